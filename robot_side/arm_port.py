@@ -1,0 +1,76 @@
+"""The Arm port: what feelahead asks of a robot, simulated or real, and what it gets back."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from common.arrays import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """What the arm measures of itself: never the truth, always what its sensors say."""
+
+    time_s: float
+    """When it was measured, on the clock of the `now` that `state` was given."""
+    joint_positions_rad: FloatArray
+    """(n,) encoder readings, with their noise and quantisation; metres for a prismatic joint."""
+    joint_velocities_rad_s: FloatArray
+    """(n,) the drives' own velocity estimate."""
+    finger_positions: FloatArray
+    """(f,) readings of the gripper's joints, in the model's order; empty without a gripper."""
+    gripper_opening_m: float
+    """The free gap between the fingers; 0 without a gripper."""
+    gripper_holding: bool
+    """The fingers were told to close and something between them stopped them."""
+
+
+class Arm(Protocol):
+    """A velocity-controlled arm that stops by itself when it is no longer told to go on."""
+
+    @property
+    def joint_count(self) -> int:
+        """The number n of joints between the base and the tool."""
+        ...
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`, then decelerate from the measured state.
+
+        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        """
+        ...
+
+    def command_gripper(self, closing: float, valid_until_s: float) -> None:
+        """Close (+1), hold (0) or open (-1) at that fraction of the gripper's speed until `valid_until_s`."""
+        ...
+
+    def state(self, now_s: float) -> ArmState:
+        """The measured state at `now_s`; a simulated arm advances its physics up to then first."""
+        ...
+
+
+@dataclass(frozen=True)
+class GripperPose:
+    """Where forward kinematics puts the tool and the gripper's spheres, in the world frame (eq. 4)."""
+
+    tool_position_m: FloatArray
+    """(3,)"""
+    tool_rotation: FloatArray
+    """(3, 3) tool to world; the approach axis is one of its columns."""
+    tool_jacobian: FloatArray
+    """(6, n) linear rows first, world frame."""
+    sphere_centers_m: FloatArray
+    """(m, 3)"""
+    sphere_radii_m: FloatArray
+    """(m,) not enlarged"""
+    sphere_jacobians: FloatArray
+    """(m, 3, n) positional Jacobian of each centre."""
+    sphere_on_finger: BoolArray
+    """(m,) whether the sphere belongs to a finger."""
+
+
+class GripperKinematics(Protocol):
+    """Forward kinematics of the estimated configuration: it sees encoder readings, not the simulation."""
+
+    def pose(self, state: ArmState) -> GripperPose:
+        """The gripper at `state`."""
+        ...

@@ -1,0 +1,62 @@
+"""What the camera reports: objects as spheres, boxes, tetrahedra and half-spaces, each with a role."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from common.arrays import FloatArray, IntArray
+
+
+class Role(Enum):
+    """What an object is to the task."""
+
+    OBSTACLE = "obstacle"
+    TARGET = "target"
+    SUPPORT = "support"
+    IGNORED = "ignored"
+
+
+@dataclass(frozen=True)
+class PerceivedObjects:
+    """Every object at its perceived pose, in the world frame, as contiguous arrays by kind of primitive.
+
+    An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`.
+    Ignored objects have no primitives.
+    """
+
+    time_s: float
+    """When the frame was taken."""
+    names: tuple[str, ...]
+    roles: tuple[Role, ...]
+    sphere_centers_m: FloatArray
+    """(s, 3)"""
+    sphere_radii_m: FloatArray
+    """(s,)"""
+    sphere_object: IntArray
+    box_centers_m: FloatArray
+    """(b, 3)"""
+    box_rotations: FloatArray
+    """(b, 3, 3) box to world"""
+    box_half_sizes_m: FloatArray
+    """(b, 3)"""
+    box_object: IntArray
+    tetrahedron_vertices_m: FloatArray
+    """(t, 4, 3)"""
+    tetrahedron_object: IntArray
+    half_space_normals: FloatArray
+    """(p, 3) unit; solid where normal·x <= offset"""
+    half_space_offsets_m: FloatArray
+    """(p,)"""
+    half_space_object: IntArray
+
+
+class ObjectSource(Protocol):
+    """A camera with segmentation, simulated or real."""
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
+        ...
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change what the object `name` is to the task, from the next frame on."""
+        ...
