@@ -1,0 +1,147 @@
+"""Every message that crosses the link, frozen and validated when it is made and when it is decoded.
+
+    operator ── Hello, MotionCommand ──▶ robot          control, ROUTER/DEALER
+    robot ── Hello, StiffnessUpdate ──▶ operator        control
+    robot ── Telemetry ──▶ whoever looks                view, PUB/SUB
+
+A field out of range or not finite makes the whole message invalid: nothing of it is ever applied.
+"""
+
+import math
+from typing import Literal
+
+import msgspec
+
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+
+MotionState = Literal["disarmed", "armed", "stopped"]
+
+
+def _in_range(name: str, low: float, high: float, *values: float) -> None:
+    for value in values:
+        if not low <= value <= high:  # false for NaN, too
+            raise ValueError(f"{name} = {value}; valid: {low} to {high}")
+
+
+def _finite(name: str, *values: float) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value}; valid: a finite number")
+
+
+class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Who sent it when, and which stamp of ours came back: four-timestamp delay estimation for free."""
+
+    epoch: int
+    """Identifies one life of the sending process; a restart makes a new one."""
+    sequence: int
+    """Grows by one with each message of the epoch, whatever its kind."""
+    sent_s: float
+    """The sender's monotonic clock when the message entered its delay line."""
+    echo_sent_s: float | None = None
+    """The newest `sent_s` that the sender has received from us, on our clock."""
+    echo_held_s: float | None = None
+    """How long the sender held that stamp, on its clock."""
+
+    def __post_init__(self) -> None:
+        _in_range("epoch", 0, 2**63 - 1, self.epoch)
+        _in_range("sequence", 0, 2**63 - 1, self.sequence)
+        _finite("sent_s", self.sent_s)
+        if (self.echo_sent_s is None) != (self.echo_held_s is None):
+            raise ValueError("echo_sent_s and echo_held_s; valid: both or neither")
+        if self.echo_sent_s is not None and self.echo_held_s is not None:
+            _finite("echo_sent_s", self.echo_sent_s)
+            _in_range("echo_held_s", 0.0, 1e9, self.echo_held_s)
+
+
+class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
+    """What all messages share."""
+
+    header: Header
+
+
+class Hello(Message, frozen=True, tag="hello"):
+    """Opens an epoch, in either direction; repeated until the peer's has arrived."""
+
+    side: Literal["operator", "robot"]
+    clock_domain: str
+    """Names the monotonic clock (common.clock.clock_domain): equal and not empty means a shared clock."""
+
+    def __post_init__(self) -> None:
+        if len(self.clock_domain) > 200:
+            raise ValueError(f"clock_domain has {len(self.clock_domain)} characters; valid: up to 200")
+
+
+class MotionCommand(Message, frozen=True, tag="motion"):
+    """What the operator's hands do: travel, not velocity, for the robot side owns the mapping."""
+
+    l2: float
+    """Calibrated travel of the left trigger, 0 to 1."""
+    r2: float
+    lateral: Vector2 = (0.0, 0.0)
+    """Left stick, right and up positive, -1 to 1 each."""
+    turning: Vector2 = (0.0, 0.0)
+    """Right stick, right and up positive, -1 to 1 each."""
+    gripper: float = 0.0
+    """-1 opens, +1 closes, 0 holds."""
+    run: bool = False
+    """The hold-to-run button is down."""
+    arm: bool = False
+    """The arming button is down."""
+    emergency_stop: bool = False
+    next_target: bool = False
+
+    def __post_init__(self) -> None:
+        _in_range("l2", 0.0, 1.0, self.l2)
+        _in_range("r2", 0.0, 1.0, self.r2)
+        _in_range("lateral", -1.0, 1.0, *self.lateral)
+        _in_range("turning", -1.0, 1.0, *self.turning)
+        _in_range("gripper", -1.0, 1.0, self.gripper)
+
+
+class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
+    """What the operator's fingers are to feel (§4.2)."""
+
+    l2: float
+    r2: float
+    rumble: float
+    """Danger that lies along neither trigger, 0 to 1."""
+    state: MotionState
+
+    def __post_init__(self) -> None:
+        _in_range("l2", 0.0, 1.0, self.l2)
+        _in_range("r2", 0.0, 1.0, self.r2)
+        _in_range("rumble", 0.0, 1.0, self.rumble)
+
+
+class Telemetry(Message, frozen=True, tag="telemetry"):
+    """What the operator's screen shows of the robot; never used for control by the robot side."""
+
+    state: MotionState
+    tool_position_m: Vector3
+    """Estimated, in the world frame."""
+    tool_speed_m_s: float
+    target: str | None
+    """The present target's name; None when there is none."""
+    target_in_tool_m: Vector3 | None
+    """The perceived target's centre in the tool frame; +z is the approach axis."""
+    gripper_opening_m: float
+    holding: bool
+    enlargement_m: float
+    """The largest over the gripper's spheres."""
+    l2: float
+    r2: float
+
+    def __post_init__(self) -> None:
+        _finite("tool_position_m", *self.tool_position_m)
+        if self.target_in_tool_m is not None:
+            _finite("target_in_tool_m", *self.target_in_tool_m)
+        _in_range("tool_speed_m_s", 0.0, 100.0, self.tool_speed_m_s)
+        _in_range("gripper_opening_m", 0.0, 10.0, self.gripper_opening_m)
+        _in_range("enlargement_m", 0.0, 100.0, self.enlargement_m)
+        _in_range("l2", 0.0, 1.0, self.l2)
+        _in_range("r2", 0.0, 1.0, self.r2)
+
+
+AnyMessage = Hello | MotionCommand | StiffnessUpdate | Telemetry
