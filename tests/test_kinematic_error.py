@@ -1,0 +1,125 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from robot_side.kinematic_error import (
+    directional_variance,
+    encoder_sigma,
+    position_covariance,
+    scalar_variance,
+)
+
+_LINKS_M = np.array([0.4, 0.3, 0.2])
+seeds = st.integers(0, 2**32 - 1)
+
+
+def _planar_position(angles_rad: FloatArray) -> FloatArray:
+    """Tip of a planar arm with the links `_LINKS_M`: (..., 3) for angles (..., 3)."""
+    heading = np.cumsum(angles_rad, axis=-1)
+    x = (_LINKS_M * np.cos(heading)).sum(axis=-1)
+    y = (_LINKS_M * np.sin(heading)).sum(axis=-1)
+    return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+
+def _planar_jacobian(angles_rad: FloatArray) -> FloatArray:
+    heading = np.cumsum(angles_rad)
+    columns = [
+        [
+            -(_LINKS_M * np.sin(heading))[joint:].sum(),
+            (_LINKS_M * np.cos(heading))[joint:].sum(),
+            0.0,
+        ]
+        for joint in range(3)
+    ]
+    return np.array(columns).T
+
+
+def test_covariance_is_what_noisy_encoders_do_to_a_planar_arm() -> None:
+    angles = np.array([0.3, -0.7, 1.1])
+    sigma = np.array([1e-3, 5e-4, 2e-3])
+    covariance = position_covariance(_planar_jacobian(angles)[None], sigma)[0]
+    rng = np.random.default_rng(1)
+    tips = _planar_position(angles + rng.normal(size=(200_000, 3)) * sigma)
+    sampled = np.cov(tips.T)
+    # 200 000 samples: a variance is known to 0.32 % (one standard deviation).
+    np.testing.assert_allclose(sampled, covariance, atol=0.015 * covariance.max())
+
+
+def test_trace_is_the_papers_root_sum_of_squares() -> None:
+    jacobian = np.random.default_rng(2).normal(size=(1, 3, 4))
+    sigma = np.array([1e-3, 2e-3, 0.0, 5e-4])
+    by_hand = sum((np.linalg.norm(jacobian[0, :, i]) * sigma[i]) ** 2 for i in range(4))
+    variance = scalar_variance(position_covariance(jacobian, sigma), "trace")
+    np.testing.assert_allclose(variance, [by_hand], rtol=1e-13)
+
+
+def test_isotropic_variance_of_one_joint_is_the_square_of_its_arc() -> None:
+    jacobian = np.array([[[0.0], [0.5], [0.0]]])
+    covariance = position_covariance(jacobian, np.array([2e-3]))
+    assert scalar_variance(covariance)[0] == pytest.approx(1e-6, rel=1e-12)
+    across = directional_variance(covariance, np.array([[1.0, 0.0, 0.0]]))
+    assert across[0] == 0.0
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(seed=seeds, points=st.integers(1, 5), joints=st.integers(1, 8))
+def test_every_direction_lies_below_isotropic_and_that_below_trace(seed: int, points: int, joints: int) -> None:
+    rng = np.random.default_rng(seed)
+    covariance = position_covariance(rng.normal(size=(points, 3, joints)), rng.uniform(0, 1e-2, joints))
+    directions = rng.normal(size=(points, 7, 3))
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    along = directional_variance(covariance, directions)
+    isotropic = scalar_variance(covariance)
+    trace = scalar_variance(covariance, "trace")
+    slack = 1e-12 * trace
+    assert (along >= 0.0).all()
+    assert (along <= (isotropic + slack)[:, None]).all()
+    assert (isotropic <= trace + slack).all()
+    assert (trace <= 3.0 * isotropic + slack).all()
+    for k in range(7):
+        np.testing.assert_allclose(directional_variance(covariance, directions[:, k]), along[:, k])
+    axes = np.linalg.eigh(covariance)[1]
+    worst = directional_variance(covariance, np.ascontiguousarray(axes[:, :, -1]))
+    np.testing.assert_allclose(worst, isotropic, rtol=1e-9)
+
+
+def test_quantisation_adds_the_variance_of_a_uniform_error() -> None:
+    step = 2.0 * math.pi / 4096
+    assert encoder_sigma(np.array([0.0]), np.array([step]))[0] == pytest.approx(step / math.sqrt(12.0))
+    both = encoder_sigma(np.array([1e-3]), np.array([step]))[0]
+    assert both**2 == pytest.approx(1e-6 + step**2 / 12.0)
+    # An encoder that rounds: the error's measured deviation is the one predicted.
+    angles = np.random.default_rng(3).uniform(-3.0, 3.0, 200_000)
+    error = np.round(angles / step) * step - angles
+    assert error.std() == pytest.approx(step / math.sqrt(12.0), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("jacobians", "sigma", "named"),
+    [
+        (np.zeros((2, 3, 4)), np.zeros(3), "encoder_sigma_rad"),
+        (np.zeros((3, 4)), np.zeros(4), "jacobians"),
+        (np.zeros((1, 2, 4)), np.zeros(4), "jacobians"),
+        (np.full((1, 3, 2), np.nan), np.zeros(2), "jacobians"),
+        (np.zeros((1, 3, 2)), np.array([0.0, np.inf]), "encoder_sigma_rad"),
+        (np.zeros((1, 3, 2)), np.array([0.0, -1e-3]), "encoder_sigma_rad"),
+    ],
+)
+def test_bad_arguments_are_named(jacobians: FloatArray, sigma: FloatArray, named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        position_covariance(jacobians, sigma)
+
+
+def test_bad_directions_and_measures_are_named() -> None:
+    covariance = np.eye(3)[None]
+    for directions in (np.zeros((1, 3)), np.full((1, 3), np.nan), np.ones((2, 3)), np.ones((1, 2))):
+        with pytest.raises(ValueError, match="directions"):
+            directional_variance(covariance, directions)
+    with pytest.raises(ValueError, match="measure"):
+        scalar_variance(covariance, "median")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="quantisation_step_rad"):
+        encoder_sigma(np.array([1e-3]), np.array([-1e-3]))
