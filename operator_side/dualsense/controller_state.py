@@ -1,0 +1,99 @@
+"""What one input report says of the controller, in units a program can use."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+Stick = tuple[float, float]
+
+SENSOR_TICKS_PER_S: Final = 3_000_000
+"""The sensor timestamp counts thirds of a microsecond."""
+SENSOR_TIME_SPAN_S: Final = 2**32 / SENSOR_TICKS_PER_S
+"""The sensor timestamp starts again at 0 after this long: 1431.7 s."""
+
+
+class Button(Enum):
+    """Everything that is pressed or not; the directional pad counts as four buttons, two on a diagonal."""
+
+    UP = "up"
+    RIGHT = "right"
+    DOWN = "down"
+    LEFT = "left"
+    SQUARE = "square"
+    CROSS = "cross"
+    CIRCLE = "circle"
+    TRIANGLE = "triangle"
+    L1 = "L1"
+    R1 = "R1"
+    L2 = "L2"
+    """The trigger has left its rest."""
+    R2 = "R2"
+    CREATE = "create"
+    OPTIONS = "options"
+    L3 = "L3"
+    """The left stick is pushed in."""
+    R3 = "R3"
+    PS = "PS"
+    TOUCHPAD = "touchpad"
+    MUTE = "mute"
+    LEFT_FUNCTION = "left function"
+    """This and the three below: DualSense Edge only."""
+    RIGHT_FUNCTION = "right function"
+    LEFT_PADDLE = "left paddle"
+    RIGHT_PADDLE = "right paddle"
+
+
+@dataclass(frozen=True, slots=True)
+class TriggerFeedback:
+    """What an adaptive trigger reports of itself: three nibbles, 0 to 15, as the controller sends them."""
+
+    stop_location: int = 0
+    """0 to 9 in every report seen so far."""
+    status: int = 0
+    """Under a feedback effect: 0 no load, 1 load."""
+    active_effect: int = 0
+    """0 other, 1 feedback, 2 weapon, 3 vibration."""
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("stop_location", self.stop_location),
+            ("status", self.status),
+            ("active_effect", self.active_effect),
+        ):
+            if not 0 <= value <= 15:
+                raise ValueError(f"{name} = {value}; valid: 0 to 15")
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerState:
+    """One input report; the defaults are a controller that nobody touches."""
+
+    left_stick: Stick = (0.0, 0.0)
+    """(x, y), -1 to 1 each: right and up are positive. No dead zone is taken off."""
+    right_stick: Stick = (0.0, 0.0)
+    l2: float = 0.0
+    """Raw travel as the controller measures it, 0 to 1; 1 comes at about 75 % of the mechanical travel."""
+    r2: float = 0.0
+    pressed: frozenset[Button] = frozenset()
+    sequence: int = 0
+    """0 to 255, one more with each report."""
+    sensor_time_s: float = 0.0
+    """The controller's clock, which wraps after SENSOR_TIME_SPAN_S."""
+    l2_feedback: TriggerFeedback = TriggerFeedback()
+    r2_feedback: TriggerFeedback = TriggerFeedback()
+
+    def __post_init__(self) -> None:
+        for name, stick in (("left_stick", self.left_stick), ("right_stick", self.right_stick)):
+            if not all(-1.0 <= axis <= 1.0 for axis in stick):
+                raise ValueError(f"{name} = {stick}; valid: -1 to 1 for each axis")
+        for name, travel in (("l2", self.l2), ("r2", self.r2)):
+            if not 0.0 <= travel <= 1.0:
+                raise ValueError(f"{name} = {travel}; valid: 0 to 1")
+        if not 0 <= self.sequence <= 255:
+            raise ValueError(f"sequence = {self.sequence}; valid: 0 to 255")
+        if not (math.isfinite(self.sensor_time_s) and 0.0 <= self.sensor_time_s < SENSOR_TIME_SPAN_S):
+            raise ValueError(f"sensor_time_s = {self.sensor_time_s}; valid: from 0 to below {SENSOR_TIME_SPAN_S}")
+        for one, opposite in ((Button.UP, Button.DOWN), (Button.LEFT, Button.RIGHT)):
+            if one in self.pressed and opposite in self.pressed:
+                raise ValueError(f"pressed has {one.value} and {opposite.value}; valid: one of the two")
