@@ -1,0 +1,140 @@
+"""The simulated finger: monotone equilibria, and dynamics that do not depend on the step."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off, TriggerEffect
+from operator_side.dualsense.trigger_model import (
+    FINGER_TIME_CONSTANT_S,
+    NORMAL_FINGER_FORCE_N,
+    SENSED_TRAVEL,
+    SPRING_PRELOAD_N,
+    SPRING_RISE_N,
+    STRENGTH_STEP_N,
+    SimulatedTrigger,
+    equilibrium_travel,
+)
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+FORCES = st.floats(0.0, 10.0)
+STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
+EFFECTS = st.one_of(st.just(Off()), st.builds(MultiPositionFeedback, STRENGTHS))
+
+
+def resistance_n(travel: float, strength: int) -> float:
+    return SPRING_PRELOAD_N + SPRING_RISE_N * travel + STRENGTH_STEP_N * strength
+
+
+def test_a_normal_pull_is_full_without_an_effect_and_overcomes_the_strongest() -> None:
+    free = equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10)
+    assert free >= SENSED_TRAVEL
+    hardest = equilibrium_travel(NORMAL_FINGER_FORCE_N, (8,) * 10)
+    assert 0.25 <= hardest <= 0.6
+    assert 0.25 <= hardest / SENSED_TRAVEL <= 0.6
+
+
+@given(FORCES, STRENGTHS)
+@REPEATABLE
+def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int, ...]) -> None:
+    """Short of it everything yields to the finger; at it, or one zone on, the resistance holds."""
+    travel = equilibrium_travel(force_n, strengths)
+    assert 0.0 <= travel <= 1.0
+    for zone in range(10):
+        begin, end = zone / 10, min((zone + 1) / 10, travel)
+        if begin < travel:
+            assert resistance_n(end, strengths[zone]) <= force_n + 1e-9
+    if 0.0 < travel < 1.0:
+        here = min(int(travel * 10 + 1e-9), 9)
+        assert resistance_n(travel, strengths[here]) >= force_n - 1e-9
+
+
+@given(FORCES, STRENGTHS, st.integers(0, 9))
+@REPEATABLE
+def test_equilibrium_never_grows_with_a_zones_strength(force_n: float, strengths: tuple[int, ...], zone: int) -> None:
+    travels = [
+        equilibrium_travel(force_n, (*strengths[:zone], strength, *strengths[zone + 1 :])) for strength in range(9)
+    ]
+    assert travels == sorted(travels, reverse=True)
+
+
+@given(FORCES, FORCES, STRENGTHS)
+@REPEATABLE
+def test_equilibrium_never_falls_with_the_force(one: float, other: float, strengths: tuple[int, ...]) -> None:
+    weak, strong = sorted((one, other))
+    assert equilibrium_travel(weak, strengths) <= equilibrium_travel(strong, strengths)
+
+
+def test_a_finger_rests_at_the_edge_of_a_stiffer_zone() -> None:
+    strengths = (0,) * 5 + (8,) * 5
+    travels = {equilibrium_travel(force_n, strengths) for force_n in (2.6, 3.0, 3.5, 4.4)}
+    assert travels == {0.5}
+    assert equilibrium_travel(2.4, strengths) < 0.5 < equilibrium_travel(4.6, strengths)
+
+
+def test_relaxation_has_the_stated_time_constant() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_finger_force(NORMAL_FINGER_FORCE_N)
+    trigger.advance(FINGER_TIME_CONSTANT_S)
+    goal = equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10)
+    assert trigger.travel == pytest.approx(goal * (1.0 - math.exp(-1.0)), abs=1e-12)
+
+
+@given(st.lists(st.tuples(FORCES, EFFECTS, st.floats(0.0, 0.5), st.integers(1, 300)), min_size=1, max_size=6))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_the_step_size_does_not_matter(phases: list[tuple[float, TriggerEffect, float, int]]) -> None:
+    coarse, fine = SimulatedTrigger(), SimulatedTrigger()
+    for force_n, effect, duration_s, steps in phases:
+        for trigger in (coarse, fine):
+            trigger.set_finger_force(force_n)
+            trigger.set_effect(effect)
+        coarse.advance(duration_s)
+        for _ in range(steps):
+            fine.advance(duration_s / steps)
+        assert fine.travel == pytest.approx(coarse.travel, abs=1e-11)
+
+
+@given(FORCES, EFFECTS, st.floats(0.0, 1e6))
+@REPEATABLE
+def test_no_step_is_too_long(force_n: float, effect: TriggerEffect, step_s: float) -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_finger_force(force_n)
+    trigger.set_effect(effect)
+    trigger.advance(step_s)
+    assert 0.0 <= trigger.travel <= equilibrium_travel(force_n, effect.zone_strengths)
+
+
+def test_load() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(Feedback(4, 8))
+    trigger.advance(1.0)
+    assert not trigger.loaded
+    trigger.set_finger_force(1.5)
+    trigger.advance(1.0)
+    assert trigger.zone == 2
+    assert not trigger.loaded  # short of the zone that resists
+    trigger.set_finger_force(3.0)
+    trigger.advance(1.0)
+    assert trigger.travel == pytest.approx(0.4, abs=1e-9)
+    assert trigger.loaded  # at rest against its edge
+    trigger.set_finger_force(10.0)
+    trigger.advance(1.0)
+    assert trigger.zone == 9
+    assert trigger.sensed_travel == 1.0
+    assert trigger.loaded
+
+
+def test_arguments_out_of_range() -> None:
+    trigger = SimulatedTrigger()
+    for force_n in (-0.1, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="finger_force_n"):
+            trigger.set_finger_force(force_n)
+    for step_s in (-0.1, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="step_s"):
+            trigger.advance(step_s)
+    with pytest.raises(ValueError, match="zone_strengths"):
+        equilibrium_travel(1.0, (1,) * 9)
+    with pytest.raises(ValueError, match="zone_strengths"):
+        equilibrium_travel(1.0, (9,) * 10)
