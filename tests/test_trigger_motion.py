@@ -1,0 +1,139 @@
+"""The controller's state to the operator's intent: dead zones, calibration and the button map."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from operator_side.dualsense.report import Button, ControllerState
+from operator_side.trigger_motion import (
+    BUTTON_OF,
+    Action,
+    OperatorIntent,
+    TravelCalibration,
+    operator_intent,
+)
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+AXES = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+CALIBRATIONS = st.builds(
+    TravelCalibration, st.floats(0.0, 0.4), st.floats(0.5, 1.0), stick_dead_zone=st.floats(0.0, 0.9)
+)
+
+
+def pressing(*buttons: Button) -> OperatorIntent:
+    return operator_intent(ControllerState(pressed=frozenset(buttons)))
+
+
+def test_nobody_touches_it() -> None:
+    intent = operator_intent(ControllerState())
+    assert intent == OperatorIntent(0.0, 0.0, (0.0, 0.0), (0.0, 0.0), False, False, False, False, 0)
+    assert intent.triggers_released
+
+
+def test_travel_runs_from_the_dead_zone_to_saturation() -> None:
+    calibration = TravelCalibration(dead_zone=0.1, saturation=0.9)
+    raw_to_travel = {0.0: 0.0, 0.1: 0.0, 0.3: 0.25, 0.5: 0.5, 0.9: 1.0, 1.0: 1.0}
+    for raw, travel in raw_to_travel.items():
+        intent = operator_intent(ControllerState(l2=raw, r2=1.0 - raw), calibration)
+        assert intent.l2 == pytest.approx(travel, abs=1e-12)
+        assert intent.r2 == pytest.approx(1.0 - travel, abs=1e-12)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), CALIBRATIONS)
+@REPEATABLE
+def test_travel_is_monotone_and_in_range(one: float, other: float, calibration: TravelCalibration) -> None:
+    low, high = (calibration.travel(raw) for raw in sorted((one, other)))
+    assert 0.0 <= low <= high <= 1.0
+
+
+@pytest.mark.parametrize(("l2", "r2", "released"), [(0.04, 0.05, True), (0.06, 0.0, False), (0.0, 1.0, False)])
+def test_released_means_within_the_dead_zone(l2: float, r2: float, released: bool) -> None:
+    assert operator_intent(ControllerState(l2=l2, r2=r2)).triggers_released is released
+
+
+@given(AXES, CALIBRATIONS)
+@REPEATABLE
+def test_sticks_keep_their_direction_and_lose_the_dead_zone(
+    raw: tuple[float, float], calibration: TravelCalibration
+) -> None:
+    x, y = calibration.stick(raw)
+    assert -1.0 <= x <= 1.0
+    assert -1.0 <= y <= 1.0
+    radius = math.hypot(*raw)
+    if radius <= calibration.stick_dead_zone:
+        assert (x, y) == (0.0, 0.0)
+        return
+    expected = min((radius - calibration.stick_dead_zone) / (1.0 - calibration.stick_dead_zone), 1.0)
+    assert math.hypot(x, y) == pytest.approx(expected, abs=1e-12)
+    assert x * raw[1] == pytest.approx(y * raw[0], abs=1e-12)
+
+
+def test_left_stick_moves_across_and_right_stick_turns() -> None:
+    intent = operator_intent(ControllerState(left_stick=(1.0, 0.0), right_stick=(0.0, -1.0)))
+    assert intent.lateral == (1.0, 0.0)
+    assert intent.turning == (0.0, -1.0)
+
+
+def test_the_button_map() -> None:
+    assert dict(BUTTON_OF) == {
+        Action.RUN: Button.L1,
+        Action.ARM: Button.OPTIONS,
+        Action.EMERGENCY_STOP: Button.CIRCLE,
+        Action.CLOSE_GRIPPER: Button.CROSS,
+        Action.OPEN_GRIPPER: Button.SQUARE,
+        Action.NEXT_TARGET: Button.TRIANGLE,
+    }
+
+
+@pytest.mark.parametrize(
+    ("button", "field", "value"),
+    [
+        (Button.L1, "run", True),
+        (Button.OPTIONS, "arm", True),
+        (Button.CIRCLE, "emergency_stop", True),
+        (Button.TRIANGLE, "next_target", True),
+        (Button.CROSS, "gripper", 1),
+        (Button.SQUARE, "gripper", -1),
+    ],
+)
+def test_each_button_does_one_thing(button: Button, field: str, value: object) -> None:
+    idle = operator_intent(ControllerState())
+    intent = pressing(button)
+    changed = {name for name in idle.__dataclass_fields__ if getattr(idle, name) != getattr(intent, name)}
+    assert changed == {field}
+    assert getattr(intent, field) == value
+
+
+def test_every_other_button_does_nothing() -> None:
+    unused = [button for button in Button if button not in BUTTON_OF.values()]
+    assert len(unused) == len(Button) - 6
+    for button in unused:
+        assert pressing(button) == pressing()
+
+
+def test_both_gripper_buttons_hold() -> None:
+    assert pressing(Button.CROSS, Button.SQUARE).gripper == 0
+
+
+def test_the_emergency_stop_overrules_the_other_buttons() -> None:
+    assert pressing(*BUTTON_OF.values()) == pressing(Button.CIRCLE)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"dead_zone": -0.1},
+        {"dead_zone": 0.98},
+        {"saturation": 1.1},
+        {"saturation": math.nan},
+        {"dead_zone": math.nan},
+        {"stick_dead_zone": 1.0},
+        {"stick_dead_zone": math.nan},
+    ],
+)
+def test_impossible_calibrations(fields: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="valid: 0"):
+        TravelCalibration(**fields)
