@@ -1,0 +1,115 @@
+"""Settings from three layers, defaults under a TOML file under flags, and errors in one line."""
+
+import contextlib
+import dataclasses
+import io
+import sys
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+import msgspec
+import tyro
+
+from common.errors import ConfigurationError, FeelaheadError
+
+Settings = TypeVar("Settings")
+
+
+def parse_settings(settings_type: type[Settings], program: str, arguments: Sequence[str]) -> Settings:
+    """Build the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
+
+    Every field of the (nested) dataclass is a key of the file and a flag: `[camera] mean_m = 0.001` and
+    `--camera.mean-m 0.001`. ConfigurationError for whatever is unknown, malformed or out of range; SystemExit
+    after `--help`.
+    """
+    path = _config_path(arguments)
+    try:
+        default = settings_type() if path is None else load_toml(Path(path), settings_type)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from error
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.cli(
+                settings_type,
+                prog=program,
+                args=list(arguments),
+                default=default,
+                config=(tyro.conf.AvoidSubcommands, tyro.conf.OmitArgPrefixes)
+                if not _is_nested(settings_type)
+                else (tyro.conf.AvoidSubcommands,),
+            )
+    except SystemExit as stop:
+        if stop.code:
+            raise ConfigurationError(_one_line(complaint.getvalue(), program)) from None
+        raise
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from error
+
+
+def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
+    """Read `settings_type` from a TOML file; ConfigurationError names the file, the key and what is valid."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(f"--config {path}: cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"--config {path}: is no valid TOML: {error}") from error
+    _refuse_unknown_keys(content, settings_type, path, "")
+    try:
+        return msgspec.convert(content, settings_type)
+    except msgspec.ValidationError as error:
+        raise ConfigurationError(f"--config {path}: {error}") from error
+
+
+def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
+    """Run `command(arguments)` and exit: a FeelaheadError becomes one line and exit code 2."""
+    try:
+        code = command(sys.argv[1:])
+    except FeelaheadError as error:
+        print(f"{program}: {error}", file=sys.stderr)
+        code = 2
+    except KeyboardInterrupt:
+        code = 0
+    sys.exit(code)
+
+
+def _config_path(arguments: Sequence[str]) -> str | None:
+    """The value of --config, read before the flags because it provides their defaults."""
+    path = None
+    for position, argument in enumerate(arguments):
+        if argument == "--config":
+            if position + 1 == len(arguments):
+                raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
+            path = arguments[position + 1]
+        elif argument.startswith("--config="):
+            path = argument.removeprefix("--config=")
+    return path
+
+
+def _is_nested(settings_type: type) -> bool:
+    return any(dataclasses.is_dataclass(hint) for hint in get_type_hints(settings_type).values())
+
+
+def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str) -> None:
+    hints = get_type_hints(settings_type)
+    for key, value in content.items():
+        if key not in hints:
+            raise ConfigurationError(
+                f"--config {path}: unknown key {prefix + key!r}; valid: {', '.join(sorted(hints))}"
+            )
+        if isinstance(value, dict) and dataclasses.is_dataclass(hints[key]):
+            _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.")
+
+
+def _one_line(box: str, program: str) -> str:
+    """The first paragraph of tyro's boxed complaint as one line."""
+    words: list[str] = []
+    for line in box.splitlines()[1:]:
+        text = line.strip("│ \t")
+        if text.startswith(("──", "╰─")):
+            break
+        words += text.split()
+    return f"{' '.join(words)} (see {program} --help)"

@@ -1,0 +1,115 @@
+"""One end of a link to one peer: stamps what leaves, and orders and measures what arrives."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from common.delay import ClockOffset, QueueingAge
+from common.messages import AnyMessage, Header, Hello
+from common.statistics import RunningStatistics
+
+_REMEMBERED_EPOCHS = 64
+"""Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """What the stamps of one message say at the moment it arrived."""
+
+    fresh: bool
+    """Newer than all that came before of its kind, in the peer's present epoch: it may be applied."""
+    queueing_age_s: float
+    """Its one-way delay beyond the sliding minimum: what a queue added, whatever the distance."""
+    one_way_s: float | None
+    """Its delay from the peer; None while the clock offset is unknown."""
+    loop_age_s: float | None
+    """Since we sent the stamp that it echoes: both ways, holding and ticks; None before the first echo."""
+
+
+class LinkEnd:
+    """Epoch, sequence numbers, echoes and delay statistics towards one peer.
+
+    Latest wins and never twice: of each kind of message only a higher sequence number of the present epoch is
+    fresh. An epoch begins with the peer's Hello; one that has ended is refused for good.
+    """
+
+    def __init__(self, side: Literal["operator", "robot"], epoch: int, clock_domain: str, seed: int = 0) -> None:
+        self.delay = RunningStatistics(seed)
+        """One-way delay from the peer in seconds, every arrival, before ordering."""
+        self.round_trip = RunningStatistics(seed)
+        """Both ways without the peer's holding time, in seconds, every arrival that echoes a stamp."""
+        self.stale = 0
+        """Messages that came too late to be applied, or of no known epoch."""
+        self._side = side
+        self._epoch = epoch
+        self._clock_domain = clock_domain
+        self._sequence = 0
+        self._ended_epochs: list[int] = []
+        self._forget_peer(None, shared_clock=False)
+
+    def _forget_peer(self, epoch: int | None, *, shared_clock: bool) -> None:
+        self.peer_epoch = epoch
+        self._offset = ClockOffset(shared_clock=shared_clock)
+        self._queueing = QueueingAge()
+        self._newest_of_kind: dict[type, int] = {}
+        self._newest: Header | None = None
+        self._newest_received_s = 0.0
+
+    def hello(self, now_s: float) -> Hello:
+        """The message that opens our epoch."""
+        return Hello(self.stamp(now_s), side=self._side, clock_domain=self._clock_domain)
+
+    def stamp(self, now_s: float) -> Header:
+        """The header of the next message, to be made when it enters its delay line."""
+        self._sequence += 1
+        if self._newest is None:
+            return Header(epoch=self._epoch, sequence=self._sequence, sent_s=now_s)
+        return Header(
+            epoch=self._epoch,
+            sequence=self._sequence,
+            sent_s=now_s,
+            echo_sent_s=self._newest.sent_s,
+            echo_held_s=now_s - self._newest_received_s,
+        )
+
+    def arrived(self, message: AnyMessage, now_s: float) -> Arrival:
+        """Measure and order one message from the peer."""
+        header = message.header
+        if isinstance(message, Hello) and header.epoch != self.peer_epoch:
+            self._begin_epoch(message)
+        if header.epoch != self.peer_epoch:
+            self.stale += 1
+            return Arrival(fresh=False, queueing_age_s=0.0, one_way_s=None, loop_age_s=None)
+        loop_age_s = self._measure_loop(header, now_s)
+        one_way_s = self._offset.one_way_from_peer_s(header.sent_s, now_s)
+        if one_way_s is not None:
+            self.delay.add(one_way_s)
+        queueing_age_s = self._queueing.update(header.sent_s, now_s)
+        if self._newest is None or header.sequence > self._newest.sequence:
+            self._newest, self._newest_received_s = header, now_s
+        fresh = header.sequence > self._newest_of_kind.get(type(message), 0)
+        if fresh:
+            self._newest_of_kind[type(message)] = header.sequence
+        else:
+            self.stale += 1
+        return Arrival(fresh, queueing_age_s, one_way_s, loop_age_s)
+
+    def _begin_epoch(self, hello: Hello) -> None:
+        epoch = hello.header.epoch
+        if epoch in self._ended_epochs:
+            return
+        if self.peer_epoch is not None:
+            self._ended_epochs = [*self._ended_epochs, self.peer_epoch][-_REMEMBERED_EPOCHS:]
+        shared = self._clock_domain != "" and hello.clock_domain == self._clock_domain
+        self._forget_peer(epoch, shared_clock=shared)
+
+    def _measure_loop(self, header: Header, now_s: float) -> float | None:
+        loop_age_s = None
+        if header.echo_sent_s is not None and header.echo_held_s is not None:
+            loop_age_s = now_s - header.echo_sent_s
+            # A stamp from before our own restart, or a peer that invents one, says nothing about the link.
+            if loop_age_s < header.echo_held_s:
+                loop_age_s = None
+            else:
+                self._offset.update(header.echo_sent_s, header.sent_s, header.echo_held_s, now_s)
+                self.round_trip.add(loop_age_s - header.echo_held_s)
+        return loop_age_s

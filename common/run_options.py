@@ -1,0 +1,40 @@
+"""The flags that every running side has in common."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from common.link_model import LinkModel, LinkSpec
+from common.status import StatusMode
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What to emulate, how long to run, and what to say about it."""
+
+    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Settings from a file, under these flags; every flag's name is a key."""
+    link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = ""
+    """Emulated link for what this side sends, in netem's words: "delay 50ms 10ms distribution normal", or per
+    direction: "to_robot: delay 20ms; to_operator: delay 50ms 10ms"."""
+    link_model: LinkModel = "datagram"
+    """datagram lets jitter reorder messages, stream keeps them in order as TCP does."""
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    """End after this long; without it, at Ctrl-C."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """For every random draw: the same seed gives the same noise and delays."""
+    summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the run's figures there at the end."""
+    status: StatusMode = "line"
+    """A live line for people, JSON lines for programs, or nothing."""
+
+    def __post_init__(self) -> None:
+        LinkSpec.parse(self.link, 0, self.link_model)
+        if self.duration is not None and not 0.0 < self.duration < 1e6:
+            raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
+        if self.seed < 0:
+            raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
+        if self.summary is not None and not self.summary.absolute().parent.is_dir():
+            raise ValueError(f"--summary {self.summary}: there is no folder {self.summary.absolute().parent}")

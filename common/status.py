@@ -1,0 +1,78 @@
+"""A live one-line status for people, or a line of JSON at a time for the program that started us."""
+
+import json
+import sys
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Literal
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+StatusMode = Literal["line", "json", "none"]
+Value = float | int | str | bool | None
+
+_PERIOD_S = 0.2
+_PERIOD_WITHOUT_TERMINAL_S = 2.0
+
+
+class Status:
+    """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error."""
+
+    def __init__(self, mode: StatusMode, program: str) -> None:
+        self._mode = mode
+        self._program = program
+        self._console = Console()
+        self._live: Live | None = None
+        self._next_s = -1.0
+
+    def __enter__(self) -> "Status":
+        if self._mode == "line" and self._console.is_terminal:
+            self._live = Live(console=self._console, auto_refresh=False, transient=False)
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def due(self, now_s: float) -> bool:
+        """Whether `show` would show anything; building the values costs time in a tick."""
+        return self._mode != "none" and now_s >= self._next_s
+
+    def show(self, now_s: float, values: Mapping[str, Value]) -> None:
+        """Show the values, at most five times a second; BrokenPipeError when a JSON reader has gone."""
+        if not self.due(now_s):
+            return
+        self._next_s = now_s + _PERIOD_S
+        if self._mode == "json":
+            self.event("status", **values)
+            return
+        line = f"{self._program}  " + "  ".join(f"{name} {_shown(value)}" for name, value in values.items())
+        if self._live is not None:
+            self._live.update(Text(line, overflow="ellipsis", no_wrap=True), refresh=True)
+        else:
+            self._next_s = now_s + _PERIOD_WITHOUT_TERMINAL_S
+            print(line, flush=True)
+
+    def event(self, kind: str, **values: Value) -> None:
+        """One line of JSON, in the JSON mode only, at once."""
+        if self._mode == "json":
+            sys.stdout.write(json.dumps({"event": kind, **values}) + "\n")
+            sys.stdout.flush()
+
+    def note(self, text: str) -> None:
+        """A line that stays, for people."""
+        if self._mode == "line":
+            self._console.print(f"{self._program}: {text}", markup=False, highlight=False)
+
+
+def _shown(value: Value) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)

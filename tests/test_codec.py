@@ -1,0 +1,161 @@
+import math
+from typing import Any
+
+import msgpack
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
+from common.errors import RemoteProtocolError
+from common.messages import AnyMessage, Header, Hello, MotionCommand, StiffnessUpdate, Telemetry
+
+unit = st.floats(0.0, 1.0)
+signed_unit = st.floats(-1.0, 1.0)
+finite = st.floats(-1e6, 1e6)
+headers = st.builds(
+    Header,
+    epoch=st.integers(0, 2**63 - 1),
+    sequence=st.integers(0, 2**63 - 1),
+    sent_s=finite,
+    echo_sent_s=st.none(),
+    echo_held_s=st.none(),
+) | st.builds(
+    Header,
+    epoch=st.integers(0, 2**53),
+    sequence=st.integers(0, 2**53),
+    sent_s=finite,
+    echo_sent_s=finite,
+    echo_held_s=unit,
+)
+messages: st.SearchStrategy[AnyMessage] = st.one_of(
+    st.builds(Hello, headers, side=st.sampled_from(["operator", "robot"]), clock_domain=st.text(max_size=50)),
+    st.builds(
+        MotionCommand,
+        headers,
+        l2=unit,
+        r2=unit,
+        lateral=st.tuples(signed_unit, signed_unit),
+        turning=st.tuples(signed_unit, signed_unit),
+        gripper=signed_unit,
+        run=st.booleans(),
+    ),
+    st.builds(StiffnessUpdate, headers, l2=unit, r2=unit, rumble=unit, state=st.sampled_from(["armed", "stopped"])),
+)
+HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
+
+
+@given(messages)
+@settings(derandomize=True, deadline=None)
+def test_messages_come_back_as_they_were(message: AnyMessage) -> None:
+    payload = encode(message)
+    assert decode(payload) == message
+    assert len(payload) <= MAXIMUM_BYTES
+
+
+@given(st.binary(max_size=200))
+@settings(derandomize=True, deadline=None, max_examples=500)
+def test_garbage_raises_only_the_documented_error(payload: bytes) -> None:
+    with pytest.raises(RemoteProtocolError):
+        decode(payload)
+
+
+@given(messages, st.data())
+@settings(derandomize=True, deadline=None, max_examples=500)
+def test_damaged_messages_decode_to_valid_ones_or_are_refused_whole(message: AnyMessage, data: st.DataObject) -> None:
+    payload = bytearray(encode(message))
+    position = data.draw(st.integers(0, len(payload) - 1))
+    payload[position] ^= data.draw(st.integers(1, 255))
+    try:
+        decoded = decode(bytes(payload[: data.draw(st.integers(0, len(payload)))]))
+    except RemoteProtocolError:
+        return
+    assert decode(encode(decoded)) == decoded
+
+
+nested = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**63)
+    | st.floats()
+    | st.text(max_size=8)
+    | st.binary(max_size=8),
+    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=4), inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(nested)
+@settings(derandomize=True, deadline=None, max_examples=500)
+def test_well_packed_nonsense_is_refused(content: Any) -> None:
+    with pytest.raises(RemoteProtocolError):
+        decode(msgpack.packb([PROTOCOL_VERSION, content]))
+
+
+def motion(**changes: Any) -> list[Any]:
+    fields = {"r2": 0.5, "lateral": [0.0, 0.0], "sent_s": 3.0} | changes
+    header = [1, 2, fields["sent_s"], None, None]
+    return [
+        PROTOCOL_VERSION,
+        ["motion", header, 0.0, fields["r2"], fields["lateral"], [0.0, 0.0], 0.0, True, False, False, False],
+    ]
+
+
+def test_the_unspoiled_message_is_valid() -> None:
+    assert decode(msgpack.packb(motion())) == MotionCommand(HEADER, l2=0.0, r2=0.5, run=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"r2": math.nan}, "r2"),
+        ({"r2": math.inf}, "r2"),
+        ({"r2": 1.0001}, "r2"),
+        ({"r2": -1e-9}, "r2"),
+        ({"r2": True}, "float"),
+        ({"r2": "1"}, "float"),
+        ({"lateral": [0.0]}, "length 2"),
+        ({"lateral": [0.0, math.nan]}, "lateral"),
+        ({"sent_s": math.inf}, "sent_s"),
+    ],
+)
+def test_one_bad_field_spoils_the_whole_message(changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(RemoteProtocolError, match=named):
+        decode(msgpack.packb(motion(**changes)))
+
+
+def test_another_version_is_told_apart_from_garbage() -> None:
+    content = motion()
+    content[0] = PROTOCOL_VERSION + 1
+    with pytest.raises(RemoteProtocolError, match=f"protocol version {PROTOCOL_VERSION + 1}"):
+        decode(msgpack.packb(content))
+
+
+def test_an_oversize_payload_is_not_looked_into() -> None:
+    with pytest.raises(RemoteProtocolError, match=str(MAXIMUM_BYTES)):
+        decode(encode(Hello(HEADER, side="robot", clock_domain="")) + bytes(MAXIMUM_BYTES))
+
+
+def test_messages_refuse_bad_values_when_made() -> None:
+    with pytest.raises(ValueError, match="rumble"):
+        StiffnessUpdate(HEADER, l2=0.0, r2=0.0, rumble=2.0, state="armed")
+    with pytest.raises(ValueError, match="both or neither"):
+        Header(epoch=1, sequence=1, sent_s=0.0, echo_sent_s=1.0)
+
+
+def test_telemetry_comes_back() -> None:
+    message = Telemetry(
+        HEADER,
+        state="armed",
+        tool_position_m=(0.1, 0.2, 0.3),
+        tool_speed_m_s=0.1,
+        target="target",
+        target_in_tool_m=None,
+        up_in_tool=(0.0, -1.0, 0.0),
+        gripper_opening_m=0.08,
+        holding=False,
+        enlargement_m=0.01,
+        l2=0.0,
+        r2=1.0,
+    )
+    assert decode(encode(message)) == message

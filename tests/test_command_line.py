@@ -1,0 +1,95 @@
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from common.command_line import load_toml, parse_settings
+from common.errors import ConfigurationError
+from common.run_options import RunOptions
+
+
+@dataclass(frozen=True)
+class Inner:
+    sd_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not self.sd_m >= 0.0:
+            raise ValueError(f"sd_m = {self.sd_m}; valid: 0 or more")
+
+
+@dataclass(frozen=True)
+class Options(RunOptions):
+    """What a test runs."""
+
+    probability: float = 0.99
+    camera: Inner = field(default_factory=Inner)
+
+
+def parse(*arguments: str) -> Options:
+    return parse_settings(Options, "prog", arguments)
+
+
+def test_flags_win_over_the_file_which_wins_over_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "options.toml"
+    path.write_text("probability = 0.5\nseed = 3\n[camera]\nsd_m = 0.2\n")
+    options = parse("--config", str(path), "--seed", "4")
+    assert (options.probability, options.seed, options.camera.sd_m) == (0.5, 4, 0.2)
+    assert parse(f"--config={path}", "--camera.sd-m", "0.3").camera.sd_m == 0.3
+    assert parse().probability == 0.99
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--nonsense", "1"], "--nonsense"),
+        (["--seed", "x"], "--seed"),
+        (["--seed", "-1"], "-1"),
+        (["--camera.sd-m", "-2"], "sd_m = -2"),
+        (["--duration", "0"], "0.0"),
+        (["--duration"], "--duration"),
+        (["--link", "delay -5ms"], "-5ms"),
+        (["--link", "delay"], "delay"),
+        (["--link", "dealy 5ms"], "dealy"),
+        (["--link-model", "pigeon"], "pigeon"),
+        (["--config"], "--config"),
+        (["--config", "missing.toml"], "missing.toml"),
+        (["--summary", "no/such/folder/out.json"], "no/such/folder"),
+    ],
+)
+def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        parse(*arguments)
+    text = str(caught.value)
+    assert named in text
+    assert "\n" not in text
+    assert "│" not in text
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("probability = ", "no valid TOML"),
+        ("probability = 'x'", "probability"),
+        ("probabilty = 0.9", "probabilty"),
+        ("[camera]\nsd = 1.0", "camera.sd"),
+        ("[camera]\nsd_m = -1.0", "sd_m = -1.0"),
+        ("camera = 3", "camera"),
+        ("seed = -4", "-4"),
+    ],
+)
+def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, content: str, named: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError) as caught:
+        load_toml(path, Options)
+    text = str(caught.value)
+    assert named in text
+    assert "bad.toml" in text
+    assert "\n" not in text
+
+
+def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        parse("--help")
+    assert stop.value.code == 0
+    assert "--probability" in capsys.readouterr().out
