@@ -3,7 +3,7 @@
     FeelaheadError
     ├── ConfigurationError   what a person asked for cannot be done (also a ValueError); a command prints it
     │                        as one line and ends with exit code 2
-    ├── RemoteProtocolError  the peer sent something that is not a valid message; it is counted and dropped whole
+    ├── RemoteProtocolError  the peer sent what is no valid message; it is counted and dropped whole
     └── DeviceError          the controller is missing, unreadable or gone; the text says what to do about it
 
 Arguments of public functions that are out of range raise a plain ValueError that names the argument.

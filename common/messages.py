@@ -126,6 +126,8 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
     """The present target's name; None when there is none."""
     target_in_tool_m: Vector3 | None
     """The perceived target's centre in the tool frame; +z is the approach axis."""
+    up_in_tool: Vector3
+    """The world's upward direction in the tool frame: an artificial horizon."""
     gripper_opening_m: float
     holding: bool
     enlargement_m: float
@@ -135,6 +137,7 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
 
     def __post_init__(self) -> None:
         _finite("tool_position_m", *self.tool_position_m)
+        _in_range("up_in_tool", -1.001, 1.001, *self.up_in_tool)
         if self.target_in_tool_m is not None:
             _finite("target_in_tool_m", *self.target_in_tool_m)
         _in_range("tool_speed_m_s", 0.0, 100.0, self.tool_speed_m_s)

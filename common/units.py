@@ -17,9 +17,7 @@ def parse_duration(text: str, field: str) -> float:
     """
     match = re.fullmatch(rf"({_NUMBER})([a-z]+)", text.strip())
     if match is None or match[2] not in _SECONDS:
-        raise ConfigurationError(
-            f"{field}: {text!r} is no duration; valid: a number with us, ms or s, such as 50ms"
-        )
+        raise ConfigurationError(f"{field}: {text!r} is no duration; valid: a number with us, ms or s, such as 50ms")
     seconds = float(match[1]) * _SECONDS[match[2]]
     if not math.isfinite(seconds) or seconds < 0.0:
         raise ConfigurationError(f"{field}: {text!r} is negative or not finite; valid: 0s or longer")
