@@ -1,0 +1,36 @@
+"""Joint encoders: what the arm's sensors say of its true configuration (eq. 3)."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.kinematic_error import encoder_sigma
+
+
+class Encoder:
+    """An absolute encoder on every joint: white noise, then rounding to whole steps.
+
+    The defaults are assumptions, not one arm's specification: a 15-bit ring on the joint's output, a usual
+    class for collaborative arms, and 0.2 mrad for what calibration, eccentricity and gear flex leave over.
+    """
+
+    def __init__(self, sigma_rad: float = 2e-4, resolution_rad: float = 2.0 * math.pi / 2**15, seed: int = 0) -> None:
+        """Seed the noise. ValueError for a negative or non-finite deviation or step; a step of 0 is none."""
+        for name, value in (("sigma_rad", sigma_rad), ("resolution_rad", resolution_rad)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} = {value}; valid: finite and 0 or more")
+        self._sigma_rad = sigma_rad
+        self._resolution_rad = resolution_rad
+        self._noise = np.random.default_rng(seed)
+
+    def read(self, true_positions: FloatArray) -> FloatArray:
+        """Readings (n,) of joints that stand at `true_positions` (n,), radians; metres for a prismatic joint."""
+        readings: FloatArray = true_positions + self._sigma_rad * self._noise.standard_normal(true_positions.shape)
+        if self._resolution_rad > 0.0:
+            readings = self._resolution_rad * np.round(readings / self._resolution_rad)
+        return readings
+
+    def standard_deviation_rad(self) -> float:
+        """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
+        return float(encoder_sigma(np.array(self._sigma_rad), np.array(self._resolution_rad)))
