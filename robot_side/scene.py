@@ -1,0 +1,269 @@
+"""The simulated world: MJCF to an arm among objects, what a camera sees of them, and what is true of them."""
+
+import logging
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from robot_side.camera_error import CameraError
+from robot_side.model_enums import GeomKind
+from robot_side.object_primitives import ObjectPrimitives, SceneObject
+from robot_side.object_roles import assign_roles
+from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.robot_model import RobotModel, can_touch, find_robot
+
+_LOG = logging.getLogger(__name__)
+_ASSETS = Path(__file__).parent / "assets"
+# MuJoCo wants a prefix for what is attached; objects are named without it.
+_TABLE_PREFIX = "table_scene/"
+_START_KEY = "feelahead_start"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A compiled model and its one live state, which the arm advances and everybody else only reads."""
+
+    model: Any
+    """mujoco.MjModel"""
+    data: Any
+    """mujoco.MjData"""
+    robot: RobotModel
+    objects: tuple[SceneObject, ...]
+    roles: dict[str, Role]
+    """Each object's present role; `MujocoCamera.set_role` changes it."""
+    primitives: ObjectPrimitives
+    warnings: tuple[str, ...]
+    """What MuJoCo had to say about the model."""
+
+    @property
+    def approximated(self) -> tuple[str, ...]:
+        """Names of the objects that are perceived as the boxes around their shapes."""
+        return self.primitives.approximated
+
+
+def load_scene(
+    model_path: Path | None = None, site: str | None = None, roles: Mapping[str, Role] | None = None
+) -> Scene:
+    """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
+
+    A file with nothing but a robot and planes gets the built-in table and its objects in front of the robot.
+    The arm starts at the keyframe `home`, else the first keyframe, else the middle of its joints' ranges.
+    `roles` overrides what the objects' names tell. ConfigurationError, one line, for what cannot be used.
+    """
+    mujoco.set_mju_user_warning(_log_warning)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        if model_path is None:
+            spec, site = _read(_ASSETS / "arm.xml"), site or "tool"
+        else:
+            spec = _read(model_path)
+        model = _compile(spec)
+        robot = find_robot(model, site)
+        start = _start_configuration(model, robot)
+        if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot) for geom in thing.geoms):
+            # Attaching extends the keyframes by what is attached, so that one carries the configuration over.
+            spec.add_key(name=_START_KEY, qpos=start)
+            _attach_table(spec, model, robot, start)
+            model = _compile(spec)
+            robot = find_robot(model, site)
+            start = model.key(_START_KEY).qpos
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_forward(model, data)
+    objects = _objects(model, robot)
+    return Scene(
+        model=model,
+        data=data,
+        robot=robot,
+        objects=objects,
+        roles=assign_roles([thing.name for thing in objects], roles or {}),
+        primitives=ObjectPrimitives(model, objects),
+        warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
+    )
+
+
+class MujocoCamera:
+    """An ObjectSource: the simulated objects as a camera with segmentation reports them, frame by frame."""
+
+    def __init__(self, scene: Scene, error: CameraError | None = None, frame_rate_hz: float = 30.0) -> None:
+        """Look at `scene` with `error`, drawn for its objects' names in their order; no error when None."""
+        if not (math.isfinite(frame_rate_hz) and frame_rate_hz > 0.0):
+            raise ValueError(f"frame_rate_hz = {frame_rate_hz}; valid: finite and above 0")
+        self._scene = scene
+        self._error = error or CameraError(tuple(thing.name for thing in scene.objects))
+        self._period_s = 1.0 / frame_rate_hz
+        self._origin_s: float | None = None
+        self._frame_number = -1
+        self._newest: PerceivedObjects | None = None
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
+        if self._origin_s is None:
+            self._origin_s = now_s
+        # A frame is due on the grid of the first one, so that the rate does not sink with the tick's period.
+        number = math.floor((now_s - self._origin_s) / self._period_s + 1e-9)
+        if self._newest is None or number > self._frame_number:
+            self._frame_number = number
+            scene = self._scene
+            self._newest = scene.primitives.place(
+                now_s, scene.roles, self._error.next_frame(), scene.data.geom_xpos, scene.data.geom_xmat
+            )
+        return self._newest
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change what the object `name` is to the task, from the next frame on. ValueError for an unknown name."""
+        if name not in self._scene.roles:
+            raise ValueError(f"name = {name!r} is no object; valid: {', '.join(self._scene.roles)}")
+        self._scene.roles[name] = role
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What nobody on the robot side can see: where the gripper really is among the objects."""
+
+    min_distance_m: float | None
+    """From the true, unenlarged gripper to the nearest object that is no support, negative inside it; None beyond
+    the distance that was looked for."""
+    min_obstacle_distance_m: float | None
+    """The same over obstacles alone."""
+    contacts: frozenset[tuple[str, str]]
+    """(gripper geom, object) now in contact, supports included"""
+
+
+class GroundTruth:
+    """Watches the simulation itself, for the summary and for tests."""
+
+    def __init__(self, scene: Scene, farthest_m: float = 1.0) -> None:
+        """Look for objects up to `farthest_m` from the gripper."""
+        self._scene = scene
+        self._farthest_m = farthest_m
+        model = scene.model
+        self._gripper = {int(geom): model.geom(geom).name or f"geom{geom}" for geom in scene.robot.gripper_geoms}
+        self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
+
+    def observe(self) -> Truth:
+        """The distances and contacts at the simulation's present state."""
+        roles = self._scene.roles
+        obstacles = [geom for geom, name in self._object_of.items() if roles[name] is Role.OBSTACLE]
+        others = [geom for geom, name in self._object_of.items() if roles[name] in {Role.TARGET, Role.IGNORED}]
+        to_obstacles = self._distance(obstacles, self._farthest_m)
+        to_any = min(to_obstacles, self._distance(others, to_obstacles))
+        return Truth(
+            min_distance_m=to_any if to_any < self._farthest_m else None,
+            min_obstacle_distance_m=to_obstacles if to_obstacles < self._farthest_m else None,
+            contacts=self._contacts(),
+        )
+
+    def _distance(self, object_geoms: list[int], farthest_m: float) -> float:
+        """The smallest signed distance between the gripper and some geoms, at most `farthest_m`."""
+        model, data = self._scene.model, self._scene.data
+        mine, theirs = np.array(list(self._gripper), dtype=np.int64), np.array(object_geoms, dtype=np.int64)
+        if theirs.size == 0:
+            return farthest_m
+        apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
+        # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
+        bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
+        bound -= model.geom_rbound[mine][:, None]
+        nearest = farthest_m
+        for pair in np.argsort(bound, axis=None):
+            first, second = np.unravel_index(pair, bound.shape)
+            if bound[first, second] >= nearest:
+                break
+            distance = mujoco.mj_geomDistance(
+                model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0), None
+            )
+            nearest = min(nearest, float(distance))
+        return nearest
+
+    def _contacts(self) -> frozenset[tuple[str, str]]:
+        found = set()
+        for first, second in self._scene.data.contact.geom:
+            for mine, other in ((int(first), int(second)), (int(second), int(first))):
+                if mine in self._gripper and other in self._object_of:
+                    found.add((self._gripper[mine], self._object_of[other]))
+        return frozenset(found)
+
+
+def _log_warning(message: str) -> None:
+    # MuJoCo's own handler writes a file into the working directory.
+    _LOG.info("MuJoCo: %s", message)
+
+
+def _read(model_path: Path) -> Any:
+    if not model_path.is_file():
+        raise ConfigurationError(f"model: there is no file {str(model_path)!r}; valid: an MJCF file")
+    try:
+        return mujoco.MjSpec.from_file(str(model_path))
+    except (ValueError, mujoco.FatalError) as error:
+        raise _unusable(error) from error
+
+
+def _compile(spec: Any) -> Any:
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _unusable(error) from error
+
+
+def _unusable(error: Exception) -> ConfigurationError:
+    return ConfigurationError(f"model: {' '.join(str(error).split())}; valid: an MJCF file that MuJoCo compiles")
+
+
+def _start_configuration(model: Any, robot: RobotModel) -> FloatArray:
+    """qpos (nq,) of the keyframe `home`, else of the first one, else the middle of the arm joints' ranges."""
+    keyframes = [model.key(key).name for key in range(model.nkey)]
+    start: FloatArray
+    if keyframes:
+        start = model.key_qpos[keyframes.index("home") if "home" in keyframes else 0].copy()
+        return start
+    start = model.qpos0.copy()
+    limited = np.isfinite(robot.lower_rad)
+    start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
+    return start
+
+
+def _objects(model: Any, robot: RobotModel) -> tuple[SceneObject, ...]:
+    """What is not the robot and can touch something, in the order of its first geom."""
+    geoms_of: dict[str, list[int]] = {}
+    for geom in range(model.ngeom):
+        root = int(model.body_rootid[model.geom_bodyid[geom]])
+        if root == robot.root_body or not can_touch(model, geom):
+            continue
+        # What is fixed to the world is a thing of its own; a tree of bodies is one thing.
+        kind, index, named = ("geom", geom, model.geom(geom)) if root == 0 else ("body", root, model.body(root))
+        name = named.name.removeprefix(_TABLE_PREFIX) or f"{kind}{index}"
+        geoms_of.setdefault(name, []).append(geom)
+    return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items())
+
+
+def _attach_table(spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
+    """Put the built-in table under the tool's start, at the height of the robot's base and the way the tool is."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_kinematics(model, data)
+    base, tool = data.xpos[robot.root_body], data.site_xpos[robot.site]
+    ahead = tool[:2] - base[:2]
+    # A tool straight above the base has no side of its own.
+    yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
+    table = _read(_ASSETS / "table_scene.xml")
+    home_x, home_y, _ = table.site("tool_home").pos
+    if model.geom_type[model.geom_type == GeomKind.PLANE].size:
+        table.delete(table.geom("floor"))
+    turned_x = math.cos(yaw) * home_x - math.sin(yaw) * home_y
+    turned_y = math.sin(yaw) * home_x + math.cos(yaw) * home_y
+    spec.attach(
+        table,
+        prefix=_TABLE_PREFIX,
+        frame=spec.worldbody.add_frame(
+            pos=[tool[0] - turned_x, tool[1] - turned_y, base[2]],
+            quat=[math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)],
+        ),
+    )
