@@ -1,0 +1,91 @@
+"""Where the joints should be now: a commanded velocity turned into a reference that stops by itself."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What the arm's own controller allows each joint, whatever it is told; metres for a prismatic joint."""
+
+    velocity_rad_s: float = 2.0
+    """Under the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints (their data sheets)."""
+    acceleration_rad_s2: float = 8.0
+    deceleration_rad_s2: float = 12.0
+    """How fast the reference stops when a command has run out."""
+    windup_rad: float = 0.02
+    """How far the reference may run ahead of a joint that something holds back."""
+
+    def __post_init__(self) -> None:
+        for name in ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "windup_rad"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} = {value}; valid: finite and above 0")
+
+
+class JointReference:
+    """Position and velocity references (n,) that follow a velocity command until it runs out, then stop."""
+
+    def __init__(
+        self, position_rad: FloatArray, lower_rad: FloatArray, upper_rad: FloatArray, limits: MotionLimits
+    ) -> None:
+        """Stand at `position_rad` (n,); lower_rad and upper_rad (n,) may be infinite."""
+        self.position_rad: FloatArray = np.clip(position_rad, lower_rad, upper_rad)
+        self.velocity_rad_s: FloatArray = np.zeros_like(self.position_rad)
+        self._lower_rad = lower_rad
+        self._upper_rad = upper_rad
+        self._limits = limits
+        self._stopped: FloatArray = np.zeros_like(self.position_rad)
+        self._command = self._stopped
+        self._valid_until_s = -math.inf
+        self._following = False
+
+    def command(self, velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Follow `velocity_rad_s` (n,), scaled as a whole to the limit, until `valid_until_s`.
+
+        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        """
+        velocity = np.asarray(velocity_rad_s, dtype=np.float64)
+        if velocity.shape != self.position_rad.shape:
+            raise ValueError(f"joint_velocity_rad_s has the shape {velocity.shape}; valid: {self.position_rad.shape}")
+        if not np.isfinite(velocity).all():
+            raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
+        if not math.isfinite(valid_until_s):
+            raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
+        excess = float(np.max(np.abs(velocity))) / self._limits.velocity_rad_s
+        self._command = velocity / max(excess, 1.0)
+        self._valid_until_s = valid_until_s
+
+    def advance(
+        self, time_s: float, step_s: float, measured_position_rad: FloatArray, measured_velocity_rad_s: FloatArray
+    ) -> None:
+        """Move the references on by `step_s` from `time_s`, near the measured positions and velocities (n,)."""
+        limits = self._limits
+        following = time_s < self._valid_until_s
+        if self._following and not following:
+            # Halting from a reference that ran ahead would first make the arm catch up with it.
+            self.position_rad = measured_position_rad.copy()
+            speed = limits.velocity_rad_s
+            self.velocity_rad_s = np.clip(measured_velocity_rad_s, -speed, speed)
+        self._following = following
+        target = self._command if following else self._stopped
+        change = target - self.velocity_rad_s
+        most = (limits.acceleration_rad_s2 if following else limits.deceleration_rad_s2) * step_s
+        largest = float(np.abs(change).max())
+        if largest > most:
+            change *= most / largest
+        velocity = self.velocity_rad_s + change
+
+        position = self.position_rad
+        # Near a limit only the speed from which the joint can still stop before it.
+        to_lower = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(position - self._lower_rad, 0.0))
+        to_upper = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(self._upper_rad - position, 0.0))
+        self.velocity_rad_s = np.clip(velocity, -to_lower, to_upper)
+        moved = np.clip(position + self.velocity_rad_s * step_s, self._lower_rad, self._upper_rad)
+        self.position_rad = np.clip(
+            moved, measured_position_rad - limits.windup_rad, measured_position_rad + limits.windup_rad
+        )
