@@ -1,0 +1,140 @@
+"""Statistics of a stream of samples, in bounded memory."""
+
+import math
+from array import array
+from bisect import bisect_left, insort
+from collections import deque
+
+import numpy as np
+
+RESERVOIR_SIZE = 100_000
+"""Samples kept for quantiles: 100 s at 1 kHz are exact, a longer run is a uniform random sample of it."""
+
+
+class RunningStatistics:
+    """Mean, standard deviation, extremes and quantiles of every sample added; None where there is none yet.
+
+    All but the quantiles are exact. Quantiles come from all samples up to `RESERVOIR_SIZE`, and from a
+    uniform random choice of as many beyond that.
+    """
+
+    def __init__(self, seed: int = 0) -> None:
+        self._generator = np.random.default_rng(seed)
+        self._count = 0
+        self._mean = 0.0
+        self._squares = 0.0
+        self._minimum = math.inf
+        self._maximum = -math.inf
+        self._reservoir = array("d")
+        self._log_threshold = 0.0
+        self._next_kept = 0
+
+    def add(self, value: float) -> None:
+        """Take in one sample; ValueError when it is not finite."""
+        if not math.isfinite(value):
+            raise ValueError(f"value = {value}; valid: a finite number")
+        self._count += 1
+        # Welford's update, because the difference of two large sums would lose the variance.
+        before = value - self._mean
+        self._mean += before / self._count
+        self._squares += before * (value - self._mean)
+        self._minimum = min(self._minimum, value)
+        self._maximum = max(self._maximum, value)
+        if self._count <= RESERVOIR_SIZE:
+            self._reservoir.append(value)
+            if self._count == RESERVOIR_SIZE:
+                self._choose_next_kept()
+        elif self._count == self._next_kept:
+            self._reservoir[int(self._generator.integers(RESERVOIR_SIZE))] = value
+            self._choose_next_kept()
+
+    def _choose_next_kept(self) -> None:
+        """Skip ahead to the next sample that the reservoir takes in (Li 1994, algorithm L).
+
+        A random number for each sample that is kept, instead of one for each that is added.
+        """
+        first, second = 1.0 - self._generator.random(2)
+        self._log_threshold += math.log(first) / RESERVOIR_SIZE
+        skipped = math.floor(math.log(second) / math.log1p(-math.exp(self._log_threshold)))
+        self._next_kept = self._count + skipped + 1
+
+    @property
+    def count(self) -> int:
+        """How many samples were added."""
+        return self._count
+
+    @property
+    def mean(self) -> float | None:
+        """The arithmetic mean."""
+        return self._mean if self._count else None
+
+    @property
+    def sd(self) -> float | None:
+        """The standard deviation of a sample (n − 1); None below two samples."""
+        return math.sqrt(self._squares / (self._count - 1)) if self._count > 1 else None
+
+    @property
+    def minimum(self) -> float | None:
+        """The least sample."""
+        return self._minimum if self._count else None
+
+    @property
+    def maximum(self) -> float | None:
+        """The greatest sample."""
+        return self._maximum if self._count else None
+
+    def quantile(self, probability: float) -> float | None:
+        """The `probability` quantile, interpolated linearly; ValueError outside [0, 1]."""
+        if not 0.0 <= probability <= 1.0:
+            raise ValueError(f"probability = {probability}; valid: 0 to 1")
+        return float(np.quantile(np.array(self._reservoir), probability)) if self._count else None
+
+    def summary_ms(self) -> dict[str, float | None]:
+        """`mean`, `sd`, `p50`, `p95` and `p99` in milliseconds, of samples in seconds."""
+        values_s = {
+            "mean": self.mean,
+            "sd": self.sd,
+            "p50": self.quantile(0.50),
+            "p95": self.quantile(0.95),
+            "p99": self.quantile(0.99),
+        }
+        return {name: None if value is None else 1e3 * value for name, value in values_s.items()}
+
+
+class SlidingQuantile:
+    """A quantile of the newest `window` samples, up to date after each of them.
+
+    Nearest rank: the least sample that at least that fraction of the window does not exceed, so that a few
+    samples give their maximum.
+    """
+
+    def __init__(self, window: int = 500, probability: float = 0.95) -> None:
+        if window < 1:
+            raise ValueError(f"window = {window}; valid: 1 sample or more")
+        if not 0.0 < probability <= 1.0:
+            raise ValueError(f"probability = {probability}; valid: above 0, up to 1")
+        self._window = window
+        self._probability = probability
+        self._arrivals: deque[float] = deque()
+        self._sorted: list[float] = []
+
+    def update(self, value: float) -> None:
+        """Take in the newest sample and forget the oldest of a full window; ValueError when not finite."""
+        if not math.isfinite(value):
+            raise ValueError(f"value = {value}; valid: a finite number")
+        if len(self._arrivals) == self._window:
+            del self._sorted[bisect_left(self._sorted, self._arrivals.popleft())]
+        self._arrivals.append(value)
+        insort(self._sorted, value)
+
+    def clear(self) -> None:
+        """Forget every sample."""
+        self._arrivals.clear()
+        self._sorted.clear()
+
+    @property
+    def value(self) -> float | None:
+        """The quantile of the window; None while it is empty."""
+        if not self._sorted:
+            return None
+        return self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
