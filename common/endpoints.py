@@ -1,0 +1,99 @@
+"""Addresses of the form tcp://HOST:PORT, checked before a socket sees them."""
+
+import ipaddress
+import re
+import socket
+from dataclasses import dataclass
+
+from common.errors import ConfigurationError
+
+_ADDRESS = re.compile(r"tcp://(?:\[(?P<v6>[^\[\]]+)\]|(?P<host>[^\s:/\[\];]+)):(?P<port>[^\s:/]+)")
+_EPHEMERAL = 0
+_HIGHEST_PORT = 65535
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Where to bind or connect to."""
+
+    host: str
+    """A host name, an IP address without brackets, or * for every address of this machine."""
+    port: int
+    """0 lets the system choose a free one."""
+    ipv6: bool
+    """Whether only IPv6 reaches it."""
+
+    @property
+    def address(self) -> str:
+        """As tcp://HOST:PORT."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"tcp://{host}:{'*' if self.port == _EPHEMERAL else self.port}"
+
+    def is_loopback(self) -> bool:
+        """Whether only this machine can reach it."""
+        return self.host != "*" and ipaddress.ip_address(self.host.partition("%")[0]).is_loopback
+
+
+def parse_bind(text: str, flag: str) -> Endpoint:
+    """Read an address to bind, a host name replaced by its own numeric address.
+
+    Port 0 or * lets the system choose. ConfigurationError names `flag`, `text` and what is valid.
+    """
+    host, port_text = _split(text, flag, "tcp://127.0.0.1:5555")
+    port = _EPHEMERAL if port_text == "*" else _port(port_text, text, flag, lowest=0)
+    if host == "*":
+        return Endpoint(host, port, ipv6=False)
+    numeric, ipv6 = _resolve(host, text, flag)
+    return Endpoint(numeric, port, ipv6)
+
+
+def parse_connect(text: str, flag: str) -> Endpoint:
+    """Read an address to connect to, and see that its host name resolves; the name itself is kept.
+
+    ConfigurationError names `flag`, `text` and what is valid.
+    """
+    host, port_text = _split(text, flag, "tcp://192.168.1.5:5555")
+    port = _port(port_text, text, flag, lowest=1)
+    if host == "*":
+        raise ConfigurationError(f"{flag}: {text!r} names no host to connect to; valid: tcp://HOST:PORT")
+    return Endpoint(host, port, _resolve(host, text, flag)[1])
+
+
+def following(control: Endpoint, text: str, flag: str) -> Endpoint:
+    """The view's endpoint where none is given: the port after the control port, or any if that is any."""
+    if control.port == _HIGHEST_PORT:
+        raise ConfigurationError(
+            f"{flag}: the control address {text!r} leaves no port after it for the view; "
+            f"valid: a control port up to {_HIGHEST_PORT - 1}, or {flag} tcp://HOST:PORT"
+        )
+    port = _EPHEMERAL if control.port == _EPHEMERAL else control.port + 1
+    return Endpoint(control.host, port, control.ipv6)
+
+
+def _split(text: str, flag: str, example: str) -> tuple[str, str]:
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        raise ConfigurationError(f"{flag}: {text!r} is no address; valid: tcp://HOST:PORT such as {example}")
+    return match["v6"] or match["host"], match["port"]
+
+
+def _port(port_text: str, text: str, flag: str, lowest: int) -> int:
+    if not re.fullmatch(r"[0-9]{1,5}", port_text) or not lowest <= int(port_text) <= _HIGHEST_PORT:
+        raise ConfigurationError(f"{flag}: {port_text!r} in {text!r} is no port; valid: {lowest} to {_HIGHEST_PORT}")
+    return int(port_text)
+
+
+def _resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
+    """The first numeric address, IPv4 if there is one, and whether there is none of IPv4."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "no valid host name"
+        raise ConfigurationError(
+            f"{flag}: {host!r} in {text!r} cannot be resolved ({reason}); "
+            "valid: an IP address, or a host name that this machine knows"
+        ) from error
+    for family, _, _, _, address in found:
+        if family == socket.AF_INET:
+            return str(address[0]), False
+    return str(found[0][4][0]), True
