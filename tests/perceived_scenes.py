@@ -1,0 +1,94 @@
+"""Small scenes of perceived objects, for the tests of the robot side's pipeline."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from common.arrays import FloatArray
+from robot_side.perceived_objects import PerceivedObjects, Role
+
+# A cube's corners, numbered by their bits (x, y, z), and five tetrahedra that fill it.
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+_FIVE_TETRAHEDRA = np.array([[0, 4, 2, 1], [6, 4, 2, 7], [5, 4, 1, 7], [3, 2, 1, 7], [4, 2, 1, 7]])
+
+
+class Scene:
+    """Objects, each of one or more primitives, in the order in which they are added."""
+
+    def __init__(self) -> None:
+        self.roles: list[Role] = []
+        self._spheres: list[tuple[npt.ArrayLike, float, int]] = []
+        self._boxes: list[tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, int]] = []
+        self._tetrahedra: list[tuple[npt.ArrayLike, int]] = []
+        self._half_spaces: list[tuple[npt.ArrayLike, float, int]] = []
+
+    def add(self, role: Role = Role.OBSTACLE) -> "Scene":
+        """A new object; what follows belongs to it."""
+        self.roles.append(role)
+        return self
+
+    def sphere(self, center_m: npt.ArrayLike, radius_m: float) -> "Scene":
+        self._spheres.append((center_m, radius_m, len(self.roles) - 1))
+        return self
+
+    def box(self, center_m: npt.ArrayLike, half_sizes_m: npt.ArrayLike, rotation: FloatArray | None = None) -> "Scene":
+        self._boxes.append((center_m, np.eye(3) if rotation is None else rotation, half_sizes_m, len(self.roles) - 1))
+        return self
+
+    def tetrahedron(self, vertices_m: npt.ArrayLike) -> "Scene":
+        self._tetrahedra.append((vertices_m, len(self.roles) - 1))
+        return self
+
+    def box_of_tetrahedra(self, center_m: FloatArray, half_sizes_m: FloatArray, rotation: FloatArray) -> "Scene":
+        corners = center_m + (_CORNERS * half_sizes_m) @ rotation.T
+        for indices in _FIVE_TETRAHEDRA:
+            self.tetrahedron(corners[indices])
+        return self
+
+    def half_space(self, normal: npt.ArrayLike, offset_m: float) -> "Scene":
+        self._half_spaces.append((normal, offset_m, len(self.roles) - 1))
+        return self
+
+    def objects(self) -> PerceivedObjects:
+        return PerceivedObjects(
+            time_s=0.0,
+            names=tuple(f"object{index}" for index in range(len(self.roles))),
+            roles=tuple(self.roles),
+            sphere_centers_m=_stacked([row[0] for row in self._spheres], (3,)),
+            sphere_radii_m=_stacked([row[1] for row in self._spheres], ()),
+            sphere_object=np.array([row[-1] for row in self._spheres], dtype=np.int64),
+            box_centers_m=_stacked([row[0] for row in self._boxes], (3,)),
+            box_rotations=_stacked([row[1] for row in self._boxes], (3, 3)),
+            box_half_sizes_m=_stacked([row[2] for row in self._boxes], (3,)),
+            box_object=np.array([row[-1] for row in self._boxes], dtype=np.int64),
+            tetrahedron_vertices_m=_stacked([row[0] for row in self._tetrahedra], (4, 3)),
+            tetrahedron_object=np.array([row[-1] for row in self._tetrahedra], dtype=np.int64),
+            half_space_normals=_stacked([row[0] for row in self._half_spaces], (3,)),
+            half_space_offsets_m=_stacked([row[1] for row in self._half_spaces], ()),
+            half_space_object=np.array([row[-1] for row in self._half_spaces], dtype=np.int64),
+        )
+
+
+def random_rotation(rng: np.random.Generator) -> FloatArray:
+    matrix, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    rotation: FloatArray = matrix * np.sign(np.linalg.det(matrix))
+    return rotation
+
+
+def random_scene(rng: np.random.Generator, of_each_kind: int, extent_m: float = 1.0) -> PerceivedObjects:
+    """Objects of every kind, each of one primitive, within `extent_m` of the origin."""
+    scene = Scene()
+    for _ in range(of_each_kind):
+        center = rng.uniform(-extent_m, extent_m, 3)
+        scene.add().sphere(center, float(rng.uniform(0.01, 0.2)))
+        center = rng.uniform(-extent_m, extent_m, 3)
+        scene.add().box(center, rng.uniform(0.01, 0.2, 3), random_rotation(rng))
+        scene.add().tetrahedron(rng.uniform(-extent_m, extent_m, 3) + rng.normal(size=(4, 3)) * 0.1)
+        normal = rng.normal(size=3)
+        scene.add().half_space(normal / np.linalg.norm(normal), float(rng.uniform(-extent_m, extent_m)))
+    return scene.objects()
+
+
+def _stacked(rows: Sequence[npt.ArrayLike], shape: tuple[int, ...]) -> FloatArray:
+    return np.array(rows, dtype=np.float64).reshape(len(rows), *shape)
