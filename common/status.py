@@ -67,7 +67,7 @@ class Status:
     def note(self, text: str) -> None:
         """A line that stays, for people."""
         if self._mode == "line":
-            self._console.print(f"{self._program}: {text}", markup=False, highlight=False)
+            self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _shown(value: Value) -> str:

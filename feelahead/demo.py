@@ -1,0 +1,172 @@
+"""`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
+
+import json
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from common.command_line import parse_settings
+from common.run_options import RunOptions
+from common.status import Status, Value
+from common.stop_signal import StopSignal
+from feelahead.processes import SideFailedError, SideProcess
+from feelahead.summary import merge_summaries
+
+_START_TIMEOUT_S = 90.0
+"""The first start compiles the overlap kernels."""
+_LINK_TIMEOUT_S = 15.0
+
+
+@dataclass(frozen=True)
+class DemoSettings(RunOptions):
+    """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
+
+    The person arms the arm, pulls R2 to advance towards the target, feels the trigger stiffen as things come
+    near, grasps the target and lifts it. Nothing is needed but this machine.
+
+    Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
+    """
+
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 20.0
+    """How long to run from the moment that the link is up."""
+    probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
+    """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    haptics: bool = True
+    """Whether the triggers are stiffened; without, the same person sees only."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
+    """Any MJCF arm with actuators instead of the built-in one."""
+    site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """The model's site between the fingertips, its z axis along the approach."""
+    console: bool = True
+    """The browser console. It is not there yet: the status line is all there is to see."""
+    robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """More settings for the robot side: see feelahead-robot --help."""
+    operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """More settings for the operator side: see feelahead-operator --help."""
+
+
+def demo(arguments: Sequence[str]) -> int:
+    """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
+    settings = parse_settings(DemoSettings, "feelahead demo", arguments)
+    with (
+        tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
+        StopSignal() as stop,
+        Status(settings.status, "feelahead demo") as status,
+    ):
+        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
+        status.note("starting the robot side (the first start compiles its kernels)")
+        with SideProcess("robot_side.main", "robot", _robot_arguments(settings, summaries["robot"])) as robot:
+            listening = robot.wait_for("listening", _START_TIMEOUT_S)
+            operator_arguments = _operator_arguments(settings, summaries["operator"], listening)
+            with SideProcess("operator_side.main", "operator", operator_arguments) as operator:
+                errors = _watch(settings, robot, operator, stop, status)
+                # The operator side first: its triggers are off before the robot side goes.
+                operator.stop()
+                robot.stop()
+                for side in (operator, robot):
+                    try:
+                        side.check()
+                    except SideFailedError as failure:
+                        if str(failure) not in errors:
+                            errors.append(str(failure))
+        merged = merge_summaries(_read(summaries["robot"]), _read(summaries["operator"]), errors)
+    for line in _report(merged):
+        status.note(line)
+    for error in errors:
+        status.note(f"error: {error}")
+    if settings.summary is not None:
+        settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
+    return 1 if errors else 0
+
+
+def _robot_arguments(settings: DemoSettings, summary: Path) -> list[str]:
+    arguments = [*_shared_arguments(settings, summary), "--bind=tcp://127.0.0.1:0"]
+    if settings.robot_config is not None:
+        arguments.append(f"--config={settings.robot_config}")
+    if settings.model is not None:
+        arguments.append(f"--model={settings.model}")
+    if settings.site is not None:
+        arguments.append(f"--site={settings.site}")
+    return [*arguments, f"--probability={settings.probability}"]
+
+
+def _operator_arguments(settings: DemoSettings, summary: Path, listening: dict[str, Any]) -> list[str]:
+    arguments = [*_shared_arguments(settings, summary), "--device=simulated"]
+    if settings.operator_config is not None:
+        arguments.append(f"--config={settings.operator_config}")
+    arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
+    return [*arguments, "--haptics" if settings.haptics else "--no-haptics"]
+
+
+def _shared_arguments(settings: DemoSettings, summary: Path) -> list[str]:
+    return [
+        f"--link={settings.link}",
+        f"--link-model={settings.link_model}",
+        f"--seed={settings.seed}",
+        f"--summary={summary}",
+    ]
+
+
+def _watch(
+    settings: DemoSettings, robot: SideProcess, operator: SideProcess, stop: StopSignal, status: Status
+) -> list[str]:
+    """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
+    start_s = time.monotonic()
+    linked_s: float | None = None
+    values: dict[str, Value] = {}
+    while not stop.is_set:
+        now_s = time.monotonic()
+        for side in (robot, operator):
+            for event in side.events():
+                if event["event"] == "status":
+                    values |= {name: value for name, value in event.items() if name != "event"}
+            if not side.running:
+                try:
+                    side.check()
+                except SideFailedError as error:
+                    return [str(error)]
+                return [f"the {side.name} side ended early"]
+        if linked_s is None:
+            if values.get("link") == "up":
+                linked_s = now_s
+            elif now_s - start_s > _LINK_TIMEOUT_S:
+                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s"]
+        elif settings.duration is not None and now_s - linked_s >= settings.duration:
+            break
+        status.show(now_s, values)
+        time.sleep(0.02)
+    return []
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """A side's summary; empty when it did not live to write one, which `errors` then says."""
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError):
+        return {}
+    return content
+
+
+def _report(summary: dict[str, Any]) -> list[str]:
+    """The run in a few lines for people."""
+    if "stiffness" not in summary:
+        return []
+    delays = summary.get("delay_ms", {})
+    shown = [
+        f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"
+        for name, delay in delays.items()
+        if delay.get("mean") is not None and delay.get("sd") is not None
+    ]
+    task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
+    grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
+    return [
+        f"delay: {', '.join(shown) or 'unknown'}",
+        f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
+        f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
+        f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm; contacts with obstacles: {task['obstacle_contacts']}",
+    ]

@@ -1,0 +1,37 @@
+"""The command `feelahead`: what needs both sides."""
+
+import sys
+from collections.abc import Callable, Sequence
+
+from common.command_line import run_command
+from common.errors import ConfigurationError
+from feelahead.demo import demo
+
+_COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
+    "demo": (demo, "both sides on this machine, with a simulated controller and person"),
+}
+
+
+def main() -> None:
+    """The console script."""
+    run_command("feelahead", command)
+
+
+def command(arguments: Sequence[str]) -> int:
+    """Run the command that the first argument names."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        lines = [f"  {name:<12}{text}" for name, (_, text) in _COMMANDS.items()]
+        sys.stdout.write(
+            "usage: feelahead COMMAND [OPTIONS]\n\nTeleoperation in which the operator feels what is ahead.\n\n"
+            + "\n".join(lines)
+            + "\n\nEach has its own --help. The two sides by themselves: feelahead-robot, feelahead-operator.\n"
+        )
+        return 0
+    name, *rest = arguments
+    if name not in _COMMANDS:
+        raise ConfigurationError(f"unknown command {name!r}; valid: {', '.join(_COMMANDS)}")
+    return _COMMANDS[name][0](rest)
+
+
+if __name__ == "__main__":
+    main()

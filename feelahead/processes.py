@@ -1,0 +1,114 @@
+"""Both sides as child processes that report to this one by lines of JSON."""
+
+import json
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+from common.errors import FeelaheadError
+
+
+class SideFailedError(FeelaheadError):
+    """A side ended by itself with an error; the text is what it said."""
+
+
+class SideProcess:
+    """One side, started with `--status json`; its events are read by a thread so that none blocks it."""
+
+    def __init__(self, module: str, name: str, arguments: Sequence[str]) -> None:
+        self.name = name
+        self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8")  # noqa: SIM115  # closed by __exit__
+        # -P: a folder named `common` in the working directory must not shadow the package.
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", module, "--status", "json", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            # Ctrl-C reaches this process alone, which then ends the sides in order.
+            start_new_session=True,
+        )
+        self._events: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=1000)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> "SideProcess":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+        self._reader.join(timeout=1.0)
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        self._errors.close()
+
+    @property
+    def process_id(self) -> int:
+        """The operating system's number for it."""
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.poll() is None
+
+    def events(self) -> list[dict[str, Any]]:
+        """What it has said since the last call."""
+        said = []
+        while not self._events.empty():
+            said.append(self._events.get_nowait())
+        return said
+
+    def wait_for(self, kind: str, timeout_s: float) -> dict[str, Any]:
+        """The next event of this kind; SideFailedError when the side ends or says nothing for so long."""
+        while True:
+            try:
+                event = self._events.get(timeout=timeout_s)
+            except queue.Empty:
+                self.check()
+                raise SideFailedError(f"the {self.name} side said nothing for {timeout_s:g} s") from None
+            if event["event"] == kind:
+                return event
+            if event["event"] == "end":
+                self._process.wait(timeout=10.0)
+                self.check()
+                raise SideFailedError(f"the {self.name} side ended early")
+
+    def check(self) -> None:
+        """SideFailedError when it has ended with an error, in its own words."""
+        code = self._process.poll()
+        if code not in (None, 0):
+            self._errors.seek(0)
+            said = self._errors.read().strip().splitlines()
+            reason = said[-1] if said else "without a word"
+            raise SideFailedError(f"the {self.name} side ended with code {code}: {reason}")
+
+    def stop(self, timeout_s: float = 10.0) -> int:
+        """End it as Ctrl-C would, wait, and kill it only if it does not; its exit code."""
+        if self.running:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+    def _read(self) -> None:
+        stream = self._process.stdout
+        if stream is not None:
+            for line in stream:
+                if self._events.full():
+                    self._events.get_nowait()
+                try:
+                    self._events.put_nowait(json.loads(line))
+                except json.JSONDecodeError:
+                    continue  # a library wrote to standard output; not ours to interpret
+        self._events.put({"event": "end"})

@@ -1,0 +1,34 @@
+"""Everything about the operator side that a person may set, on the command line or in a TOML file."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import tyro
+
+from common.run_options import RunOptions
+from operator_side.simulated_operator import PersonSettings
+from operator_side.trigger_motion import TravelCalibration
+
+
+@dataclass(frozen=True)
+class OperatorSettings(RunOptions):
+    """The operator side: a DualSense whose triggers stiffen in the direction of danger.
+
+    It connects to a robot side, sends what the hands do, and lets the fingers feel what is ahead. L1 held: the
+    arm may move. Options: arm it, with released triggers. R2 advances, L2 retreats, the left stick moves
+    across, the right one turns. Cross closes and square opens the gripper, triangle changes the target, circle
+    stops everything.
+    """
+
+    connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
+    """Where the robot side listens."""
+    view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Where it publishes what the screen shows; the port after the control port unless given."""
+    device: Literal["hid", "simulated"] = "hid"
+    """A real controller, or a simulated one with a scripted person."""
+    haptics: bool = True
+    """Whether the triggers are stiffened at all."""
+    calibration: TravelCalibration = field(default_factory=TravelCalibration)
+    """Which part of the triggers' travel counts."""
+    person: PersonSettings = field(default_factory=PersonSettings)
+    """The scripted person's limits (simulated device only)."""
