@@ -50,10 +50,10 @@ def tool_twist(command: MotionCommand, tool_rotation: FloatArray, settings: Tool
     return np.concatenate([tool_rotation @ linear, tool_rotation @ angular])
 
 
-def trigger_directions(tool_rotation: FloatArray) -> dict[str, FloatArray]:
-    """û of §4.2: the unit direction (3,) in which pulling each trigger moves the gripper's spheres.
+def trigger_directions(tool_rotation: FloatArray, count: int) -> dict[str, FloatArray]:
+    """û of §4.2: the unit directions (count, 3) in which pulling each trigger moves the gripper's spheres.
 
     Both triggers translate the whole gripper, so that one direction holds for every sphere.
     """
-    approach = tool_rotation[:, 2]
+    approach = np.tile(tool_rotation[:, 2], (count, 1))
     return {"l2": -approach, "r2": approach}

@@ -1,0 +1,98 @@
+"""Settings to a robot side that is ready to tick: the simulated arm, its camera, and everything in between."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.delay import LoopAge
+from common.link_end import LinkEnd
+from robot_side.arm import MujocoArm, MujocoKinematics
+from robot_side.arm_port import ArmState
+from robot_side.camera_error import CameraError
+from robot_side.core import RobotSide
+from robot_side.encoders import Encoder
+from robot_side.enlargement import Enlargement
+from robot_side.joint_reference import MotionLimits
+from robot_side.kinematic_error import position_covariance
+from robot_side.run_figures import RunFigures
+from robot_side.safety import Safety
+from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.sensing import AheadSensing
+from robot_side.settings import RobotSettings
+from robot_side.stiffness import StiffnessMap
+
+_SAMPLED_CONFIGURATIONS = 256
+
+
+class SimulationObserver:
+    """Tells the figures what is true in the simulation, which the pipeline itself never sees."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._truth = GroundTruth(scene)
+        self._roles = scene.roles
+
+    def observe(self, figures: RunFigures, now_s: float) -> None:
+        """Tell `figures` the true distances and contacts."""
+        figures.truth(self._truth.observe(), self._roles, now_s)
+
+
+def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
+    """Put a robot side together; ConfigurationError for a model that cannot be used."""
+    scene = load_scene(settings.model, settings.site, settings.roles)
+    noise, camera_noise, samples = np.random.SeedSequence(settings.seed).generate_state(3)
+    encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
+    limits = MotionLimits()
+    arm = MujocoArm(scene, encoder, limits)
+    kinematics = MujocoKinematics(scene, settings.spheres)
+    camera = MujocoCamera(
+        scene,
+        CameraError(
+            tuple(thing.name for thing in scene.objects),
+            settings.camera.mean_m,
+            settings.camera.sd_m,
+            settings.camera.frame_sd_m,
+            int(camera_noise),
+        ),
+    )
+    encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
+    sampled = None
+    if settings.enlargement.mode == "once":
+        sampled = _sampled_covariances(scene, arm, kinematics, encoder_sigma_rad, int(samples))
+    return RobotSide(
+        arm,
+        kinematics,
+        camera,
+        AheadSensing(
+            Enlargement(settings.enlargement_settings(), sampled),
+            StiffnessMap(settings.stiffness),
+            encoder_sigma_rad,
+        ),
+        Safety(settings.safety),
+        LoopAge(settings.assumed_delay_s),
+        np.full(arm.joint_count, limits.velocity_rad_s),
+        settings.motion,
+        LinkEnd("robot", epoch, clock_domain, settings.seed),
+        SimulationObserver(scene),
+        settings.seed,
+    )
+
+
+def _sampled_covariances(
+    scene: Scene, arm: MujocoArm, kinematics: MujocoKinematics, encoder_sigma_rad: FloatArray, seed: int
+) -> FloatArray:
+    """Σ_ee (k, m, 3, 3) of every gripper sphere in configurations all over the joints' ranges."""
+    generator = np.random.default_rng(seed)
+    lower = np.maximum(scene.robot.lower_rad, -np.pi)
+    upper = np.minimum(scene.robot.upper_rad, np.pi)
+    present: ArmState = arm.state(0.0)
+    configurations = generator.uniform(lower, upper, (_SAMPLED_CONFIGURATIONS, arm.joint_count))
+    return np.stack(
+        [
+            position_covariance(
+                kinematics.pose(replace(present, joint_positions_rad=configuration)).sphere_jacobians,
+                encoder_sigma_rad,
+            )
+            for configuration in configurations
+        ]
+    )

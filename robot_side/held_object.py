@@ -1,0 +1,107 @@
+"""An object between the fingers moves with them: it leaves the surroundings and joins the gripper as spheres."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm_port import GripperPose
+from robot_side.gripper_spheres import cover_boxes
+from robot_side.nearest_point import nearest_on_box, nearest_on_sphere, nearest_on_tetrahedron
+from robot_side.perceived_objects import PerceivedObjects, Role
+
+_SPHERES_PER_BOX = 4
+
+
+@dataclass(frozen=True)
+class HeldObject:
+    """The spheres that cover it, as they stood in the tool frame when it was gripped."""
+
+    index: int
+    """Its place among the perceived objects' names."""
+    name: str
+    centers_in_tool_m: FloatArray
+    """(k, 3)"""
+    radii_m: FloatArray
+    """(k,)"""
+
+
+def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach_m: float) -> int | None:
+    """The object nearest to the point between the fingertips, within `reach_m`; None when there is none.
+
+    Supports and half-spaces are never held: an arm that closes its fingers on the table does not lift it.
+    """
+    nearest: tuple[float, int] | None = None
+    for distances, owner in (
+        (
+            nearest_on_sphere(
+                _repeat(tool_position_m, objects.sphere_object), objects.sphere_centers_m, objects.sphere_radii_m
+            )[0],
+            objects.sphere_object,
+        ),
+        (
+            nearest_on_box(
+                _repeat(tool_position_m, objects.box_object),
+                objects.box_centers_m,
+                objects.box_rotations,
+                objects.box_half_sizes_m,
+            )[0],
+            objects.box_object,
+        ),
+        (
+            nearest_on_tetrahedron(
+                _repeat(tool_position_m, objects.tetrahedron_object), objects.tetrahedron_vertices_m
+            )[0],
+            objects.tetrahedron_object,
+        ),
+    ):
+        for distance, index in zip(distances.tolist(), owner.tolist(), strict=True):
+            if objects.roles[index] is not Role.SUPPORT and distance <= reach_m:
+                nearest = min(nearest, (distance, index)) if nearest is not None else (distance, index)
+    return None if nearest is None else nearest[1]
+
+
+def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject:
+    """The object `index`, fixed to the tool from now on."""
+    centers = [objects.sphere_centers_m[objects.sphere_object == index]]
+    radii = [objects.sphere_radii_m[objects.sphere_object == index]]
+    boxes = objects.box_object == index
+    if boxes.any():
+        cover = cover_boxes(
+            objects.box_centers_m[boxes],
+            objects.box_rotations[boxes],
+            objects.box_half_sizes_m[boxes],
+            _SPHERES_PER_BOX * int(boxes.sum()),
+        )
+        centers.append(cover.centers_m)
+        radii.append(cover.radii_m)
+    vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
+    middles = vertices.mean(axis=1)
+    centers.append(middles)
+    radii.append(np.linalg.norm(vertices - middles[:, None, :], axis=2).max(axis=1, initial=0.0))
+    in_world = np.concatenate(centers)
+    return HeldObject(
+        index=index,
+        name=objects.names[index],
+        centers_in_tool_m=(in_world - pose.tool_position_m) @ pose.tool_rotation,
+        radii_m=np.concatenate(radii),
+    )
+
+
+def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
+    """The gripper's spheres and after them the held object's, all moving with the tool."""
+    lever = held.centers_in_tool_m @ pose.tool_rotation.T
+    linear, angular = pose.tool_jacobian[:3], pose.tool_jacobian[3:]
+    # Velocity of a point fixed to the tool: v + ω × r, for each joint's unit velocity.
+    turning = np.cross(angular.T[None, :, :], lever[:, None, :]).swapaxes(1, 2)
+    return replace(
+        pose,
+        sphere_centers_m=np.concatenate([pose.sphere_centers_m, pose.tool_position_m + lever]),
+        sphere_radii_m=np.concatenate([pose.sphere_radii_m, held.radii_m]),
+        sphere_jacobians=np.concatenate([pose.sphere_jacobians, linear + turning]),
+        sphere_on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(lever), dtype=np.bool_)]),
+    )
+
+
+def _repeat(point: FloatArray, owner: np.ndarray) -> FloatArray:
+    return np.broadcast_to(point, (len(owner), 3))

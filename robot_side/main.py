@@ -1,0 +1,101 @@
+"""The process `feelahead-robot`: sockets, clock, core; nothing else."""
+
+import json
+import secrets
+import time
+from collections.abc import Sequence
+
+from common.clock import MonotonicClock, clock_domain
+from common.command_line import parse_settings, run_command
+from common.link_model import DelayLine, LinkSpec
+from common.sockets import RobotSockets
+from common.statistics import RunningStatistics
+from common.status import Status
+from common.stop_signal import StopSignal, ignore_broken_output
+from robot_side.assembly import build_robot_side
+from robot_side.core import Outgoing, RobotSide
+from robot_side.overlap.kernels import warm_up
+from robot_side.run_figures import tick_microseconds
+from robot_side.settings import RobotSettings
+
+TICK_PERIOD_S = 1e-3
+_NOTEWORTHY_WARM_UP_S = 1.0
+
+
+def main() -> None:
+    """The console script."""
+    run_command("feelahead-robot", command)
+
+
+def command(arguments: Sequence[str]) -> int:
+    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
+    settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
+    link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    # The sockets first: a port that is taken is found out before the kernels are compiled.
+    with (
+        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure) as sockets,
+        StopSignal() as stop,
+        Status(settings.status, "robot") as status,
+    ):
+        core = build_robot_side(settings, secrets.randbits(53), clock_domain())
+        compile_s = warm_up()
+        if compile_s > _NOTEWORTHY_WARM_UP_S:
+            status.note(f"compiled the overlap kernels in {compile_s:.1f} s; the next start finds them ready")
+        status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
+        status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
+        tick_time = RunningStatistics(settings.seed)
+        clock = MonotonicClock()
+        start_s = clock.now()
+        try:
+            _loop(settings, core, link, sockets, stop, status, tick_time)
+        except BrokenPipeError:
+            ignore_broken_output()
+        summary = {"duration_s": clock.now() - start_s, "tick_us": tick_microseconds(tick_time)} | core.summary()
+    if settings.summary is not None:
+        settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+def _loop(
+    settings: RobotSettings,
+    core: RobotSide,
+    link: LinkSpec,
+    sockets: RobotSockets,
+    stop: StopSignal,
+    status: Status,
+    tick_time: RunningStatistics,
+) -> None:
+    clock = MonotonicClock()
+    lines: dict[str, DelayLine[Outgoing]] = {
+        stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
+    }
+    start_s = next_tick_s = clock.now()
+    while not stop.is_set:
+        now_s = clock.now()
+        if settings.duration is not None and now_s - start_s >= settings.duration:
+            break
+        for peer, payload in sockets.receive():
+            core.receive(peer, payload, now_s)
+        if now_s >= next_tick_s:
+            # A late loop skips the ticks that it missed: the newest state is all that counts.
+            next_tick_s = max(next_tick_s + TICK_PERIOD_S, now_s)
+            began_s = time.perf_counter()
+            outgoing = core.tick(now_s)
+            tick_time.add(time.perf_counter() - began_s)
+            for message in outgoing:
+                lines[message.stream].push(now_s, message)
+            if status.due(now_s):
+                status.show(now_s, core.status(now_s))
+        due_s = clock.now()
+        for line in lines.values():
+            for message in line.pop(due_s):
+                if message.stream == "haptics":
+                    sockets.send(message.peer, message.payload)
+                else:
+                    sockets.publish(b"telemetry", message.payload)
+        wakes_s = [next_tick_s, *(due for line in lines.values() if (due := line.next_due()) is not None)]
+        sockets.wait(max(0.0, min(wakes_s) - clock.now()))
+
+
+if __name__ == "__main__":
+    main()

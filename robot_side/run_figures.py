@@ -1,0 +1,123 @@
+"""The robot side's figures of one run, gathered tick by tick for the summary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.statistics import RunningStatistics
+from robot_side.perceived_objects import Role
+from robot_side.sensing import Sensed
+
+if TYPE_CHECKING:
+    from robot_side.scene import Truth
+
+MOVING_M_S = 0.01
+"""A tool faster than this counts as moving."""
+_CONTACT_REST_S = 0.1
+"""A contact that comes back within this time is the same one: a sliding touch chatters."""
+
+
+class RunFigures:
+    """Statistics over the ticks; nothing here is read back by the control."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.ticks = 0
+        self._enlargement = RunningStatistics(seed)
+        self._enlargement_moving = RunningStatistics(seed)
+        self._overlap = RunningStatistics(seed)
+        self._l2 = RunningStatistics(seed)
+        self._r2 = RunningStatistics(seed)
+        self._min_distance_m: float | None = None
+        self._min_obstacle_distance_m: float | None = None
+        self._touched_s: dict[tuple[str, str], float] = {}
+        self._contacts: dict[str, int] = {}
+        self._obstacle_contacts = 0
+        self._armed_s: float | None = None
+        self._grasped_s: float | None = None
+        self._rest_height_m: float | None = None
+        self._lifted_m = 0.0
+
+    def tick(self, sensed: Sensed, tool_speed_m_s: float) -> None:
+        """One tick's enlargement, overlap and stiffness."""
+        self.ticks += 1
+        largest_m = float(sensed.enlargement_m.max())
+        self._enlargement.add(largest_m)
+        if tool_speed_m_s > MOVING_M_S:
+            self._enlargement_moving.add(largest_m)
+        self._overlap.add(sensed.overlap_m3)
+        self._l2.add(sensed.stiffness.l2)
+        self._r2.add(sensed.stiffness.r2)
+
+    def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
+        """What really happened, from the simulation: distances and contact onsets."""
+        self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
+        self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
+        for pair in truth.contacts:
+            if now_s - self._touched_s.get(pair, -np.inf) > _CONTACT_REST_S:
+                self._contacts[pair[1]] = self._contacts.get(pair[1], 0) + 1
+                self._obstacle_contacts += roles[pair[1]] is Role.OBSTACLE
+            self._touched_s[pair] = now_s
+
+    def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
+        """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
+        if armed and self._armed_s is None:
+            self._armed_s = now_s
+        if held and self._grasped_s is None:
+            self._grasped_s = now_s
+        if target_center_m is not None:
+            height_m = float(target_center_m[2])
+            if self._rest_height_m is None:
+                self._rest_height_m = height_m
+            if held:
+                self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
+
+    def summary(self) -> dict[str, Any]:
+        """The summary's keys that come from here, in the units of their names."""
+        grasp_s = None
+        if self._grasped_s is not None and self._armed_s is not None:
+            grasp_s = self._grasped_s - self._armed_s
+        return {
+            "ticks": self.ticks,
+            "enlargement_mm": {
+                "min": _scaled(self._enlargement.minimum, 1e3),
+                "mean": _scaled(self._enlargement.mean, 1e3),
+                "max": _scaled(self._enlargement.maximum, 1e3),
+                "mean_moving": _scaled(self._enlargement_moving.mean, 1e3),
+            },
+            "overlap_mm3": {"max": _scaled(self._overlap.maximum, 1e9), "mean": _scaled(self._overlap.mean, 1e9)},
+            "stiffness": {
+                "l2": {"mean": self._l2.mean, "max": self._l2.maximum},
+                "r2": {"mean": self._r2.mean, "max": self._r2.maximum},
+            },
+            "min_distance_mm": _scaled(self._min_distance_m, 1e3),
+            "contacts": sum(self._contacts.values()),
+            "task": {
+                "time_to_grasp_s": grasp_s,
+                "lifted_mm": 1e3 * self._lifted_m,
+                "obstacle_contacts": self._obstacle_contacts,
+                "contacts_by_object": dict(sorted(self._contacts.items())),
+                "min_obstacle_distance_mm": _scaled(self._min_obstacle_distance_m, 1e3),
+            },
+        }
+
+
+def tick_microseconds(tick_time_s: RunningStatistics) -> dict[str, float | None]:
+    """`p50`, `p99` and `max` of the ticks' computing time, from samples in seconds."""
+    return {
+        "p50": _scaled(tick_time_s.quantile(0.50), 1e6),
+        "p99": _scaled(tick_time_s.quantile(0.99), 1e6),
+        "max": _scaled(tick_time_s.maximum, 1e6),
+    }
+
+
+def _smaller(one: float | None, other: float | None) -> float | None:
+    if one is None or other is None:
+        return one if other is None else other
+    return min(one, other)
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor

@@ -1,0 +1,55 @@
+"""Which object is the target: found in a frame, and switched by the operator's button."""
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.perceived_objects import PerceivedObjects, Role
+
+_OFF_AXIS_WEIGHT = 3.0
+"""A metre off the approach axis puts an object as far back in the order as three along it."""
+
+
+def object_centers(objects: PerceivedObjects) -> FloatArray:
+    """(k, 3) the mean of each object's primitives' centres, in metres; NaN for half-spaces and ignored objects."""
+    sums = np.zeros((len(objects.names), 3))
+    counts = np.zeros(len(objects.names))
+    for centers, owner in (
+        (objects.sphere_centers_m, objects.sphere_object),
+        (objects.box_centers_m, objects.box_object),
+        (objects.tetrahedron_vertices_m.mean(axis=1), objects.tetrahedron_object),
+    ):
+        np.add.at(sums, owner, centers)
+        np.add.at(counts, owner, 1.0)
+    with np.errstate(invalid="ignore"):
+        centers_m: FloatArray = sums / np.where(counts > 0.0, counts, np.nan)[:, None]
+    return centers_m
+
+
+def target_index(objects: PerceivedObjects) -> int | None:
+    """The object whose role is the target; None when there is none."""
+    return objects.roles.index(Role.TARGET) if Role.TARGET in objects.roles else None
+
+
+def next_target(
+    objects: PerceivedObjects, centers_m: FloatArray, tool_position_m: FloatArray, approach: FloatArray
+) -> str | None:
+    """The object to become the target when the operator asks for another one; None when there is no other.
+
+    The obstacles and the target ahead of the tool stand in an order of nearness along the approach axis; the
+    one after the present target follows it, and the first one follows the last. centers_m (k, 3) from
+    `object_centers`; `approach` is a unit vector (3,) in the world frame.
+    """
+    offsets = centers_m - tool_position_m
+    along = offsets @ approach
+    across = np.linalg.norm(offsets - along[:, None] * approach, axis=1)
+    eligible = [
+        index
+        for index, role in enumerate(objects.roles)
+        if role in (Role.OBSTACLE, Role.TARGET) and (along[index] > 0.0 or role is Role.TARGET)
+    ]
+    order = sorted(eligible, key=lambda index: along[index] + _OFF_AXIS_WEIGHT * across[index])
+    present = target_index(objects)
+    if present is None:
+        return objects.names[order[0]] if order else None
+    follower = order[(order.index(present) + 1) % len(order)]
+    return None if follower == present else objects.names[follower]
