@@ -3,7 +3,7 @@
 import math
 
 from robot_side.overlap.compile import building_block
-from robot_side.overlap.solid import Overlap, nothing, sphere_volume, whole_solid, whole_sphere
+from robot_side.overlap.solid import Overlap, bounded, nothing, sphere_volume, whole_solid, whole_sphere
 from robot_side.overlap.vectors import Vector, norm, scale, subtract
 
 
@@ -36,4 +36,4 @@ def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_ra
     disc /= 4.0 * distance * distance
     far_gap = sticking_out if radius >= other_radius else distance + (other_radius - radius)
     area = math.pi * radius * overlap * far_gap / distance
-    return volume, scale(disc / distance, toward), area
+    return bounded((volume, scale(disc / distance, toward), area), radius, sphere_volume(other_radius))

@@ -56,18 +56,19 @@ class Compiled:
         with contextlib.suppress(RuntimeError):
             self._dispatcher._cache = cast(Any, _PackageCache)(function)
         self._signature = numba.types.void(*arguments)
-        self._ready = False
+        self.ready = False
+        """Whether it is compiled, so that the next call takes no longer than any other."""
 
     def prepare(self) -> None:
         """Compile or load now."""
-        if not self._ready:
+        if not self.ready:
             self._dispatcher.compile(self._signature)
             self._dispatcher.disable_compile()
-            self._ready = True
+            self.ready = True
 
     def __call__(self, *arguments: Any) -> None:
         """Run the kernel; TypeError for arrays that its signature does not name."""
-        if not self._ready:
+        if not self.ready:
             self.prepare()
         self._dispatcher(*arguments)
 

@@ -3,7 +3,7 @@
 import math
 
 from robot_side.overlap.compile import building_block
-from robot_side.overlap.solid import Overlap, nothing, whole_sphere
+from robot_side.overlap.solid import Overlap, bounded, nothing, whole_sphere
 from robot_side.overlap.vectors import Vector, dot, norm, scale
 
 
@@ -20,6 +20,7 @@ def half_space_overlap(center: Vector, radius: float, normal: Vector, offset: fl
         return nothing()
     if rest <= 0.0:
         return whole_sphere(radius)
-    volume = math.pi * depth * depth * (2.0 * radius + rest) / 3.0
-    disc = math.pi * depth * rest
-    return volume, scale(-disc / length, normal), 2.0 * math.pi * radius * depth
+    volume = math.pi * depth * depth * (radius + rest) / 3.0
+    disc = math.pi * (depth * rest)
+    overlap = volume, scale(-disc / length, normal), 2.0 * math.pi * radius * depth
+    return bounded(overlap, radius, math.inf)

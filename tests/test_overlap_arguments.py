@@ -1,0 +1,189 @@
+"""The public functions' arguments: shapes, broadcasting, errors; and the unchecked kernels beneath."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robot_side.overlap import kernels, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+
+CORNER = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+Call = tuple[Callable[..., Any], dict[str, Any]]
+CALLS: dict[str, Call] = {
+    "sphere": (
+        sphere_sphere,
+        {"centers": np.zeros((2, 3)), "radii": np.ones(2), "other_centers": np.ones((2, 3)), "other_radii": np.ones(2)},
+    ),
+    "half-space": (
+        sphere_half_space,
+        {"centers": np.zeros((2, 3)), "radii": np.ones(2), "normals": np.eye(3)[:2], "offsets": np.zeros(2)},
+    ),
+    "box": (
+        sphere_box,
+        {
+            "centers": np.zeros((2, 3)),
+            "radii": np.ones(2),
+            "box_centers": np.ones((2, 3)),
+            "box_rotations": np.array([np.eye(3), np.eye(3)]),
+            "box_half_sizes": np.ones((2, 3)),
+        },
+    ),
+    "tetrahedron": (
+        sphere_tetrahedron,
+        {"centers": np.zeros((2, 3)), "radii": np.ones(2), "vertices": np.array([CORNER, CORNER])},
+    ),
+}
+ARGUMENTS = [(kind, name) for kind, (_, arguments) in CALLS.items() for name in arguments]
+
+
+def changed(kind: str, name: str, value: object) -> Callable[[], Any]:
+    function, arguments = CALLS[kind]
+    return lambda: function(**{**arguments, name: value})
+
+
+@pytest.mark.parametrize("kind", CALLS)
+def test_results_have_the_leading_dimensions(kind: str) -> None:
+    function, arguments = CALLS[kind]
+    volumes = function(**arguments)
+    assert volumes.shape == (2,)
+    assert volumes.dtype == np.float64
+    with_gradient = function(**arguments, gradient=True)
+    assert [result.shape for result in with_gradient] == [(2,), (2, 3), (2,)]
+    np.testing.assert_array_equal(with_gradient[0], volumes)
+
+    one = function(**{name: value[0] for name, value in arguments.items()})
+    assert one.shape == ()
+    assert one == volumes[0]
+    none = function(**{name: value[:0] for name, value in arguments.items()}, gradient=True)
+    assert [result.shape for result in none] == [(0,), (0, 3), (0,)]
+
+
+@pytest.mark.parametrize("kind", CALLS)
+def test_leading_dimensions_broadcast(kind: str) -> None:
+    function, arguments = CALLS[kind]
+    rng = np.random.default_rng(5)
+    centers, radii = 0.3 * rng.normal(size=(4, 1, 3)), rng.uniform(0.5, 1.0, (4, 1))
+    table = function(**{**arguments, "centers": centers, "radii": radii}, gradient=True)
+    assert [result.shape for result in table] == [(4, 2), (4, 2, 3), (4, 2)]
+    for row in range(4):
+        for column in range(2):
+            single = {name: value[column] for name, value in arguments.items()}
+            single |= {"centers": centers[row, 0], "radii": radii[row, 0]}
+            for result, expected in zip(table, function(**single, gradient=True), strict=True):
+                np.testing.assert_array_equal(result[row, column], expected)
+
+
+def test_lists_integers_and_single_precision_are_numbers() -> None:
+    expected = sphere_tetrahedron(np.zeros(3), 1.0, CORNER)
+    assert sphere_tetrahedron([0, 0, 0], 1, CORNER.astype(int).tolist()) == expected
+    assert sphere_tetrahedron(np.zeros(3, np.float32), np.float32(1), CORNER.astype(np.float32)) == expected
+    strided = np.repeat(CORNER, 2, axis=0)[::2]
+    strided.flags.writeable = False
+    assert sphere_tetrahedron([0, 0, 0], 1, strided) == expected
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e51])
+@pytest.mark.parametrize(("kind", "name"), ARGUMENTS)
+def test_numbers_that_are_not_finite_or_too_large_are_refused(kind: str, name: str, bad: float) -> None:
+    value = CALLS[kind][1][name].copy()
+    value[(1, *[0] * (value.ndim - 1))] = bad
+    place = ", ".join(["1", *["0"] * (value.ndim - 1)])
+    with pytest.raises(ValueError, match=re.escape(f"{name}[{place}] = {bad} is out of range; valid: finite")):
+        changed(kind, name, value)()
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("sphere", "radii"), ("box", "radii"), ("sphere", "other_radii"), ("box", "box_half_sizes")]
+)
+def test_negative_lengths_are_refused(kind: str, name: str) -> None:
+    value = CALLS[kind][1][name].copy()
+    value[-1] = -0.25
+    with pytest.raises(ValueError, match=rf"^{name}\[1.*\] = -0\.25 is out of range; valid: 0 to 1e\+50 m$"):
+        changed(kind, name, value)()
+
+
+@pytest.mark.parametrize(("kind", "name"), ARGUMENTS)
+def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
+    value = CALLS[kind][1][name]
+    if value.ndim > 1:
+        with pytest.raises(ValueError, match=rf"^{name} has the shape \(2, .*; valid: the shape \(\.\.\., "):
+            changed(kind, name, value[..., :-1])()
+        with pytest.raises(ValueError, match=rf"^{name} has the shape \(\); valid"):
+            changed(kind, name, 1.0)()
+    three = np.concatenate([value, value[:1]])
+    with pytest.raises(ValueError, match=rf"do not broadcast: .*{name} \(3"):
+        changed(kind, name, three)()
+
+
+@pytest.mark.parametrize("bad", ["far", None, 1j, True])
+def test_what_is_no_number_is_refused(bad: object) -> None:
+    with pytest.raises(ValueError, match=r"^radii has the type .*; valid: real numbers"):
+        changed("sphere", "radii", bad)()
+
+
+def test_ragged_lists_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"^vertices is no rectangular array; valid: the shape \(\.\.\., 4, 3\)"):
+        changed("tetrahedron", "vertices", [[0, 0, 0], [1, 0]])()
+
+
+def test_a_normal_of_zero_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^normals\[1\] = \[0\.0, 0\.0, 0\.0\] is out of range; valid: a vector"):
+        changed("half-space", "normals", np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]]))()
+
+
+@pytest.mark.parametrize("rotation", [2.0 * np.eye(3), np.zeros((3, 3)), np.eye(3) + 1e-6 * np.eye(3, k=1)])
+def test_rotations_that_are_not_orthonormal_are_refused(rotation: object) -> None:
+    with pytest.raises(ValueError, match=r"^box_rotations = \[\[.*\]\] is out of range; valid: an orthonormal"):
+        changed("box", "box_rotations", rotation)()
+
+
+def test_a_rotation_within_its_tolerance_gives_the_set_that_it_describes() -> None:
+    skewed = np.eye(3) + 4e-7 * np.eye(3, k=1)
+    stretched = np.diag([1.0 + 4e-7, 1.0, 1.0])
+    for rotation in (skewed, stretched, -stretched):
+        inside = sphere_box((0, 0, 0), 9.0, (0, 0, 0), rotation, (1, 2, 3))
+        assert inside == pytest.approx(48.0 * abs(np.linalg.det(rotation)), rel=1e-15)
+
+
+def test_flat_solids_and_points_give_nothing() -> None:
+    for vertices in (CORNER[[0, 1, 2, 1]], np.zeros((4, 3)), CORNER * [1.0, 1.0, 0.0], CORNER[[0, 1, 1, 2]]):
+        for result in sphere_tetrahedron((0.25, 0.25, 0.0), 0.5, vertices, gradient=True):
+            assert not result.any()
+    for result in sphere_box((0, 0, 0), 1.0, (0, 0, 0), np.eye(3), (1.0, 0.0, 1.0), gradient=True):
+        assert not result.any()
+    for function, arguments in CALLS.values():
+        for result in function(**{**arguments, "radii": 0.0}, gradient=True):
+            assert not result.any()
+
+
+def test_collinear_vertices_that_round_to_a_volume_stay_finite() -> None:
+    rng = np.random.default_rng(6)
+    start, step = rng.normal(size=(2, 5000, 1, 3))
+    vertices = start + np.array([0.0, 0.25, 0.5, 1.0])[:, None] * step
+    vertices[:, 3] = rng.normal(size=(5000, 3))
+    volumes, gradients, areas = sphere_tetrahedron(start[:, 0], 0.5, vertices, gradient=True)
+    assert volumes.max() <= 1e-15
+    assert np.abs(gradients).max() <= 1e-14
+    assert areas.max() <= 1e-14
+
+
+def test_kernels_take_what_a_tick_has() -> None:
+    rng = np.random.default_rng(7)
+    vertices = rng.normal(size=(8, 4, 3))
+    frozen = vertices.copy()
+    frozen.flags.writeable = False
+    centers, radii = rng.normal(size=(8, 3)), np.ones(8)
+    expected = sphere_tetrahedron(centers, radii, vertices, gradient=True)
+    for overlaps in (
+        kernels.tetrahedron_pairs(centers, radii, vertices),
+        kernels.tetrahedron_pairs(centers, radii, frozen),
+    ):
+        for result, wanted in zip(overlaps, expected, strict=True):
+            np.testing.assert_array_equal(result, wanted)
+    with pytest.raises(TypeError):
+        kernels.tetrahedron_pairs(centers, radii, vertices.astype(np.float32))
+    with pytest.raises(TypeError):
+        kernels.tetrahedron_pairs(centers[::2], radii[::2], vertices[::2])

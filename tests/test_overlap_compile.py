@@ -1,0 +1,57 @@
+"""The kernels' compilation: once, beforehand, and never from stale machine code."""
+
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.overlap import compile as compile_module
+from robot_side.overlap import kernels, warm_up
+from robot_side.overlap.compile import Compiled, compiled, input_array, output_array
+
+
+def _double(values: FloatArray, doubled: FloatArray) -> None:
+    for i in range(values.size):
+        doubled[i] = 2.0 * values[i]
+
+
+def _kernel() -> Compiled:
+    kernel = compiled(input_array(1), output_array(1))(_double)
+    result = np.empty(2)
+    kernel(np.array([1.0, 2.0]), result)
+    assert result.tolist() == [2.0, 4.0]
+    return kernel
+
+
+def test_warm_up_leaves_nothing_to_compile() -> None:
+    assert warm_up() > 0.0
+    for name in ("_sphere_loop", "_half_space_loop", "_box_loop", "_tetrahedron_loop"):
+        kernel = getattr(kernels, name)
+        assert isinstance(kernel, Compiled)
+        assert kernel.ready
+
+
+def test_machine_code_is_kept_on_disk_until_any_source_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert _kernel().cache_hits == 0
+    assert _kernel().cache_hits == 1
+    monkeypatch.setattr(compile_module, "package_digest", lambda: "another version")
+    assert _kernel().cache_hits == 0
+
+
+def test_a_kernel_works_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_place(_: object) -> None:
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(compile_module, "_PackageCache", no_place)
+    assert _kernel().cache_hits == 0
+
+
+def test_an_array_of_another_kind_is_refused_rather_than_compiled_for() -> None:
+    kernel = _kernel()
+    with pytest.raises(TypeError):
+        kernel(np.ones(2, dtype=np.float32), np.empty(2))
+    with pytest.raises(TypeError):
+        kernel(np.ones((2, 2)), np.empty(2))

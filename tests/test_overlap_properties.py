@@ -1,0 +1,229 @@
+"""What holds for every overlap, whatever the shapes: bounds, additivity, invariances, monotonicity."""
+
+import itertools
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from common.arrays import FloatArray
+from robot_side.overlap import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+
+repeatable = settings(derandomize=True, deadline=None, max_examples=150)
+
+# Integers and eighths bring about the degenerate positions that random reals never reach.
+coordinates = st.floats(-4.0, 4.0, width=32) | st.integers(-3, 3).map(float) | st.integers(-32, 32).map(lambda n: n / 8)
+points = arrays.arrays(np.float64, 3, elements=coordinates)
+corners = arrays.arrays(np.float64, (4, 3), elements=coordinates)
+radii = st.floats(0.0, 5.0) | st.integers(0, 5).map(float) | st.integers(0, 40).map(lambda n: n / 8)
+half_sizes = arrays.arrays(np.float64, 3, elements=st.floats(0.0, 3.0) | st.integers(0, 3).map(float))
+seeds = st.integers(0, 2**32 - 1)
+
+SIZE = 16.0
+"""The largest distance (m) between any two of these points, generously."""
+
+
+def rounding(radius: float) -> float:
+    """What the documented error comes to in m³: 1e-15 of the sphere, more for solids that are larger."""
+    return 1e-15 * 4.2 * radius**2 * max(radius, SIZE)
+
+
+def rotation(seed: int) -> FloatArray:
+    return np.asarray(np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0])
+
+
+def determinant_volume(vertices: FloatArray) -> float:
+    return abs(float(np.linalg.det(vertices[1:] - vertices[0]))) / 6.0
+
+
+@repeatable
+@given(points, radii, corners)
+def test_a_tetrahedron_bounds_its_overlap(center: FloatArray, radius: float, vertices: FloatArray) -> None:
+    volume, gradient, area = sphere_tetrahedron(center, radius, vertices, gradient=True)
+    assert 0.0 <= volume <= 4.0 / 3.0 * np.pi * radius**3 * (1.0 + 1e-15)
+    assert volume <= determinant_volume(vertices) + 1e-15 * SIZE**3
+    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
+    assert np.linalg.norm(gradient) <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
+
+
+@repeatable
+@given(points, radii, points, seeds, half_sizes)
+def test_a_box_bounds_its_overlap(
+    center: FloatArray, radius: float, box: FloatArray, seed: int, half: FloatArray
+) -> None:
+    volume, gradient, area = sphere_box(center, radius, box, rotation(seed), half, gradient=True)
+    assert 0.0 <= volume <= 4.0 / 3.0 * np.pi * radius**3 * (1.0 + 1e-15)
+    assert volume <= 8.0 * half.prod() * (1.0 + 1e-14)
+    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
+    assert np.linalg.norm(gradient) <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
+
+
+@repeatable
+@given(points, radii, corners)
+def test_vertices_may_come_in_any_order(center: FloatArray, radius: float, vertices: FloatArray) -> None:
+    orders = np.array([vertices[list(order)] for order in itertools.permutations(range(4))])
+    volumes, gradients, areas = sphere_tetrahedron(center, radius, orders, gradient=True)
+    assert np.ptp(volumes) <= rounding(radius)
+    assert np.ptp(gradients, axis=0).max() <= 2e-15 * 4.0 * max(radius, SIZE) * radius
+    assert np.ptp(areas) <= 1e-15 * 13.0 * max(radius, SIZE) * radius
+
+
+@repeatable
+@given(points, radii, corners, st.floats(0.0, 1.0))
+def test_the_parts_of_a_tetrahedron_add_up(
+    center: FloatArray, radius: float, vertices: FloatArray, share: float
+) -> None:
+    cut = (1.0 - share) * vertices[2] + share * vertices[3]
+    parts = np.stack([[*vertices[:3], cut], [vertices[0], vertices[1], cut, vertices[3]]])
+    whole = sphere_tetrahedron(center, radius, vertices)
+    # The cut is rounded, which moves the parts' faces by as much.
+    moved = 1e-15 * SIZE * 2.0 * np.pi * radius**2
+    assert abs(whole - sphere_tetrahedron(center, radius, parts).sum()) <= 2.0 * rounding(radius) + moved
+
+
+@repeatable
+@given(points, radii, points, half_sizes)
+def test_a_box_is_the_sum_of_six_tetrahedra(
+    center: FloatArray, radius: float, box: FloatArray, half: FloatArray
+) -> None:
+    whole = sphere_box(center, radius, box, np.eye(3), half)
+    tetrahedra = []
+    for order in itertools.permutations(range(3)):
+        corner, path = box - half, [box - half]
+        for axis in order:
+            corner = corner.copy()
+            corner[axis] = (box + half)[axis]
+            path.append(corner)
+        tetrahedra.append(path)
+    parts = sphere_tetrahedron(center, radius, tetrahedra)
+    assert abs(whole - parts.sum()) <= 4.0 * rounding(radius)
+
+
+@repeatable
+@given(points, radii, corners, seeds, points)
+def test_moving_both_changes_nothing(
+    center: FloatArray, radius: float, vertices: FloatArray, seed: int, shift: FloatArray
+) -> None:
+    turn = rotation(seed)
+    before = sphere_tetrahedron(center, radius, vertices, gradient=True)
+    after = sphere_tetrahedron(turn @ center + shift, radius, vertices @ turn.T + shift, gradient=True)
+    moved = 4e-15 * SIZE
+    assert abs(before[0] - after[0]) <= moved * 4.0 * np.pi * radius**2
+    # Where the sphere touches a face, a move of δ changes the disc in it by 2π R δ at once.
+    np.testing.assert_allclose(turn @ before[1], after[1], rtol=0.0, atol=moved * 8.0 * np.pi * radius + 1e-30)
+
+
+@repeatable
+@given(points, corners, radii, radii)
+def test_a_larger_sphere_overlaps_no_less(
+    center: FloatArray, vertices: FloatArray, first: float, second: float
+) -> None:
+    small, large = sphere_tetrahedron(center, sorted((first, second)), vertices)
+    assert small <= large + rounding(max(first, second))
+
+
+@repeatable
+@given(points, radii, corners, points, seeds, half_sizes, st.integers(-60, 60))
+def test_powers_of_two_scale_exactly(
+    center: FloatArray,
+    radius: float,
+    vertices: FloatArray,
+    box: FloatArray,
+    seed: int,
+    half: FloatArray,
+    exponent: int,
+) -> None:
+    factor, turn = 2.0**exponent, rotation(seed)
+    pairs = (
+        (
+            sphere_tetrahedron(center, radius, vertices),
+            sphere_tetrahedron(factor * center, factor * radius, factor * vertices),
+        ),
+        (
+            sphere_box(center, radius, box, turn, half),
+            sphere_box(factor * center, factor * radius, factor * box, turn, factor * half),
+        ),
+    )
+    for plain, scaled in pairs:
+        # Subnormal products of the tiniest coordinates are the only ones that do not scale.
+        assert scaled == np.float64(factor**3) * plain or plain < 1e-200
+
+
+@repeatable
+@given(points, radii, points, radii)
+def test_two_spheres_are_alike(center: FloatArray, radius: float, other: FloatArray, other_radius: float) -> None:
+    volume, gradient, area = sphere_sphere(center, radius, other, other_radius, gradient=True)
+    swapped, opposite, _ = sphere_sphere(other, other_radius, center, radius, gradient=True)
+    assert volume == swapped
+    np.testing.assert_array_equal(gradient, -opposite)
+    assert 0.0 <= volume <= 4.0 / 3.0 * np.pi * min(radius, other_radius) ** 3 * (1.0 + 1e-15)
+    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
+
+
+@repeatable
+@given(points, radii, points.filter(np.any), coordinates)
+def test_opposite_half_spaces_share_the_sphere(
+    center: FloatArray, radius: float, normal: FloatArray, offset: float
+) -> None:
+    inside = sphere_half_space(center, radius, normal, offset, gradient=True)
+    outside = sphere_half_space(center, radius, -normal, -offset, gradient=True)
+    assert abs(inside[0] + outside[0] - 4.0 / 3.0 * np.pi * radius**3) <= 1e-15 * 4.2 * radius**3
+    np.testing.assert_array_equal(inside[1], -outside[1])
+
+
+wild = st.floats(-1e50, 1e50)
+wild_points = arrays.arrays(np.float64, 3, elements=wild)
+
+
+@repeatable
+@given(
+    wild_points,
+    st.floats(0.0, 1e50),
+    arrays.arrays(np.float64, (4, 3), elements=wild | st.floats(-1.0, 1.0)),
+    wild_points,
+    seeds,
+    arrays.arrays(np.float64, 3, elements=st.floats(0.0, 1e50)),
+    st.floats(0.0, 1e50),
+)
+def test_every_valid_input_gives_finite_results(
+    center: FloatArray,
+    radius: float,
+    vertices: FloatArray,
+    box: FloatArray,
+    seed: int,
+    half: FloatArray,
+    other_radius: float,
+) -> None:
+    results = (
+        *sphere_tetrahedron(center, radius, vertices, gradient=True),
+        *sphere_box(center, radius, box, rotation(seed), half, gradient=True),
+        *sphere_sphere(center, radius, box, other_radius, gradient=True),
+        *sphere_half_space(center, radius, (0.6, 0.0, 0.8), box[0], gradient=True),
+    )
+    for result in results:
+        assert np.isfinite(result).all()
+
+
+@repeatable
+@given(seeds)
+def test_gradients_are_finite_differences(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    center, radius = rng.normal(size=3), float(rng.uniform(0.5, 2.0))
+    vertices, box, half, turn = rng.normal(size=(4, 3)), rng.normal(size=3), rng.uniform(0.2, 1.5, 3), rotation(seed)
+    normal, other_radius = rng.normal(size=3), float(rng.uniform(0.5, 2.0))
+    step = 1e-5
+    centers = np.concatenate([center + step * np.eye(3), center - step * np.eye(3), [center, center]])
+    grown = np.array([radius] * 6 + [radius + step, radius - step])
+    for volumes, (_, gradient, area) in (
+        (sphere_tetrahedron(centers, grown, vertices), sphere_tetrahedron(center, radius, vertices, gradient=True)),
+        (sphere_box(centers, grown, box, turn, half), sphere_box(center, radius, box, turn, half, gradient=True)),
+        (
+            sphere_sphere(centers, grown, box, other_radius),
+            sphere_sphere(center, radius, box, other_radius, gradient=True),
+        ),
+        (sphere_half_space(centers, grown, normal, 0.3), sphere_half_space(center, radius, normal, 0.3, gradient=True)),
+    ):
+        differences = [*(volumes[:3] - volumes[3:6]), volumes[6] - volumes[7]]
+        # A corner or an edge at the sphere's surface lets the derivative turn within one step.
+        np.testing.assert_allclose(np.array(differences) / (2 * step), [*gradient, area], rtol=0.0, atol=2e-4)
