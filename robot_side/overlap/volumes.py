@@ -14,7 +14,7 @@ ValueError for NaN, infinity, a magnitude above 1e50, a negative radius or size,
 the text names the argument, the value and what is valid.
 
 The error is a few 1e-16 of the sphere's volume as long as the solid is not much larger than the sphere; it
-grows with the ratio of their sizes, to 1e-15 at 10 and 1e-13 at 1000.
+grows with the ratio of their sizes, to 3e-15 at 10 and 4e-13 at 1000.
 """
 
 from typing import Literal, overload
