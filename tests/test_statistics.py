@@ -1,0 +1,126 @@
+import math
+import statistics
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.statistics import RESERVOIR_SIZE, RunningStatistics, SlidingQuantile
+
+repeatable = settings(derandomize=True, deadline=None)
+samples = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200)
+
+
+def test_without_samples_everything_is_absent() -> None:
+    empty = RunningStatistics(0)
+    assert empty.count == 0
+    assert [empty.mean, empty.sd, empty.minimum, empty.maximum, empty.quantile(0.5)] == [None] * 5
+    assert empty.summary_ms() == dict.fromkeys(("mean", "sd", "p50", "p95", "p99"))
+
+
+def test_one_sample_has_no_spread() -> None:
+    one = RunningStatistics(0)
+    one.add(0.25)
+    assert one.sd is None
+    assert one.summary_ms() == {"mean": 250.0, "sd": None, "p50": 250.0, "p95": 250.0, "p99": 250.0}
+
+
+@repeatable
+@given(samples, st.floats(0.0, 1.0))
+def test_agrees_with_the_whole_sample(values: list[float], probability: float) -> None:
+    running = RunningStatistics(0)
+    for value in values:
+        running.add(value)
+    assert running.count == len(values)
+    assert running.mean == pytest.approx(statistics.fmean(values), rel=1e-9, abs=1e-7)
+    assert (running.minimum, running.maximum) == (min(values), max(values))
+    assert running.quantile(probability) == pytest.approx(np.quantile(values, probability), rel=1e-12)
+    if len(values) > 1:
+        assert running.sd == pytest.approx(statistics.stdev(values), rel=1e-9, abs=1e-7)
+
+
+def test_a_large_offset_does_not_hide_the_spread() -> None:
+    running = RunningStatistics(0)
+    for value in range(1000):
+        running.add(1e9 + value % 2)
+    assert running.sd == pytest.approx(statistics.stdev(value % 2 for value in range(1000)), rel=1e-6)
+
+
+def test_quantiles_of_a_long_run_cover_all_of_it() -> None:
+    count = 3 * RESERVOIR_SIZE
+    running = RunningStatistics(1)
+    for value in range(count):
+        running.add(value)
+    assert running.count == count
+    for probability in (0.05, 0.50, 0.95):
+        sd = count * math.sqrt(probability * (1.0 - probability) / RESERVOIR_SIZE)
+        assert running.quantile(probability) == pytest.approx(probability * count, abs=4.0 * sd)
+
+
+def test_the_reservoir_is_repeatable_by_seed() -> None:
+    def quantile(seed: int) -> float | None:
+        running = RunningStatistics(seed)
+        for value in range(RESERVOIR_SIZE + 20_000):
+            running.add(value)
+        return running.quantile(0.37)
+
+    assert quantile(5) == quantile(5)
+    assert quantile(5) != quantile(6)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_refuses_what_is_not_finite(value: float) -> None:
+    running, sliding = RunningStatistics(0), SlidingQuantile()
+    with pytest.raises(ValueError, match="value = "):
+        running.add(value)
+    with pytest.raises(ValueError, match="value = "):
+        sliding.update(value)
+    assert running.count == 0
+    assert sliding.value is None
+
+
+@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
+def test_refuses_probabilities_that_are_none(probability: float) -> None:
+    with pytest.raises(ValueError, match="probability = "):
+        RunningStatistics(0).quantile(probability)
+    with pytest.raises(ValueError, match="probability = "):
+        SlidingQuantile(probability=probability)
+
+
+def test_refuses_an_empty_window() -> None:
+    with pytest.raises(ValueError, match="window = 0"):
+        SlidingQuantile(window=0)
+
+
+@repeatable
+@given(samples, st.integers(1, 50), st.sampled_from([0.05, 0.25, 0.5, 0.75, 0.95, 1.0]))
+def test_sliding_quantile_agrees_with_numpy(values: list[float], window: int, probability: float) -> None:
+    sliding = SlidingQuantile(window, probability)
+    for position, value in enumerate(values):
+        sliding.update(value)
+        newest = values[max(0, position + 1 - window) : position + 1]
+        assert sliding.value == np.quantile(newest, probability, method="inverted_cdf")
+
+
+def test_sliding_quantile_follows_a_step() -> None:
+    generator = np.random.default_rng(3)
+    sliding = SlidingQuantile(window=500, probability=0.95)
+    for age_s in generator.normal(0.050, 0.010, 2000):
+        sliding.update(age_s)
+    before_s = sliding.value
+    for age_s in generator.normal(0.120, 0.010, 300):
+        sliding.update(age_s)
+    upper_s = 1.645 * 0.010
+    assert before_s == pytest.approx(0.050 + upper_s, abs=0.003)
+    assert sliding.value == pytest.approx(0.120 + upper_s, abs=0.005)
+
+
+def test_sliding_quantile_forgets_on_request() -> None:
+    sliding = SlidingQuantile(window=3)
+    for value in (1.0, 2.0, 3.0, 4.0):
+        sliding.update(value)
+    sliding.clear()
+    assert sliding.value is None
+    sliding.update(0.5)
+    assert sliding.value == 0.5
