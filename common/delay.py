@@ -184,6 +184,9 @@ class SlidingMinimum:
             candidates.popleft()
         return candidates[0][1]
 
+    def __len__(self) -> int:
+        return len(self._candidates)
+
     @property
     def value(self) -> float | None:
         """The present minimum; None before the first value."""

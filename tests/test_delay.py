@@ -1,0 +1,266 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.delay import ClockOffset, LoopAge, QueueingAge, SlidingMinimum
+
+repeatable = settings(derandomize=True, deadline=None)
+delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)
+
+
+# Loop age (eq. 8)
+
+
+def test_loop_age_is_the_worst_case_until_known_and_after_reset() -> None:
+    loop_age = LoopAge(worst_case_s=0.5)
+    assert loop_age.value(0.0) == 0.5
+    assert loop_age.value(1e6) == 0.5
+    for tick in range(10_000):
+        loop_age.update(0.020, 1e-3 * tick)
+    assert loop_age.value(10.0) == pytest.approx(0.020)
+    loop_age.reset()
+    assert loop_age.value(10.0) == 0.5
+    assert loop_age.value(1e6) == 0.5
+
+
+def test_loop_age_rises_at_once() -> None:
+    loop_age = LoopAge(worst_case_s=0.1, window=1)
+    loop_age.update(0.020, 0.0)
+    loop_age.update(0.300, 0.001)
+    assert loop_age.value(0.001) == 0.300
+
+
+@pytest.mark.parametrize("elapsed_s", [0.0, 0.1, 0.5, 3.0])
+def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
+    loop_age = LoopAge(worst_case_s=0.4, window=1, time_constant_s=0.5)
+    loop_age.update(0.100, 10.0)
+    expected_s = 0.100 + 0.300 * math.exp(-elapsed_s / 0.5)
+    assert loop_age.value(10.0 + elapsed_s) == pytest.approx(expected_s, rel=1e-12)
+
+
+def test_loop_age_falls_alike_however_often_it_is_updated() -> None:
+    often, once = LoopAge(worst_case_s=0.4), LoopAge(worst_case_s=0.4)
+    once.update(0.050, 0.0)
+    for tick in range(501):
+        often.update(0.050, 1e-3 * tick)
+    assert often.value(0.5) == pytest.approx(once.value(0.5), rel=1e-12)
+
+
+@repeatable
+@given(delays)
+def test_loop_age_never_lies_below_the_quantile_or_rises_by_waiting(ages_s: list[float]) -> None:
+    loop_age = LoopAge(worst_case_s=0.2, probability=0.5, window=5)
+    for tick, age_s in enumerate(ages_s):
+        now_s = 0.01 * tick
+        loop_age.update(age_s, now_s)
+        median_s = np.quantile(ages_s[max(0, tick - 4) : tick + 1], 0.5, method="inverted_cdf")
+        values_s = [loop_age.value(now_s + later_s) for later_s in (0.0, 0.1, 1.0, 60.0)]
+        assert values_s == sorted(values_s, reverse=True)
+        assert values_s[-1] == pytest.approx(median_s, abs=1e-12)
+
+
+def test_loop_age_grows_while_a_link_is_silent() -> None:
+    loop_age = LoopAge(worst_case_s=0.1)
+    for tick in range(5000):
+        loop_age.update(0.030, 1e-3 * tick)
+    steady_s = loop_age.value(5.0)
+    for tick in range(200):
+        loop_age.update(0.030 + 1e-3 * tick, 5.0 + 1e-3 * tick)
+    assert steady_s == pytest.approx(0.030, abs=1e-3)
+    assert loop_age.value(5.2) > 0.150
+
+
+@pytest.mark.parametrize("age_s", [-1e-9, math.nan, math.inf])
+def test_loop_age_refuses_impossible_ages(age_s: float) -> None:
+    loop_age = LoopAge(worst_case_s=0.1)
+    with pytest.raises(ValueError, match="age_s = "):
+        loop_age.update(age_s, 0.0)
+    assert loop_age.value(0.0) == 0.1
+
+
+@pytest.mark.parametrize("worst_case_s", [0.0, -1.0, math.nan, math.inf])
+def test_loop_age_refuses_a_worst_case_that_is_none(worst_case_s: float) -> None:
+    with pytest.raises(ValueError, match="worst_case_s = "):
+        LoopAge(worst_case_s)
+
+
+# Queueing age
+
+
+def test_a_steady_delay_ages_nothing() -> None:
+    queueing = QueueingAge()
+    ages_s = [queueing.update(0.004 * number, 0.004 * number + 0.5) for number in range(5000)]
+    assert max(ages_s) < 1e-9
+
+
+@repeatable
+@given(delays, st.floats(-1e5, 1e5))
+def test_a_clock_offset_cancels(delays_s: list[float], offset_s: float) -> None:
+    alike, apart = QueueingAge(), QueueingAge()
+    for number, delay_s in enumerate(delays_s):
+        sent_s = 0.01 * number
+        age_s = alike.update(sent_s, sent_s + delay_s)
+        assert apart.update(sent_s + offset_s, sent_s + delay_s) == pytest.approx(age_s, abs=1e-9)
+
+
+@repeatable
+@given(delays)
+def test_age_is_what_exceeds_the_least_delay(delays_s: list[float]) -> None:
+    queueing = QueueingAge()
+    for number, delay_s in enumerate(delays_s):
+        received_s = 0.01 * number
+        age_s = queueing.update(received_s - delay_s, received_s)
+        assert age_s == pytest.approx(delay_s - min(delays_s[: number + 1]), abs=1e-9)
+
+
+def test_a_longer_way_stops_ageing_after_the_window() -> None:
+    queueing = QueueingAge(window_s=10.0)
+    ages_s = {}
+    for number in range(8000):
+        sent_s = 0.004 * number
+        delay_s = 0.020 if sent_s < 5.0 else 0.070
+        ages_s[number] = queueing.update(sent_s, sent_s + delay_s)
+    assert ages_s[round(14.8 / 0.004)] == pytest.approx(0.050)
+    assert ages_s[round(15.3 / 0.004)] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("pause_s", [2.0, 60.0])
+def test_a_backlog_after_a_pause_is_old_however_long_the_pause(pause_s: float) -> None:
+    queueing = QueueingAge(window_s=10.0)
+    for number in range(1000):
+        queueing.update(0.004 * number, 0.004 * number + 0.001)
+    backlog_s = [4.0 + 0.004 * number for number in range(100)]
+    for sent_s in backlog_s:
+        assert queueing.update(sent_s, 4.0 + pause_s) == pytest.approx(4.0 + pause_s - sent_s - 0.001)
+
+
+def test_queueing_age_starts_anew_with_another_clock() -> None:
+    queueing = QueueingAge()
+    queueing.update(1000.0, 5.0)
+    assert queueing.update(3.0, 6.0) > 900.0
+    queueing.reset()
+    assert queueing.update(4.0, 7.0) == 0.0
+
+
+def test_queueing_age_refuses_what_is_not_finite() -> None:
+    with pytest.raises(ValueError, match="sent_s = nan"):
+        QueueingAge().update(math.nan, 0.0)
+    with pytest.raises(ValueError, match="window_s = 0"):
+        QueueingAge(window_s=0.0)
+
+
+@repeatable
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 9)), min_size=1, max_size=200),
+    st.integers(1, 8),
+)
+def test_sliding_minimum_agrees_with_the_whole_window(steps: list[tuple[int, int]], span: int) -> None:
+    minimum, seen, position = SlidingMinimum(span), list[tuple[int, int]](), 0
+    assert minimum.value is None
+    for step, value in steps:
+        position += step
+        seen.append((position, value))
+        expected = min(other for place, other in seen if place > position - span)
+        assert minimum.update(position, value) == expected
+        assert minimum.value == expected
+        assert len(minimum) <= span
+
+
+# Clock offset
+
+
+def exchange(
+    offset: ClockOffset, start_s: float, there_s: float, held_s: float, back_s: float, apart_s: float
+) -> float:
+    """One exchange with a peer whose clock is `apart_s` ahead; when its answer was received, by our clock."""
+    peer_sent_s = start_s + there_s + held_s + apart_s
+    received_s = start_s + there_s + held_s + back_s
+    assert offset.update(start_s, peer_sent_s, held_s, received_s)
+    return received_s
+
+
+def test_nothing_is_known_before_the_first_exchange() -> None:
+    offset = ClockOffset(shared_clock=False)
+    assert (offset.offset_s, offset.bound_s, offset.round_trip_s) == (None, None, None)
+    assert offset.one_way_from_peer_s(1.0, 2.0) is None
+
+
+@repeatable
+@given(st.floats(-1e5, 1e5), st.floats(1e-6, 1.0), st.floats(0.0, 1.0))
+def test_a_symmetric_link_gives_the_exact_offset(apart_s: float, way_s: float, held_s: float) -> None:
+    offset = ClockOffset(shared_clock=False)
+    exchange(offset, 7.0, way_s, held_s, way_s, apart_s)
+    assert offset.offset_s == pytest.approx(apart_s, abs=1e-9)
+    assert offset.round_trip_s == pytest.approx(2.0 * way_s, abs=1e-9)
+    assert offset.bound_s == pytest.approx(way_s, abs=1e-9)
+    assert offset.one_way_from_peer_s(20.0 + apart_s, 20.0 + way_s) == pytest.approx(way_s, abs=1e-9)
+
+
+@repeatable
+@given(st.floats(1e-6, 1.0), st.floats(1e-6, 1.0))
+def test_an_asymmetric_floor_costs_half_of_itself_and_stays_within_the_bound(there_s: float, back_s: float) -> None:
+    offset = ClockOffset(shared_clock=False)
+    exchange(offset, 0.0, there_s, 0.002, back_s, apart_s=100.0)
+    assert offset.offset_s is not None
+    assert offset.bound_s is not None
+    error_s = offset.offset_s - 100.0
+    assert error_s == pytest.approx((there_s - back_s) / 2.0, abs=1e-9)
+    assert abs(error_s) <= offset.bound_s + 1e-9
+
+
+def test_a_minute_of_symmetric_jitter_averages_out() -> None:
+    generator = np.random.default_rng(11)
+    offset = ClockOffset(shared_clock=False)
+    errors_s = []
+    for number, (there_s, back_s) in enumerate(np.abs(generator.normal(0.050, 0.010, (15_000, 2)))):
+        skewed_s = 1e5 + 20e-6 * 0.004 * number
+        exchange(offset, 0.004 * number, there_s, 0.001, back_s, skewed_s)
+        assert offset.offset_s is not None
+        errors_s.append(offset.offset_s - skewed_s)
+    assert math.sqrt(np.mean(np.square(errors_s[1000:]))) < 0.37e-3
+
+
+def test_the_window_forgets() -> None:
+    offset = ClockOffset(shared_clock=False, window=10)
+    exchange(offset, 0.0, 0.001, 0.0, 0.001, apart_s=-50.0)
+    for number in range(10):
+        exchange(offset, 1.0 + number, 0.020, 0.0, 0.020, apart_s=3.0)
+    assert offset.offset_s == pytest.approx(3.0, abs=1e-9)
+    assert offset.bound_s == pytest.approx(0.020, abs=1e-9)
+
+
+def test_a_shared_clock_needs_no_estimate() -> None:
+    offset = ClockOffset(shared_clock=True)
+    assert (offset.offset_s, offset.bound_s) == (0.0, 0.0)
+    assert offset.one_way_from_peer_s(1.0, 1.25) == 0.25
+    exchange(offset, 2.0, 0.3, 0.0, 0.1, apart_s=0.0)
+    assert (offset.offset_s, offset.bound_s) == (0.0, 0.0)
+    assert offset.round_trip_s == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("sent_s", "peer_s", "held_s", "received_s"),
+    [
+        (1.0, 5.0, -0.001, 1.1),
+        (1.0, 5.0, 0.2, 1.1),
+        (1.0, 5.0, 0.0, 0.9),
+        (1.0, math.nan, 0.0, 1.1),
+        (1.0, 5.0, math.nan, 1.1),
+        (-math.inf, 5.0, 0.0, 1.1),
+    ],
+)
+def test_contradictory_stamps_are_counted_and_change_nothing(
+    sent_s: float, peer_s: float, held_s: float, received_s: float
+) -> None:
+    offset = ClockOffset(shared_clock=False)
+    assert not offset.update(sent_s, peer_s, held_s, received_s)
+    assert offset.rejected == 1
+    assert (offset.offset_s, offset.bound_s, offset.round_trip_s) == (None, None, None)
+
+
+def test_refuses_an_empty_window() -> None:
+    with pytest.raises(ValueError, match="window = 0"):
+        ClockOffset(shared_clock=False, window=0)
