@@ -96,6 +96,7 @@ class RobotSide:
         self._next_target_was_down = False
         self._switch_target = False
         self._was_armed = False
+        self._was_carrying = False
         self._held: HeldObject | None = None
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
@@ -178,9 +179,11 @@ class RobotSide:
         permission = self.safety.permission(now_s)
         self._move(permission, pose, now_s)
         armed = permission.state == "armed"
-        if armed and not self._was_armed:
+        carrying = self._held is not None
+        if (armed and not self._was_armed) or carrying != self._was_carrying:
+            # What the gripper carries changes its shape: the support counts anew from there.
             self._sensing.stiffness_map.set_support_baseline()
-        self._was_armed = armed
+        self._was_armed, self._was_carrying = armed, carrying
         self._last = (state, sensed)
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
         self._record(sensed, objects, speed_m_s, armed, now_s)

@@ -7,7 +7,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm_port import GripperPose
 from robot_side.gripper_spheres import cover_boxes
-from robot_side.nearest_point import nearest_on_box, nearest_on_sphere, nearest_on_tetrahedron
+from robot_side.nearest_object import distance_to_object
 from robot_side.perceived_objects import PerceivedObjects, Role
 
 _SPHERES_PER_BOX = 4
@@ -29,36 +29,15 @@ class HeldObject:
 def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach_m: float) -> int | None:
     """The object nearest to the point between the fingertips, within `reach_m`; None when there is none.
 
-    Supports and half-spaces are never held: an arm that closes its fingers on the table does not lift it.
+    Supports are never held: an arm that closes its fingers on the table does not lift it.
     """
-    nearest: tuple[float, int] | None = None
-    for distances, owner in (
-        (
-            nearest_on_sphere(
-                _repeat(tool_position_m, objects.sphere_object), objects.sphere_centers_m, objects.sphere_radii_m
-            )[0],
-            objects.sphere_object,
-        ),
-        (
-            nearest_on_box(
-                _repeat(tool_position_m, objects.box_object),
-                objects.box_centers_m,
-                objects.box_rotations,
-                objects.box_half_sizes_m,
-            )[0],
-            objects.box_object,
-        ),
-        (
-            nearest_on_tetrahedron(
-                _repeat(tool_position_m, objects.tetrahedron_object), objects.tetrahedron_vertices_m
-            )[0],
-            objects.tetrahedron_object,
-        ),
-    ):
-        for distance, index in zip(distances.tolist(), owner.tolist(), strict=True):
-            if objects.roles[index] is not Role.SUPPORT and distance <= reach_m:
-                nearest = min(nearest, (distance, index)) if nearest is not None else (distance, index)
-    return None if nearest is None else nearest[1]
+    distances = {
+        index: distance_to_object(objects, index, tool_position_m)
+        for index, role in enumerate(objects.roles)
+        if role is not Role.SUPPORT
+    }
+    nearest = min(distances, key=lambda index: distances[index], default=None)
+    return nearest if nearest is not None and distances[nearest] <= reach_m else None
 
 
 def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject:
@@ -101,7 +80,3 @@ def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
         sphere_jacobians=np.concatenate([pose.sphere_jacobians, linear + turning]),
         sphere_on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(lever), dtype=np.bool_)]),
     )
-
-
-def _repeat(point: FloatArray, owner: np.ndarray) -> FloatArray:
-    return np.broadcast_to(point, (len(owner), 3))

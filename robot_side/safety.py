@@ -8,9 +8,9 @@ while a steady delay, however long, ages nothing.
 
 from dataclasses import dataclass
 
-from common.session import Arming
 from common.link_end import Arrival
 from common.messages import MotionCommand, MotionState
+from common.session import Arming
 
 RELEASED_TRAVEL = 0.02
 """Travel below this counts as released: a calibrated trigger at rest reads 0, give or take a count."""

@@ -3,17 +3,19 @@
 pose, joint velocities ─▶ enlargement ─▶ candidate pairs ─▶ overlaps ─▶ stiffness
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm_port import GripperPose
+from robot_side.between_fingers import outside_share
 from robot_side.enlargement import Enlargement
 from robot_side.kinematic_error import position_covariance
-from robot_side.overlapping import by_object, evaluate, nearest_surfaces, radii_for_role
+from robot_side.overlapping import evaluate, nearest_surfaces, radii_for_role
 from robot_side.perceived_objects import PerceivedObjects
 from robot_side.proximity import candidate_pairs
+from robot_side.reference_volume import plane_overlaps
 from robot_side.stiffness import Stiffness, StiffnessMap
 from robot_side.tool_motion import trigger_directions
 
@@ -84,13 +86,26 @@ class AheadSensing:
             pair_enlargement_m = enlargement_m[pairs.sphere_index]
         radii_m, binding = radii_for_role(pose.sphere_radii_m, pair_enlargement_m, pairs, objects.roles, gap_m)
         self.skipped.enlargement_limits += binding
-        overlaps = by_object(evaluate(pose.sphere_centers_m, radii_m, objects, pairs, nearest))
+        overlaps = evaluate(pose.sphere_centers_m, radii_m, objects, pairs, nearest)
+        share = outside_share(pose, objects, pairs, nearest)
+        if share is not None:
+            overlaps = replace(
+                overlaps,
+                volume_m3=share * overlaps.volume_m3,
+                gradient_m2=share[:, None] * overlaps.gradient_m2,
+            )
+        directions = trigger_directions(pose.tool_rotation, len(enlarged_m))
+        reference_m3 = None
+        if self.stiffness_map.settings.reference == "plane":
+            axes = np.stack([directions["l2"][0], directions["r2"][0]])
+            reference_m3 = plane_overlaps(pose.sphere_centers_m, pose.sphere_radii_m, enlargement_m, axes)
         stiffness = self.stiffness_map.update(
             overlaps,
             objects.roles,
             4.0 / 3.0 * np.pi * enlarged_m**3,
-            trigger_directions(pose.tool_rotation, len(enlarged_m)),
+            directions,
             now_s,
+            reference_m3=reference_m3,
             unenlarged_radii_m=pose.sphere_radii_m,
             excluded_objects=() if excluded is None else (excluded,),
         )

@@ -14,7 +14,6 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.alignment import alignments, trust
-from robot_side.overlap import kernels
 from robot_side.overlapping import Overlaps, by_object, select
 from robot_side.perceived_objects import Role
 
@@ -34,8 +33,11 @@ class StiffnessSettings:
 
     mode: Literal["directional", "total"] = "directional"
     """`total`: every overlap counts in full on both triggers (the paper's one degree of freedom)."""
+    reference: Literal["plane", "fraction"] = "plane"
+    """Which overlap gives s = 1: that with a plane which the gripper just touches (`plane_overlaps`), whatever the
+    enlargement is, or a fixed share of the enlarged gripper."""
     reference_fraction: float = 0.05
-    """f: the share of the enlarged gripper's volume whose overlap gives s = 1 (`calibrated_fraction`)."""
+    """f: that share, for `fraction`."""
     gradient_threshold: float = 1e-3
     """The share of πR² below which a gradient is too weak to give the direction alone."""
     inside_margin: float = 0.1
@@ -56,8 +58,9 @@ class StiffnessSettings:
     """Rumble for danger that lies along neither trigger."""
 
     def __post_init__(self) -> None:
-        if self.mode not in {"directional", "total"}:
-            raise ConfigurationError(f"mode = {self.mode!r} is unknown; valid: directional, total")
+        for name, choices in (("mode", ("directional", "total")), ("reference", ("plane", "fraction"))):
+            if getattr(self, name) not in choices:
+                raise ConfigurationError(f"{name} = {getattr(self, name)!r} is unknown; valid: {', '.join(choices)}")
         for name, lowest, highest in (
             ("reference_fraction", 1e-9, 1.0),
             ("gradient_threshold", 1e-9, 1.0),
@@ -97,25 +100,6 @@ class Stiffness:
     """Of these, with the sphere's centre inside the object."""
 
 
-def calibrated_fraction(
-    centers_m: FloatArray, radii_m: FloatArray, enlargement_m: FloatArray, approach: FloatArray
-) -> float:
-    """The `reference_fraction` with which a plane at the unenlarged surface ahead gives s = 1.
-
-    centers_m (m, 3), radii_m (m,) not enlarged, enlargement_m (m,), approach (3,) unit: the plane is square to
-    it and touches the foremost sphere. ValueError when nothing is enlarged.
-    """
-    front_m = float((centers_m @ approach + radii_m).max())
-    enlarged_m = radii_m + enlargement_m
-    count = len(radii_m)
-    caps_m3, _, _ = kernels.half_space_pairs(
-        np.ascontiguousarray(centers_m), enlarged_m, np.tile(-approach, (count, 1)), np.full(count, -front_m)
-    )
-    if not caps_m3.any():
-        raise ValueError("enlargement_m leaves no overlap with a plane at the surface; valid: more than 0")
-    return float(caps_m3.sum() / (4.0 / 3.0 * np.pi * (enlarged_m**3).sum()))
-
-
 class StiffnessMap:
     """Overlap to stiffness, with what it has to remember: baseline, detent and the last output."""
 
@@ -143,6 +127,7 @@ class StiffnessMap:
         trigger_directions: Mapping[str, FloatArray],
         now_s: float,
         *,
+        reference_m3: FloatArray | None = None,
         unenlarged_radii_m: FloatArray | None = None,
         excluded_objects: Collection[int] = (),
     ) -> Stiffness:
@@ -150,7 +135,8 @@ class StiffnessMap:
 
         roles: of `PerceivedObjects`, whose order must not change between updates. enlarged_volumes_m3 (m,):
         V_i of the enlarged spheres. trigger_directions: for `l2` and `r2` the û_ik (m, 3) in the world frame,
-        unit, or zero for a sphere that the trigger does not move. unenlarged_radii_m (m,): for the target's
+        unit, or zero for a sphere that the trigger does not move. reference_m3 (2,): V_ref of l2 and r2, above 0;
+        None for `reference_fraction` of the enlarged volumes' sum. unenlarged_radii_m (m,): for the target's
         detent, None for none. excluded_objects: indices that count nowhere, such as the held object's.
         The first update is not rate limited. ValueError for a wrong shape, a direction that is neither unit nor
         zero, a volume that is negative or not finite, or a time before the last one.
@@ -164,9 +150,10 @@ class StiffnessMap:
         if excluded_objects:
             counted &= ~np.isin(overlaps.object_index, list(excluded_objects))
         merged = by_object(select(overlaps, np.flatnonzero(counted)))
-        reference_m3 = self.settings.reference_fraction * float(enlarged_volumes_m3.sum())
-        if reference_m3 == 0.0 and len(merged) > 0:
-            raise ValueError("enlarged_volumes_m3 is 0 although spheres overlap; valid: their volumes")
+        if reference_m3 is None:
+            reference_m3 = np.full(2, self.settings.reference_fraction * float(enlarged_volumes_m3.sum()))
+        if len(merged) > 0 and not (np.isfinite(reference_m3) & (reference_m3 > 0.0)).all():
+            raise ValueError(f"the reference volume is {reference_m3} although spheres overlap; valid: above 0")
 
         objects, shares, detent, capped, blended = _NOTHING
         if len(merged) > 0:
@@ -200,7 +187,7 @@ class StiffnessMap:
         overlaps: Overlaps,
         roles: Sequence[Role],
         directions: FloatArray,
-        reference_m3: float,
+        reference_m3: FloatArray,
         unenlarged_radii_m: FloatArray | None,
     ) -> _Felt:
         """What the overlaps (p,) give; directions (2, p, 3) of each one's sphere."""
@@ -212,7 +199,8 @@ class StiffnessMap:
         channels = np.vstack([aligned, 1.0 - aligned.max(axis=0)]) * overlaps.volume_m3
         objects = np.unique(overlaps.object_index)
         belongs = objects[:, None] == overlaps.object_index
-        shares: FloatArray = belongs.astype(np.float64) @ channels.T / reference_m3
+        references = np.array([*reference_m3, reference_m3.max()])
+        shares: FloatArray = belongs.astype(np.float64) @ channels.T / references
 
         present = [roles[index] for index in objects.tolist()]
         is_target = np.array([role is Role.TARGET for role in present], dtype=np.bool_)

@@ -11,7 +11,7 @@ from common.errors import ConfigurationError
 from robot_side.overlapping import Overlaps, evaluate
 from robot_side.perceived_objects import PerceivedObjects, Role
 from robot_side.proximity import candidate_pairs
-from robot_side.stiffness import Stiffness, StiffnessMap, StiffnessSettings, calibrated_fraction
+from robot_side.stiffness import Stiffness, StiffnessMap, StiffnessSettings
 from tests.perceived_scenes import Scene, random_scene
 
 _AHEAD = np.array([0.0, 0.0, 1.0])
@@ -292,16 +292,6 @@ def test_the_counters_say_what_was_counted() -> None:
     swallowed = Scene().add().sphere([0.04, 0.02, 0.01], 0.004).objects()
     felt = _Gripper().feel(swallowed)
     assert felt.pairs_blended >= 1
-
-
-def test_calibration_gives_full_stiffness_to_a_plane_at_the_unenlarged_surface() -> None:
-    enlargement = np.full(6, _ENLARGEMENT_M)
-    fraction = calibrated_fraction(_HAND_M, _HAND_RADII_M, enlargement, _AHEAD)
-    plane = Scene().add().half_space(-_AHEAD, -0.02).objects()
-    assert _Gripper(reference_fraction=fraction).feel(plane).r2 == pytest.approx(1.0, abs=1e-9)
-    assert _Gripper(reference_fraction=fraction * 2.0).feel(plane).r2 == pytest.approx(0.5, abs=1e-9)
-    with pytest.raises(ValueError, match="enlargement_m"):
-        calibrated_fraction(_HAND_M, _HAND_RADII_M, np.zeros(6), _AHEAD)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,197 @@
+from collections.abc import Callable
+
+import pytest
+
+from common.codec import decode, encode
+from common.link_end import LinkEnd
+from common.messages import Hello, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from operator_side.core import INTENT_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
+from operator_side.dualsense.controller_state import Button
+from operator_side.dualsense.effects import Off
+from operator_side.dualsense.simulated import SimulatedDualSense
+
+
+class Bench:
+    """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
+
+    def __init__(self, *, haptics: bool = True) -> None:
+        self.side = OperatorSide(2, "clock", haptics=haptics)
+        self.robot = LinkEnd("robot", 1, "clock")
+        self.device = SimulatedDualSense()
+        self.now_s = 1.0
+        self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
+
+    def stiffness(self, r2: float, state: MotionState = "armed", l2: float = 0.0, rumble: float = 0.0) -> bytes:
+        return encode(StiffnessUpdate(self.robot.stamp(self.now_s), l2=l2, r2=r2, rumble=rumble, state=state))
+
+    def feel(self, r2: float, state: MotionState = "armed", rumble: float = 0.0) -> None:
+        self.side.receive(self.stiffness(r2, state, rumble=rumble), self.now_s)
+        self.write()
+
+    def write(self) -> None:
+        if (report := self.side.output_report(self.now_s)) is not None:
+            self.device.write(report, self.now_s)
+
+    def read(self) -> None:
+        report = self.device.read(self.now_s)
+        assert report is not None
+        self.side.read_report(report, self.now_s)
+
+    def commands(self) -> list[MotionCommand]:
+        messages = [decode(payload) for payload in self.side.motion(self.now_s)]
+        return [message for message in messages if isinstance(message, MotionCommand)]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_stiffness_reaches_the_trigger_it_is_meant_for(bench: Bench) -> None:
+    bench.feel(0.8)
+    l2, r2 = bench.device.effects
+    assert l2 == Off()
+    assert sum(r2.zone_strengths) == 64
+
+
+def test_only_changes_are_written(bench: Bench) -> None:
+    bench.feel(0.8)
+    bench.now_s += 0.001
+    bench.feel(0.8)
+    bench.feel(0.801)
+    assert bench.device.write_count == 1
+
+
+def test_triggers_are_released_when_stiffness_stops_coming(bench: Bench) -> None:
+    bench.feel(1.0)
+    bench.now_s += STIFFNESS_EXPIRES_S
+    bench.write()
+    assert not bench.device.released
+    bench.now_s += 0.001
+    bench.write()
+    assert bench.device.released
+
+
+@pytest.mark.parametrize("state", ["disarmed", "stopped"])
+def test_nothing_is_felt_while_the_arm_cannot_move(bench: Bench, state: MotionState) -> None:
+    bench.feel(1.0)
+    bench.feel(1.0, state)
+    assert bench.device.released
+
+
+def test_without_haptics_nothing_is_ever_written() -> None:
+    bench = Bench(haptics=False)
+    bench.feel(1.0, rumble=1.0)
+    assert bench.device.write_count == 0
+
+
+def test_rumble_comes_and_goes(bench: Bench) -> None:
+    bench.feel(0.0, rumble=1.0)
+    assert bench.device.rumble.left == 1.0
+    bench.feel(0.0)
+    assert bench.device.rumble.left == 0.0
+
+
+def test_an_older_stiffness_is_never_felt(bench: Bench) -> None:
+    older = bench.stiffness(1.0)
+    bench.feel(0.2)
+    felt = bench.device.effects
+    bench.side.receive(older, bench.now_s)
+    bench.write()
+    assert bench.device.effects == felt
+    assert bench.side.link.stale == 1
+
+
+def test_hands_become_a_motion_command(bench: Bench) -> None:
+    bench.device.set_finger_force(0.0, 10.0)
+    bench.device.set_buttons(frozenset({Button.L1, Button.CROSS}))
+    bench.device.set_sticks(left=(1.0, 0.0))
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.read()
+    [command] = bench.commands()
+    assert command.r2 == 1.0
+    assert command.l2 == 0.0
+    assert command.run
+    assert command.gripper == 1.0
+    assert command.lateral[0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_controller_that_went_silent_sends_nothing(bench: Bench) -> None:
+    assert bench.commands() == []
+    bench.read()
+    assert len(bench.commands()) == 1
+    bench.now_s += INTENT_EXPIRES_S + 0.001
+    assert bench.commands() == []
+
+
+def test_hello_is_repeated_until_the_robot_answers(bench: Bench) -> None:
+    def hellos() -> int:
+        return sum(isinstance(decode(payload), Hello) for payload in bench.side.motion(bench.now_s))
+
+    counted = 0
+    for _ in range(250):
+        bench.now_s += 0.004
+        counted += hellos()
+    assert 3 <= counted <= 5
+    bench.feel(0.0)
+    assert hellos() == 0
+    bench.now_s += 2.0
+    assert hellos() == 1
+
+
+def telemetry(robot: LinkEnd, now_s: float, speed: float) -> bytes:
+    return encode(
+        Telemetry(
+            robot.stamp(now_s),
+            state="armed",
+            tool_position_m=(0.0, 0.0, 0.0),
+            tool_speed_m_s=speed,
+            target=None,
+            target_in_tool_m=None,
+            up_in_tool=(0.0, -1.0, 0.0),
+            gripper_opening_m=0.0,
+            holding=False,
+            enlargement_m=0.0,
+            l2=0.0,
+            r2=0.0,
+        )
+    )
+
+
+def test_the_screen_shows_the_newest_view_of_the_present_epoch(bench: Bench) -> None:
+    first, second = (telemetry(bench.robot, bench.now_s, speed) for speed in (0.1, 0.2))
+    bench.side.receive_view(second, bench.now_s)
+    bench.side.receive_view(first, bench.now_s)
+    assert bench.side.screen is not None
+    assert bench.side.screen.tool_speed_m_s == 0.2
+    stranger = LinkEnd("robot", 9, "clock")
+    bench.side.receive_view(telemetry(stranger, bench.now_s, 0.3), bench.now_s)
+    assert bench.side.screen.tool_speed_m_s == 0.2
+
+
+@pytest.mark.parametrize(
+    "receive", [OperatorSide.receive, OperatorSide.receive_view, OperatorSide.read_report], ids=lambda f: f.__name__
+)
+def test_garbage_is_counted_and_changes_nothing(
+    bench: Bench, receive: Callable[[OperatorSide, bytes, float], None]
+) -> None:
+    bench.feel(0.5)
+    receive(bench.side, b"\x93garbage", bench.now_s)
+    assert bench.side.rejected == 1
+    assert bench.side.output_report(bench.now_s) is None
+
+
+def test_a_message_of_the_wrong_kind_is_rejected(bench: Bench) -> None:
+    command = MotionCommand(bench.robot.stamp(1.0), l2=0.0, r2=0.0)
+    bench.side.receive(encode(command), bench.now_s)
+    bench.side.receive_view(bench.stiffness(1.0), bench.now_s)
+    assert bench.side.rejected == 2
+
+
+def test_a_restarted_robot_is_followed(bench: Bench) -> None:
+    bench.feel(0.5)
+    bench.robot = LinkEnd("robot", 7, "clock")
+    bench.side.receive(encode(bench.robot.hello(bench.now_s)), bench.now_s)
+    bench.feel(1.0)
+    assert sum(bench.device.effects[1].zone_strengths) == 80
