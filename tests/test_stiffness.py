@@ -314,7 +314,7 @@ def test_bad_directions_are_named(changes: dict[str, FloatArray], named: str) ->
 @pytest.mark.parametrize("volume", [-1.0, math.nan, 0.0])
 def test_bad_volumes_are_named(volume: float) -> None:
     overlaps = _overlaps(_HAND_M, _HAND_RADII_M, _wall(0.01))
-    with pytest.raises(ValueError, match="enlarged_volumes_m3"):
+    with pytest.raises(ValueError, match="volume"):
         StiffnessMap(StiffnessSettings()).update(overlaps, [Role.OBSTACLE], np.full(6, volume), _triggers(6), 0.0)
 
 
