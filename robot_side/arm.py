@@ -26,6 +26,7 @@ from robot_side.joint_reference import JointReference, MotionLimits
 from robot_side.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
+_LIMIT_MARGIN_RAD = 0.005
 _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _FARTHEST_GAP_M = 0.5
@@ -62,8 +63,10 @@ class MujocoArm:
         if travel is not None:
             data.qpos[robot.finger_positions] = travel.open_fingers
         start = data.qpos[robot.arm_positions].copy()
-        self._reference = JointReference(start, robot.lower_rad, robot.upper_rad, limits or MotionLimits())
-        self._any_motor = bool(robot.drives.is_motor.any())
+        # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
+        lower = np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start)
+        upper = np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start)
+        self._reference = JointReference(start, lower, upper, limits or MotionLimits())
         self._joint_damping: FloatArray = model.dof_damping[robot.arm_velocities].copy()
         self._acceleration: FloatArray = np.zeros(model.nv)
         self._inertial: FloatArray = np.zeros(model.nv)
@@ -135,14 +138,12 @@ class MujocoArm:
         data, robot, reference = self._data, self._robot, self._reference
         dofs = robot.arm_velocities
         position = data.qpos[robot.arm_positions]
-        load = data.qfrc_bias[dofs] - data.qfrc_gravcomp[dofs] - data.qfrc_spring[dofs]
+        self._acceleration[dofs] = reference.acceleration_rad_s2 + robot.drives.motor_acceleration(
+            reference.position_rad - position, reference.velocity_rad_s - data.qvel[dofs]
+        )
+        mujoco.mj_mulM(self._model, data, self._inertial, self._acceleration)
+        load = self._inertial[dofs] + data.qfrc_bias[dofs] - data.qfrc_gravcomp[dofs] - data.qfrc_spring[dofs]
         load += self._joint_damping * reference.velocity_rad_s
-        if self._any_motor:
-            self._acceleration[dofs] = robot.drives.motor_acceleration(
-                reference.position_rad - position, reference.velocity_rad_s - data.qvel[dofs]
-            )
-            mujoco.mj_mulM(self._model, data, self._inertial, self._acceleration)
-            load += self._inertial[dofs]
         data.ctrl[robot.arm_controls] = robot.drives.control(
             position, reference.position_rad, reference.velocity_rad_s, load
         )
@@ -206,7 +207,7 @@ class MujocoKinematics:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_jacSite(model, data, self._jacobian[:3], self._jacobian[3:], robot.site)
-        jacobian = self._jacobian[:, robot.arm_velocities]
+        jacobian = self._jacobian.take(robot.arm_velocities, axis=1)
         tool = data.site_xpos[robot.site].copy()
         body_rotations = data.xmat[self._bodies].reshape(-1, 3, 3)
         centers = data.xpos[self._bodies] + (body_rotations @ self._local_centers_m)[:, :, 0]

@@ -37,7 +37,7 @@ class JointDrives:
         return servo
 
     def motor_acceleration(self, position_error: FloatArray, velocity_error: FloatArray) -> FloatArray:
-        """The joint acceleration (n,) that a motor's critically damped loop asks for; 0 for servos.
+        """The joint acceleration (n,) that a motor's critically damped loop adds to its reference's; 0 for servos.
 
         The errors (n,) are reference less measured. The caller multiplies by the arm's inertia.
         """

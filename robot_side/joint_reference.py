@@ -28,7 +28,7 @@ class MotionLimits:
 
 
 class JointReference:
-    """Position and velocity references (n,) that follow a velocity command until it runs out, then stop."""
+    """References (n,) for position, velocity and acceleration: they follow a command until it runs out, then stop."""
 
     def __init__(
         self, position_rad: FloatArray, lower_rad: FloatArray, upper_rad: FloatArray, limits: MotionLimits
@@ -36,6 +36,7 @@ class JointReference:
         """Stand at `position_rad` (n,); lower_rad and upper_rad (n,) may be infinite."""
         self.position_rad: FloatArray = np.clip(position_rad, lower_rad, upper_rad)
         self.velocity_rad_s: FloatArray = np.zeros_like(self.position_rad)
+        self.acceleration_rad_s2: FloatArray = np.zeros_like(self.position_rad)
         self._lower_rad = lower_rad
         self._upper_rad = upper_rad
         self._limits = limits
@@ -72,19 +73,19 @@ class JointReference:
             speed = limits.velocity_rad_s
             self.velocity_rad_s = np.clip(measured_velocity_rad_s, -speed, speed)
         self._following = following
-        target = self._command if following else self._stopped
+        # Near a limit only the speed from which the joint can still stop before it.
+        position = self.position_rad
+        to_lower = -np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(position - self._lower_rad, 0.0))
+        to_upper = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(self._upper_rad - position, 0.0))
+        target = np.clip(self._command, to_lower, to_upper) if following else self._stopped
         change = target - self.velocity_rad_s
         most = (limits.acceleration_rad_s2 if following else limits.deceleration_rad_s2) * step_s
         largest = float(np.abs(change).max())
         if largest > most:
             change *= most / largest
-        velocity = self.velocity_rad_s + change
-
-        position = self.position_rad
-        # Near a limit only the speed from which the joint can still stop before it.
-        to_lower = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(position - self._lower_rad, 0.0))
-        to_upper = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(self._upper_rad - position, 0.0))
-        self.velocity_rad_s = np.clip(velocity, -to_lower, to_upper)
+        velocity = np.clip(self.velocity_rad_s + change, to_lower, to_upper)
+        self.acceleration_rad_s2 = (velocity - self.velocity_rad_s) / step_s
+        self.velocity_rad_s = velocity
         moved = np.clip(position + self.velocity_rad_s * step_s, self._lower_rad, self._upper_rad)
         self.position_rad = np.clip(
             moved, measured_position_rad - limits.windup_rad, measured_position_rad + limits.windup_rad
