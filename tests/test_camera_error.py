@@ -1,0 +1,53 @@
+import math
+
+import numpy as np
+import pytest
+
+from robot_side.camera_error import CameraError
+
+
+def test_the_lasting_error_has_the_mean_and_deviation_asked_for() -> None:
+    names = tuple(f"object{index}" for index in range(4000))
+    errors = CameraError(names, mean_m=0.004, standard_deviation_m=0.002, seed=1).next_frame()
+    assert errors.shape == (4000, 3)
+    # 4 standard deviations of the two estimates from 12 000 draws.
+    assert errors.mean() == pytest.approx(0.004, abs=4.0 * 0.002 / math.sqrt(12_000))
+    assert errors.std() == pytest.approx(0.002, rel=4.0 / math.sqrt(24_000))
+
+
+def test_an_objects_error_does_not_depend_on_the_others() -> None:
+    settings = {"standard_deviation_m": 0.003, "frame_standard_deviation_m": 0.001}
+    many = CameraError(("box", "target", "ball"), seed=7, **settings)
+    alone = CameraError(("target",), seed=7, **settings)
+    for _ in range(3):
+        np.testing.assert_array_equal(many.next_frame()[1], alone.next_frame()[0])
+
+
+def test_the_lasting_part_lasts_and_the_other_is_drawn_anew() -> None:
+    lasting = CameraError(("target",), standard_deviation_m=0.003, seed=2)
+    np.testing.assert_array_equal(lasting.next_frame(), lasting.next_frame())
+    error = CameraError(("target",), standard_deviation_m=0.003, frame_standard_deviation_m=0.001, seed=2)
+    frames = np.array([error.next_frame()[0] for _ in range(4000)])
+    np.testing.assert_allclose(frames.mean(axis=0), lasting.next_frame()[0], atol=4.0 * 0.001 / math.sqrt(4000))
+    assert frames.std(axis=0) == pytest.approx(np.full(3, 0.001), rel=4.0 / math.sqrt(8000))
+    assert error.variance_m2 == pytest.approx(0.003**2 + 0.001**2)
+
+
+def test_the_seed_changes_every_error() -> None:
+    first, second = (CameraError(("a", "b"), standard_deviation_m=0.01, seed=seed).next_frame() for seed in (1, 2))
+    assert (first != second).all()
+
+
+def test_no_objects_have_no_errors() -> None:
+    assert CameraError(()).next_frame().shape == (0, 3)
+
+
+def test_bad_specifications_are_named() -> None:
+    with pytest.raises(ValueError, match="mean_m"):
+        CameraError((), mean_m=math.nan)
+    with pytest.raises(ValueError, match="frame_standard_deviation_m"):
+        CameraError((), frame_standard_deviation_m=-0.1)
+    with pytest.raises(ValueError, match="standard_deviation_m"):
+        CameraError((), standard_deviation_m=math.inf)
+    with pytest.raises(ValueError, match="seed"):
+        CameraError((), seed=-1)

@@ -1,0 +1,158 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from robot_side.joint_drives import JointDrives
+from robot_side.joint_reference import JointReference, MotionLimits
+
+STEP_S = 0.001
+LIMITS = MotionLimits(velocity_rad_s=2.0, acceleration_rad_s2=8.0, deceleration_rad_s2=12.0, windup_rad=0.02)
+UNLIMITED = np.full(2, np.inf)
+
+
+def standing(position: FloatArray | None = None) -> JointReference:
+    return JointReference(np.zeros(2) if position is None else position, -UNLIMITED, UNLIMITED, LIMITS)
+
+
+def follow(reference: JointReference, start_s: float, steps: int) -> FloatArray:
+    """Advance with a drive that follows without error; the velocities (steps, n)."""
+    velocities = []
+    for step in range(steps):
+        reference.advance(start_s + step * STEP_S, STEP_S, reference.position_rad, reference.velocity_rad_s)
+        velocities.append(reference.velocity_rad_s)
+    return np.array(velocities)
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(seed=st.integers(0, 10_000))
+def test_no_command_breaks_a_limit(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    lower, upper = np.array([-0.3, -np.inf]), np.array([0.2, 0.5])
+    reference = JointReference(np.zeros(2), lower, upper, LIMITS)
+    measured = np.zeros(2)
+    for step in range(400):
+        if random.uniform() < 0.02:
+            reference.command(random.uniform(-5.0, 5.0, 2), step * STEP_S + random.uniform(-0.05, 0.2))
+        held = random.uniform() < 0.5
+        reference.advance(step * STEP_S, STEP_S, measured, np.zeros(2) if held else reference.velocity_rad_s)
+        assert (np.abs(reference.velocity_rad_s) <= 2.0 + 1e-12).all()
+        assert (reference.position_rad >= lower).all()
+        assert (reference.position_rad <= upper).all()
+        assert (np.abs(reference.position_rad - measured) <= 0.02 + 1e-12).all()
+        measured = measured if held else reference.position_rad
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(seed=st.integers(0, 10_000))
+def test_no_sequence_of_commands_makes_it_jump(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    reference = standing()
+    for step in range(400):
+        if random.uniform() < 0.02:
+            reference.command(random.uniform(-5.0, 5.0, 2), step * STEP_S + random.uniform(-0.05, 0.2))
+        before = reference.velocity_rad_s
+        reference.advance(step * STEP_S, STEP_S, reference.position_rad, before)
+        assert np.abs(reference.velocity_rad_s - before).max() <= 12.0 * STEP_S + 1e-12
+
+
+def test_it_accelerates_within_the_limit_and_keeps_the_direction() -> None:
+    reference = standing()
+    reference.command(np.array([1.0, -0.5]), 10.0)
+    velocities = follow(reference, 0.0, 200)
+    assert np.abs(np.diff(velocities, axis=0)).max() == pytest.approx(8.0 * STEP_S)
+    np.testing.assert_allclose(velocities[:, 1], -0.5 * velocities[:, 0], atol=1e-12)
+    np.testing.assert_allclose(velocities[-1], [1.0, -0.5])
+    assert np.count_nonzero(velocities[:, 0] < 1.0 - 1e-9) == pytest.approx(1.0 / 8.0 / STEP_S, abs=1.0)
+
+
+def test_the_command_holds_until_it_runs_out_and_not_a_step_longer() -> None:
+    reference = standing()
+    reference.command(np.array([1.0, 0.0]), 0.2)
+    velocities = follow(reference, 0.0, 400)[:, 0]
+    assert (velocities[130:200] == 1.0).all()
+    assert velocities[200] == pytest.approx(1.0 - 12.0 * STEP_S)
+    assert (velocities[200 + math.ceil(1.0 / 12.0 / STEP_S) :] == 0.0).all()
+
+
+def test_it_stops_from_what_is_measured() -> None:
+    reference = standing()
+    reference.command(np.array([1.0, 0.0]), 0.2)
+    follow(reference, 0.0, 200)
+    position = reference.position_rad - 0.01
+    reference.advance(0.2, STEP_S, position, np.array([0.3, 0.1]))
+    # One step of the deceleration away from the measured velocity, along a straight line to zero.
+    np.testing.assert_allclose(reference.velocity_rad_s, np.array([0.3, 0.1]) * (1.0 - 12.0 * STEP_S / 0.3))
+    np.testing.assert_allclose(reference.position_rad, position + reference.velocity_rad_s * STEP_S)
+
+
+def test_a_blocked_joint_winds_nothing_up() -> None:
+    reference = standing()
+    reference.command(np.array([1.0, 0.0]), 10.0)
+    for step in range(1000):
+        reference.advance(step * STEP_S, STEP_S, np.zeros(2), np.zeros(2))
+    np.testing.assert_allclose(reference.position_rad, [0.02, 0.0])
+
+
+def test_velocity_into_a_position_limit_ends_at_it() -> None:
+    reference = JointReference(np.array([0.0, 0.0]), np.array([-1.0, -1.0]), np.array([0.1, 1.0]), LIMITS)
+    reference.command(np.array([1.0, 0.1]), 10.0)
+    velocities = follow(reference, 0.0, 600)
+    assert reference.position_rad[0] == pytest.approx(0.1, abs=1e-4)
+    assert velocities[-1, 0] == pytest.approx(0.0, abs=1e-2)
+    assert velocities[-1, 1] == pytest.approx(0.1)
+
+
+def test_a_fast_command_is_scaled_as_a_whole() -> None:
+    reference = standing()
+    reference.command(np.array([8.0, -4.0]), 10.0)
+    np.testing.assert_allclose(follow(reference, 0.0, 600)[-1], [2.0, -1.0])
+
+
+@pytest.mark.parametrize("bad", [np.array([np.nan, 0.0]), np.array([np.inf, 0.0]), np.zeros(3), np.zeros((2, 1))])
+def test_a_bad_command_changes_nothing(bad: FloatArray) -> None:
+    reference = standing()
+    reference.command(np.array([0.5, 0.0]), 10.0)
+    with pytest.raises(ValueError, match="joint_velocity_rad_s"):
+        reference.command(bad, 20.0)
+    for time_s in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="valid_until_s"):
+            reference.command(np.array([-0.5, 0.0]), time_s)
+    np.testing.assert_allclose(follow(reference, 0.0, 200)[-1], [0.5, 0.0])
+
+
+def test_bad_limits_are_named() -> None:
+    for name in ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "windup_rad"):
+        for value in (0.0, -1.0, math.nan, math.inf):
+            with pytest.raises(ValueError, match=name):
+                MotionLimits(**{name: value})
+
+
+def test_each_kind_of_drive_gives_the_torque_that_is_wanted() -> None:
+    # A position servo, a velocity servo and a motor, all geared, in that order.
+    drives = JointDrives(
+        gear=np.array([2.0, 2.0, 5.0]),
+        gain=np.array([300.0, 40.0, 3.0]),
+        offset=np.array([1.0, -1.0, 0.0]),
+        stiffness=np.array([100.0, 0.0, 0.0]),
+        damping=np.array([10.0, 40.0, 0.0]),
+    )
+    np.testing.assert_array_equal(drives.is_motor, [False, False, True])
+    position, velocity, load = np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]), np.array([5.0, 6.0, 7.0])
+    control = drives.control(position, position, velocity, load)
+    length_speed = drives.gear * velocity
+    torque = drives.gear * (
+        drives.gain * control
+        + drives.offset
+        - drives.stiffness * drives.gear * position
+        - drives.damping * length_speed
+    )
+    # On its reference a joint feels the load's torque and nothing else.
+    np.testing.assert_allclose(torque, load)
+    ahead = drives.control(position, position + 0.1, velocity, load) - control
+    assert (ahead[:2] > 0.0).all()
+    assert ahead[2] == 0.0
+    np.testing.assert_allclose(drives.motor_acceleration(np.full(3, 0.1), np.zeros(3)), [0.0, 0.0, 250.0])

@@ -1,0 +1,99 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from common.arrays import FloatArray
+from robot_side.resolved_rate import joint_velocities
+
+FREE = np.full(6, np.inf)
+
+
+def jacobian_with(singular_values: FloatArray, seed: int, joints: int) -> FloatArray:
+    random = np.random.default_rng(seed)
+    left, _ = np.linalg.qr(random.standard_normal((6, 6)))
+    right, _ = np.linalg.qr(random.standard_normal((joints, joints)))
+    count = len(singular_values)
+    result: FloatArray = (left[:, :count] * singular_values) @ right[:, :count].T
+    return result
+
+
+@pytest.mark.parametrize("joints", [3, 6, 7])
+@pytest.mark.parametrize("seed", range(5))
+def test_away_from_singularities_it_is_the_pseudo_inverse(joints: int, seed: int) -> None:
+    jacobian = jacobian_with(np.linspace(0.1, 2.0, min(joints, 6)), seed, joints)
+    twist = np.random.default_rng(seed).uniform(-0.2, 0.2, 6)
+    velocity = joint_velocities(jacobian, twist, np.full(joints, np.inf))
+    np.testing.assert_allclose(velocity, np.linalg.pinv(jacobian) @ twist, atol=1e-12)
+    if joints >= 6:
+        np.testing.assert_allclose(jacobian @ velocity, twist, atol=1e-12)
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(
+    smallest=st.sampled_from([0.0, 1e-300, 1e-12, 1e-6, 1e-3, 0.02, 0.05, 0.0599]),
+    twist=hnp.arrays(np.float64, 6, elements=st.floats(-1.0, 1.0)),
+    seed=st.integers(0, 1000),
+)
+def test_near_singularities_the_velocity_stays_bounded(smallest: float, twist: FloatArray, seed: int) -> None:
+    jacobian = jacobian_with(np.array([2.0, 1.5, 1.0, 0.8, 0.3, smallest]), seed, 6)
+    velocity = joint_velocities(jacobian, twist, FREE)
+    # s / (s² + λ²) with λ² = 0.06² (1 - (s/0.06)²) is s / 0.06² for s below the threshold: 16.7 at most.
+    assert np.linalg.norm(velocity) <= np.linalg.norm(twist) / 0.06 * (1.0 + 1e-9)
+
+
+def test_damping_sets_in_smoothly_and_grows() -> None:
+    twist = np.ones(6)
+    gains = []
+    for smallest in (0.06, 0.059, 0.03, 0.003, 0.0):
+        jacobian = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, smallest])
+        gains.append(joint_velocities(jacobian, twist, FREE)[5])
+    assert gains[0] == pytest.approx(1.0 / 0.06)
+    assert gains[1] == pytest.approx(gains[0], rel=0.02)
+    assert gains == sorted(gains, reverse=True)
+    assert gains[-1] == 0.0
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(
+    twist=hnp.arrays(np.float64, 6, elements=st.floats(-5.0, 5.0)),
+    limits=hnp.arrays(np.float64, 6, elements=st.floats(0.01, 3.0)),
+    seed=st.integers(0, 1000),
+)
+def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArray, seed: int) -> None:
+    jacobian = jacobian_with(np.linspace(0.2, 1.0, 6), seed, 6)
+    free, limited = joint_velocities(jacobian, twist, FREE), joint_velocities(jacobian, twist, limits)
+    assert (np.abs(limited) <= limits * (1.0 + 1e-12)).all()
+    # Parallel and of the same sense, and no shorter than it has to be.
+    np.testing.assert_allclose(limited * np.linalg.norm(free), free * np.linalg.norm(limited), atol=1e-9)
+    assert limited @ free >= 0.0
+    if (np.abs(free) > limits).any():
+        assert np.max(np.abs(limited) / limits) == pytest.approx(1.0)
+    else:
+        np.testing.assert_array_equal(limited, free)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_values_that_are_not_finite_are_refused(bad: float) -> None:
+    jacobian, twist = np.eye(6), np.zeros(6)
+    with pytest.raises(ValueError, match="jacobian"):
+        joint_velocities(np.where(np.eye(6) > 0.0, bad, 0.0), twist, FREE)
+    with pytest.raises(ValueError, match="twist"):
+        joint_velocities(jacobian, np.full(6, bad), FREE)
+
+
+def test_wrong_arguments_are_named() -> None:
+    with pytest.raises(ValueError, match=r"jacobian has the shape \(3, 6\)"):
+        joint_velocities(np.ones((3, 6)), np.zeros(6), FREE)
+    with pytest.raises(ValueError, match="twist has the shape"):
+        joint_velocities(np.eye(6), np.zeros(3), FREE)
+    with pytest.raises(ValueError, match="velocity_limits_rad_s has the shape"):
+        joint_velocities(np.eye(6), np.zeros(6), np.ones(7))
+    for limit in (0.0, -1.0, math.nan):
+        with pytest.raises(ValueError, match="velocity_limits_rad_s"):
+            joint_velocities(np.eye(6), np.zeros(6), np.full(6, limit))
+    with pytest.raises(ValueError, match="largest_damping"):
+        joint_velocities(np.eye(6), np.zeros(6), FREE, largest_damping=0.0)
