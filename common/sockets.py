@@ -121,14 +121,20 @@ class _Sockets:
     def _send(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
         if len(frames[-1]) > limit_bytes:
             raise ValueError(f"payload of {len(frames[-1])} bytes; valid: up to {limit_bytes} bytes")
-        try:
-            part.send_multipart(frames, zmq.NOBLOCK)
-        except zmq.ZMQError as error:
-            if error.errno not in (zmq.EAGAIN, zmq.EHOSTUNREACH):
-                raise
-            self.dropped += 1
-            return False
-        return True
+        for _ in range(2):
+            try:
+                part.send_multipart(frames, zmq.NOBLOCK)
+            except zmq.Again:
+                # The socket may only not have noticed yet what has left: that happens when EVENTS is read.
+                part.getsockopt(zmq.EVENTS)
+            except zmq.ZMQError as error:
+                if error.errno != zmq.EHOSTUNREACH:
+                    raise
+                break
+            else:
+                return True
+        self.dropped += 1
+        return False
 
 
 class RobotSockets(_Sockets):
