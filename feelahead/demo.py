@@ -61,9 +61,11 @@ def demo(arguments: Sequence[str]) -> int:
         summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
         status.note("starting the robot side (the first start compiles its kernels)")
         with SideProcess("robot_side.main", "robot", _robot_arguments(settings, summaries["robot"])) as robot:
+            status.event("started", side="robot", process_id=robot.process_id)
             listening = robot.wait_for("listening", _START_TIMEOUT_S)
             operator_arguments = _operator_arguments(settings, summaries["operator"], listening)
             with SideProcess("operator_side.main", "operator", operator_arguments) as operator:
+                status.event("started", side="operator", process_id=operator.process_id)
                 errors = _watch(settings, robot, operator, stop, status)
                 # The operator side first: its triggers are off before the robot side goes.
                 operator.stop()
