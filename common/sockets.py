@@ -20,8 +20,8 @@ from common.errors import ConfigurationError
 CONTROL_HIGH_WATER_MARK = 16
 """Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.
 
-With 2, a burst of five lost its newest three, and a peer that stood still got no fewer stale ones: those wait
-in the kernel's buffers, until the heartbeat ends the connection.
+With 2, half of a burst of five was lost, and a peer that stood still got no fewer stale ones: those wait in
+the kernel's buffers, until the heartbeat ends the connection.
 """
 VIEW_HIGH_WATER_MARK = 8
 """View messages that wait on either side: both cameras' frames, telemetry, and as many again."""
