@@ -169,7 +169,8 @@ def test_a_bare_robot_gets_the_table_where_its_tool_is(tmp_path: Path, yaw_deg: 
     tool, target = scene.data.site_xpos[scene.robot.site], scene.data.body("table_scene/target").xpos
     ahead = np.array([math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))])
     np.testing.assert_allclose(target[:2] - tool[:2], 0.23 * ahead, atol=1e-6)
-    np.testing.assert_allclose(target[2], 0.1 + 0.06, atol=1e-6)
+    half_height = scene.model.geom("table_scene/target").size[2]
+    np.testing.assert_allclose(target[2], 0.1 + half_height, atol=1e-6)
     # The configuration came through the attaching.
     np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], [0.1, -0.2])
 
