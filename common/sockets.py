@@ -146,7 +146,7 @@ class RobotSockets(_Sockets):
         view_bind: str | None = None,
         *,
         insecure: bool = False,
-        heartbeat_timeout_s: float = 0.15,
+        heartbeat_timeout_s: float = 3.0,
     ) -> None:
         """Bind control to `bind` and view to `view_bind`, by default the port after.
 
@@ -212,7 +212,7 @@ class OperatorSockets(_Sockets):
         view_connect: str | None = None,
         *,
         topics: Sequence[bytes] = (b"",),
-        heartbeat_timeout_s: float = 0.15,
+        heartbeat_timeout_s: float = 3.0,
     ) -> None:
         """Connect control to `connect` and view to `view_connect`, by default the port after.
 

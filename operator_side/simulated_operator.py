@@ -54,12 +54,17 @@ class PersonSettings:
     """Misjudged distance to the target along the line of sight, drawn anew at each attempt."""
     attempts: int = 3
     """How often they try to grasp before they give up."""
+    grasp_depth_m: float = 0.02
+    """How far past the point between the fingertips they bring the target's centre: well in, up to the palm."""
     lift_m: float = 0.1
     insistence_per_s: float = 0.5
     """How fast they push harder, in normal finger forces a second, while a trigger yields less than they meant."""
 
     def __post_init__(self) -> None:
-        for name in ("visual_reaction_s", "phase_margin_rad", "depth_error_sd_m", "lift_m", "insistence_per_s"):
+        for name in (
+            *("visual_reaction_s", "phase_margin_rad", "depth_error_sd_m", "grasp_depth_m", "lift_m"),
+            "insistence_per_s",
+        ):
             if not 0.0 <= getattr(self, name) < 10.0:
                 raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to below 10")
         if self.attempts < 1:
@@ -79,7 +84,7 @@ class Glance:
 class SimulatedOperator:
     """Drives a `SimulatedDualSense` towards the target, grasps it and lifts it."""
 
-    _ALIGNED_M = 0.012
+    _ALIGNED_M = 0.006
     _REACHED_M = 0.008
 
     def __init__(
@@ -152,7 +157,7 @@ class SimulatedOperator:
             self._hands(look.now_s, 0.0, (0.0, 0.0))
             return
         across = look.view.target_in_tool_m[:2]
-        depth_m = look.view.target_in_tool_m[2] + self._depth_error_m
+        depth_m = look.view.target_in_tool_m[2] + self._settings.grasp_depth_m + self._depth_error_m
         off_m = math.hypot(*across)
         stick = self._deflection(across, look.gain)
         aligned = off_m < self._ALIGNED_M
