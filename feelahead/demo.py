@@ -67,7 +67,9 @@ def demo(arguments: Sequence[str]) -> int:
             with SideProcess("operator_side.main", "operator", operator_arguments) as operator:
                 status.event("started", side="operator", process_id=operator.process_id)
                 errors = _watch(settings, robot, operator, stop, status)
-                # The operator side first: its triggers are off before the robot side goes.
+                # Both at once: neither is to take the other's end for a fault of the link.
+                operator.interrupt()
+                robot.interrupt()
                 operator.stop()
                 robot.stop()
                 for side in (operator, robot):

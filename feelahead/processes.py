@@ -91,14 +91,18 @@ class SideProcess:
             reason = said[-1] if said else "without a word"
             raise SideFailedError(f"the {self.name} side ended with code {code}: {reason}")
 
+    def interrupt(self) -> None:
+        """Ask it to end, as Ctrl-C would; nothing once it has."""
+        if self.running:
+            self._process.send_signal(signal.SIGINT)
+
     def wait(self, timeout_s: float) -> int:
         """Its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
         return self._process.wait(timeout=timeout_s)
 
     def stop(self, timeout_s: float = 10.0) -> int:
         """End it as Ctrl-C would, wait, and kill it only if it does not; its exit code."""
-        if self.running:
-            self._process.send_signal(signal.SIGINT)
+        self.interrupt()
         try:
             return self._process.wait(timeout=timeout_s)
         except subprocess.TimeoutExpired:

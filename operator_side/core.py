@@ -107,7 +107,8 @@ class OperatorSide:
             self._hello_s = now_s
             payloads.append(encode(self.link.hello(now_s)))
         intent = self._intent
-        if intent is None or now_s - self._intent_s > INTENT_EXPIRES_S:
+        # Before the robot side has answered, it would not know whose motion this is.
+        if self.link.peer_epoch is None or intent is None or now_s - self._intent_s > INTENT_EXPIRES_S:
             return payloads
         command = MotionCommand(
             self.link.stamp(now_s),
