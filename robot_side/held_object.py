@@ -29,12 +29,14 @@ class HeldObject:
 def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach_m: float) -> int | None:
     """The object nearest to the point between the fingertips, within `reach_m`; None when there is none.
 
-    Supports are never held: an arm that closes its fingers on the table does not lift it.
+    Supports are never held: an arm that closes its fingers on the table does not lift it. Nor is anything with a
+    half-space, which has no end to be lifted by, whatever its role.
     """
+    unbounded = set(objects.half_space_object.tolist())
     distances = {
         index: distance_to_object(objects, index, tool_position_m)
         for index, role in enumerate(objects.roles)
-        if role is not Role.SUPPORT
+        if role is not Role.SUPPORT and index not in unbounded
     }
     nearest = min(distances, key=lambda index: distances[index], default=None)
     return nearest if nearest is not None and distances[nearest] <= reach_m else None
