@@ -1,0 +1,68 @@
+"""Grippers of a few spheres or of boxes, on a tool that flies freely, for the tests of what the gripper senses."""
+
+import numpy as np
+import numpy.typing as npt
+
+from common.arrays import FloatArray
+from robot_side.arm_port import GripperPose
+from robot_side.gripper_spheres import SphereCover, cover_boxes
+
+# The built-in arm's gripper, open by 85 mm, in the tool frame: its fingers close along x. The palm, then each
+# finger and its tip, which reach 15 mm beyond the point between the fingertips.
+BOX_CENTERS_M = np.array(
+    [
+        [0.0, 0.0, -0.105],
+        [0.0495, 0.0, -0.045],
+        [0.0485, 0.0, -0.005],
+        [-0.0495, 0.0, -0.045],
+        [-0.0485, 0.0, -0.005],
+    ]
+)
+BOX_HALF_SIZES_M = np.array(
+    [
+        [0.050, 0.032, 0.040],
+        [0.007, 0.011, 0.020],
+        [0.006, 0.011, 0.020],
+        [0.007, 0.011, 0.020],
+        [0.006, 0.011, 0.020],
+    ]
+)
+OPENING_M = 0.085
+
+
+def cover_gripper(spheres: int) -> SphereCover:
+    return cover_boxes(BOX_CENTERS_M, np.tile(np.eye(3), (len(BOX_CENTERS_M), 1, 1)), BOX_HALF_SIZES_M, spheres)
+
+
+def free_pose(
+    centers_in_tool_m: npt.ArrayLike,
+    radii_m: npt.ArrayLike,
+    on_finger: npt.ArrayLike | None = None,
+    tool_position_m: npt.ArrayLike = (0.0, 0.0, 0.0),
+    tool_rotation: FloatArray | None = None,
+) -> GripperPose:
+    """Spheres fixed to a tool whose six joints are its velocity and its angular velocity in the world frame."""
+    position = np.asarray(tool_position_m, dtype=np.float64)
+    rotation = np.eye(3) if tool_rotation is None else tool_rotation
+    radii = np.asarray(radii_m, dtype=np.float64)
+    lever = np.asarray(centers_in_tool_m, dtype=np.float64) @ rotation.T
+    turning = [np.cross(axis, lever) for axis in np.eye(3)]
+    return GripperPose(
+        tool_position_m=position,
+        tool_rotation=rotation,
+        tool_jacobian=np.eye(6),
+        sphere_centers_m=position + lever,
+        sphere_radii_m=radii,
+        sphere_jacobians=np.concatenate([np.tile(np.eye(3), (len(radii), 1, 1)), np.stack(turning, axis=2)], axis=2),
+        sphere_on_finger=np.zeros(len(radii), dtype=np.bool_)
+        if on_finger is None
+        else np.asarray(on_finger, dtype=np.bool_),
+    )
+
+
+def gripper_pose(
+    tool_position_m: npt.ArrayLike = (0.0, 0.0, 0.0), tool_rotation: FloatArray | None = None
+) -> GripperPose:
+    """The built-in gripper in 16 spheres."""
+    cover = cover_gripper(16)
+    return free_pose(cover.centers_m, cover.radii_m, cover.box > 0, tool_position_m, tool_rotation)
