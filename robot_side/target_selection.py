@@ -36,8 +36,8 @@ def next_target(
     """The object to become the target when the operator asks for another one; None when there is no other.
 
     The obstacles and the target ahead of the tool stand in an order of nearness along the approach axis; the
-    one after the present target follows it, and the first one follows the last. centers_m (k, 3) from
-    `object_centers`; `approach` is a unit vector (3,) in the world frame.
+    one after the present target follows it, and the first one follows the last, or a target without a centre.
+    centers_m (k, 3) from `object_centers`; `approach` is a unit vector (3,) in the world frame.
     """
     offsets = centers_m - tool_position_m
     along = offsets @ approach
@@ -45,11 +45,11 @@ def next_target(
     eligible = [
         index
         for index, role in enumerate(objects.roles)
-        if role in (Role.OBSTACLE, Role.TARGET) and (along[index] > 0.0 or role is Role.TARGET)
+        if (role is Role.OBSTACLE and along[index] > 0.0) or (role is Role.TARGET and np.isfinite(along[index]))
     ]
     order = sorted(eligible, key=lambda index: along[index] + _OFF_AXIS_WEIGHT * across[index])
     present = target_index(objects)
-    if present is None:
+    if present is None or present not in order:
         return objects.names[order[0]] if order else None
     follower = order[(order.index(present) + 1) % len(order)]
     return None if follower == present else objects.names[follower]
