@@ -35,8 +35,8 @@ FULL_STICK_M_S = 0.1
 """And a fully deflected stick."""
 _DROPPED_S = 0.5
 """After so long without the target in the fingers they believe it."""
-_FELT_TRAVEL = 0.03
-"""By how much a trigger must yield less than meant to be noticed."""
+_FELT_SHARE = 0.8
+"""A trigger that yields less than this share of what was meant is noticed."""
 
 Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "done"]
 
@@ -50,6 +50,8 @@ class PersonSettings:
     phase_margin_rad: float = math.radians(65)
     """How cautiously the person tunes themselves to the delay that they experience: 45° is tracking, and 69°
     (gain times lag 1/e) aims without any overshoot."""
+    adapts_to_delay: bool = True
+    """Whether they tune themselves to the link's delay at all, or act as they would without one."""
     depth_error_sd_m: float = 0.008
     """Misjudged distance to the target along the line of sight, drawn anew at each attempt."""
     attempts: int = 3
@@ -124,7 +126,7 @@ class SimulatedOperator:
 
     def _gain(self, delay_s: float) -> float:
         """Crossover frequency in 1/s: as fast as the delay in the loop allows, at most 4.5."""
-        lag_s = self._settings.visual_reaction_s + delay_s
+        lag_s = self._settings.visual_reaction_s + (delay_s if self._settings.adapts_to_delay else 0.0)
         if lag_s <= 0.0:
             return 4.5
         return min(4.5, (math.pi / 2 - self._settings.phase_margin_rad) / lag_s)
@@ -220,7 +222,8 @@ class SimulatedOperator:
         if meant > 0.0:
             free = self._calibration.dead_zone + meant * (self._calibration.saturation - self._calibration.dead_zone)
             mechanical = free * SENSED_TRAVEL
-            yields_less = self._device.travel[trigger] < mechanical - _FELT_TRAVEL
+            acting = self._calibration.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
+            yields_less = acting < _FELT_SHARE * meant
             insisting = self._settings.insistence_per_s * NORMAL_FINGER_FORCE_N * step_s
             self._insistence_n = max(0.0, self._insistence_n + (insisting if yields_less else -insisting))
             force_n = SPRING_PRELOAD_N + SPRING_RISE_N * mechanical
