@@ -69,10 +69,10 @@ class RunFigures:
             self._grasped_s = now_s
         if target_center_m is not None:
             height_m = float(target_center_m[2])
-            if self._rest_height_m is None:
+            # Where it last stood by itself: another target, or this one after a push, stands elsewhere.
+            if not held or self._rest_height_m is None:
                 self._rest_height_m = height_m
-            if held:
-                self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
+            self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
 
     def summary(self) -> dict[str, Any]:
         """The summary's keys that come from here, in the units of their names."""
