@@ -1,0 +1,173 @@
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.statistics import RunningStatistics
+from robot_side.perceived_objects import Role
+from robot_side.run_figures import MOVING_M_S, RunFigures, tick_microseconds
+from robot_side.scene import Truth
+from robot_side.sensing import Sensed
+from robot_side.stiffness import Stiffness
+
+ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
+
+
+def sensed(enlargement_m: list[float], overlap_m3: float = 0.0, l2: float = 0.0, r2: float = 0.0) -> Sensed:
+    stiffness = Stiffness(
+        l2=l2,
+        r2=r2,
+        rumble=0.0,
+        object_index=np.empty(0, dtype=np.int64),
+        contributions=np.empty((0, 3)),
+        detent_engaged=False,
+        target_capped=False,
+        rate_limited=False,
+        pairs_counted=0,
+        pairs_blended=0,
+        pairs_inside=0,
+    )
+    return Sensed(np.array(enlargement_m), overlap_m3, stiffness)
+
+
+def truth(
+    *contacts: tuple[str, str], min_distance_m: float | None = None, min_obstacle_distance_m: float | None = None
+) -> Truth:
+    return Truth(min_distance_m, min_obstacle_distance_m, frozenset(contacts))
+
+
+def leaves(summary: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in summary.items():
+        found |= leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return found
+
+
+def test_what_was_never_seen_is_none_and_only_counts_are_0() -> None:
+    empty = leaves(RunFigures().summary())
+    counted = {name for name, value in empty.items() if value == 0}
+    assert counted == {"ticks", "contacts", "task.lifted_mm", "task.obstacle_contacts"}
+    assert {name for name, value in empty.items() if value is None} == empty.keys() - counted
+
+
+def test_figures_are_in_the_units_of_their_names() -> None:
+    figures = RunFigures()
+    figures.tick(sensed([0.010, 0.030], 2e-6, l2=0.1, r2=0.9), 0.0)
+    figures.tick(sensed([0.050, 0.020], 4e-6, l2=0.3, r2=0.5), 0.0)
+    summary = figures.summary()
+    assert summary["ticks"] == 2
+    # Of each tick the largest sphere's enlargement.
+    assert summary["enlargement_mm"] == pytest.approx({"min": 30.0, "mean": 40.0, "max": 50.0, "mean_moving": None})
+    assert summary["overlap_mm3"] == pytest.approx({"max": 4000.0, "mean": 3000.0})
+    assert summary["stiffness"]["l2"] == pytest.approx({"mean": 0.2, "max": 0.3})
+    assert summary["stiffness"]["r2"] == pytest.approx({"mean": 0.7, "max": 0.9})
+
+
+def test_mean_moving_is_over_the_ticks_in_which_the_tool_moved() -> None:
+    figures = RunFigures()
+    for enlargement_m, speed_m_s in ((0.01, 0.0), (0.02, MOVING_M_S), (0.06, 0.011), (0.08, 0.25), (0.01, 0.009)):
+        figures.tick(sensed([enlargement_m]), speed_m_s)
+    enlargement = figures.summary()["enlargement_mm"]
+    assert enlargement["mean_moving"] == pytest.approx(70.0)
+    assert enlargement["mean"] == pytest.approx(36.0)
+    assert MOVING_M_S == 0.01
+
+
+def test_the_smallest_distance_is_kept_and_absence_is_no_distance() -> None:
+    figures = RunFigures()
+    figures.truth(truth(), ROLES, 0.0)
+    assert figures.summary()["min_distance_mm"] is None
+    for nearest, obstacle in ((0.3, None), (0.05, 0.4), (None, None), (-0.001, 0.2), (0.2, 0.3)):
+        figures.truth(truth(min_distance_m=nearest, min_obstacle_distance_m=obstacle), ROLES, 0.0)
+    assert figures.summary()["min_distance_mm"] == pytest.approx(-1.0)
+    assert figures.summary()["task"]["min_obstacle_distance_mm"] == pytest.approx(200.0)
+
+
+def contacts(touching_s: list[float], step_s: float = 0.01) -> int:
+    """Contact onsets of one pair that touches in the steps of `touching_s` (from, to, from, to ...)."""
+    figures = RunFigures()
+    for step in range(200):
+        now_s = step * step_s
+        touches = any(start <= now_s < end for start, end in zip(touching_s[::2], touching_s[1::2], strict=True))
+        figures.truth(truth(("tip", "post")) if touches else truth(), ROLES, now_s)
+    count = figures.summary()["contacts"]
+    assert isinstance(count, int)
+    return count
+
+
+def test_a_contact_counts_once_however_long_it_lasts() -> None:
+    assert contacts([0.305, 1.505]) == 1
+
+
+def test_a_contact_that_chatters_is_one_and_one_that_comes_back_is_another() -> None:
+    assert contacts([0.305, 0.405, 0.465, 0.505, 0.585, 0.605]) == 1
+    assert contacts([0.305, 0.405, 0.525, 0.605]) == 2
+    assert contacts([0.305, 0.405, 0.455, 0.505, 1.005, 1.105]) == 2
+
+
+def test_contacts_are_counted_by_object_and_those_with_obstacles_apart() -> None:
+    figures = RunFigures()
+    figures.truth(truth(("tip", "table"), ("tip", "cup")), ROLES, 0.0)
+    figures.truth(truth(("palm", "post"), ("tip", "cup")), ROLES, 0.05)
+    figures.truth(truth(), ROLES, 0.5)
+    figures.truth(truth(("palm", "post")), ROLES, 1.0)
+    summary = figures.summary()
+    assert summary["contacts"] == 4
+    assert summary["task"]["contacts_by_object"] == {"cup": 1, "post": 2, "table": 1}
+    assert summary["task"]["obstacle_contacts"] == 2
+
+
+def test_the_time_to_the_grasp_counts_from_the_first_arming() -> None:
+    figures = RunFigures()
+    for now_s, armed, held in ((1.0, False, False), (2.0, True, False), (3.0, False, False), (4.0, True, False)):
+        figures.task(armed, held, None, now_s)
+        assert figures.summary()["task"]["time_to_grasp_s"] is None
+    figures.task(True, True, None, 6.5)
+    figures.task(True, False, None, 7.0)
+    figures.task(True, True, None, 8.0)
+    assert figures.summary()["task"]["time_to_grasp_s"] == pytest.approx(4.5)
+
+
+def lifted_mm(*ticks: tuple[bool, float | None]) -> float:
+    figures = RunFigures()
+    for number, (held, height_m) in enumerate(ticks):
+        figures.task(True, held, None if height_m is None else np.array([0.5, 0.1, height_m]), 0.1 * number)
+    value = figures.summary()["task"]["lifted_mm"]
+    assert isinstance(value, float)
+    return value
+
+
+def test_lifted_is_how_far_a_held_target_rose_above_where_it_rested() -> None:
+    assert lifted_mm((False, 0.05), (True, 0.05), (True, 0.12), (True, 0.09), (False, 0.05)) == pytest.approx(70.0)
+    assert lifted_mm((False, 0.05), (True, 0.03)) == 0.0
+    # Thrown up, or seen higher, without being held.
+    assert lifted_mm((False, 0.05), (False, 0.5), (True, 0.5)) == 0.0
+    assert lifted_mm((False, None), (True, None)) == 0.0
+
+
+def test_another_target_that_stands_higher_has_not_been_lifted() -> None:
+    assert lifted_mm((False, 0.05), (False, 0.35), (True, 0.35)) == 0.0
+    assert lifted_mm((False, 0.35), (False, 0.05), (True, 0.05), (True, 0.15)) == pytest.approx(100.0)
+
+
+def test_a_target_without_a_height_spoils_nothing() -> None:
+    assert lifted_mm((False, np.nan), (False, 0.05), (True, 0.05), (True, 0.15)) == pytest.approx(100.0)
+
+
+def test_tick_times_are_in_microseconds() -> None:
+    times = RunningStatistics()
+    assert tick_microseconds(times) == {"p50": None, "p99": None, "max": None}
+    for milliseconds in range(1, 102):
+        times.add(1e-3 * milliseconds)
+    assert tick_microseconds(times) == pytest.approx({"p50": 51_000.0, "p99": 100_000.0, "max": 101_000.0})
+
+
+def test_a_summary_is_json_and_stays_as_it_was_taken() -> None:
+    figures = RunFigures()
+    figures.tick(sensed([0.01]), 0.1)
+    first = figures.summary()
+    figures.tick(sensed([0.03]), 0.1)
+    assert json.loads(json.dumps(first)) == first
+    assert first["ticks"] == 1
+    assert figures.summary()["enlargement_mm"]["max"] == pytest.approx(30.0)
