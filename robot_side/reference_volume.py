@@ -14,12 +14,12 @@ def plane_overlaps(
     """Reference volumes (k,) in m³, one for each unit direction (k, 3) in which the gripper may move.
 
     The plane is square to the direction and touches the foremost of the spheres centers_m (m, 3), radii_m (m,)
-    before they are enlarged by enlargement_m (m,); its overlap with the enlarged ones is the sum of the caps
-    π d² (3R - d) / 3, d being how deep each lies behind it.
+    before they are enlarged by enlargement_m, (m,) or (k, m) if it depends on the direction; its overlap with the
+    enlarged ones is the sum of the caps π d² (3R - d) / 3, d being how deep each lies behind it.
 
-    So the same nearness gives the same stiffness at every delay: with a fixed share of the enlarged gripper's
-    volume a plane at its surface would give a stiffness that grows from 0.07 to 1 as the enlargement grows from
-    7 to 60 mm (docs/architecture.md).
+    So a plane at the gripper's surface gives s = 1 at every delay: with a fixed share of the enlarged gripper's
+    volume it would give a stiffness that grows from 0.07 to 1 as the enlargement grows from 7 to 60 mm
+    (docs/architecture.md).
     """
     enlarged_m = radii_m + np.maximum(enlargement_m, _LEAST_ENLARGEMENT_M)
     along = directions @ centers_m.T

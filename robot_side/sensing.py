@@ -77,7 +77,8 @@ class AheadSensing:
         if len(pairs) == 0:
             self.skipped.ticks_without_candidates += 1
         nearest = nearest_surfaces(pose.sphere_centers_m, objects, pairs)
-        if self.enlargement.settings.direction == "towards_object":
+        towards_object = self.enlargement.settings.direction == "towards_object"
+        if towards_object:
             sphere = pairs.sphere_index
             pair_enlargement_m = self.enlargement.distances_towards(
                 covariances[sphere], velocities[sphere], loop_age_s, nearest.direction
@@ -98,7 +99,13 @@ class AheadSensing:
         reference_m3 = None
         if self.stiffness_map.settings.reference == "plane":
             axes = np.stack([directions["l2"][0], directions["r2"][0]])
-            reference_m3 = plane_overlaps(pose.sphere_centers_m, pose.sphere_radii_m, enlargement_m, axes)
+            # The enlargement that a plane square to the trigger's direction would meet.
+            towards_plane_m = enlargement_m
+            if towards_object:
+                towards_plane_m = self.enlargement.distances_towards(
+                    covariances, velocities, loop_age_s, np.broadcast_to(axes, (len(enlarged_m), *axes.shape))
+                ).T
+            reference_m3 = plane_overlaps(pose.sphere_centers_m, pose.sphere_radii_m, towards_plane_m, axes)
         stiffness = self.stiffness_map.update(
             overlaps,
             objects.roles,
