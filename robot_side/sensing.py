@@ -27,7 +27,7 @@ class Sensed:
     enlargement_m: FloatArray
     """(m,) of each gripper sphere"""
     overlap_m3: float
-    """Total over all pairs of a sphere and an object"""
+    """Total over all pairs of a sphere and an object, but for the object that the gripper holds"""
     stiffness: Stiffness
 
 
@@ -116,4 +116,5 @@ class AheadSensing:
             unenlarged_radii_m=pose.sphere_radii_m,
             excluded_objects=() if excluded is None else (excluded,),
         )
-        return Sensed(enlargement_m, float(overlaps.volume_m3.sum()), stiffness)
+        counted = slice(None) if excluded is None else overlaps.object_index != excluded
+        return Sensed(enlargement_m, float(overlaps.volume_m3[counted].sum()), stiffness)
