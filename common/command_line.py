@@ -59,7 +59,7 @@ def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
         raise ConfigurationError(f"--config {path}: is no valid TOML: {error}") from error
     _refuse_unknown_keys(content, settings_type, path, "")
     try:
-        return msgspec.convert(content, settings_type)
+        return msgspec.convert(content, settings_type, dec_hook=_from_toml)
     except msgspec.ValidationError as error:
         raise ConfigurationError(f"--config {path}: {error}") from error
 
@@ -74,6 +74,13 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         code = 0
     sys.exit(code)
+
+
+def _from_toml(kind: type, value: object) -> object:
+    """A value of a type that TOML does not have."""
+    if kind is Path and isinstance(value, str):
+        return Path(value)
+    raise TypeError(f"Expected `{kind.__name__}`, got `{type(value).__name__}`")
 
 
 def _config_path(arguments: Sequence[str]) -> str | None:
