@@ -63,12 +63,12 @@ class PersonSettings:
     """How fast they push harder, in normal finger forces a second, while a trigger yields less than they meant."""
 
     def __post_init__(self) -> None:
-        for name in (
-            *("visual_reaction_s", "phase_margin_rad", "depth_error_sd_m", "grasp_depth_m", "lift_m"),
-            "insistence_per_s",
-        ):
+        for name in ("visual_reaction_s", "depth_error_sd_m", "grasp_depth_m", "lift_m", "insistence_per_s"):
             if not 0.0 <= getattr(self, name) < 10.0:
                 raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to below 10")
+        # From 90° on a person would not correct what they see, or make it worse.
+        if not 0.0 <= self.phase_margin_rad < math.pi / 2:
+            raise ValueError(f"phase_margin_rad = {self.phase_margin_rad}; valid: 0 to below pi / 2")
         if self.attempts < 1:
             raise ValueError(f"attempts = {self.attempts}; valid: 1 or more")
 
