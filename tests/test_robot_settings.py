@@ -1,0 +1,174 @@
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.command_line import load_toml, parse_settings
+from common.errors import ConfigurationError
+from robot_side.perceived_objects import Role
+from robot_side.settings import CameraSettings, EncoderSettings, EnlargementOptions, RobotSettings
+
+NAN, INFINITY = math.nan, math.inf
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "values"),
+    [
+        (EncoderSettings, "sigma_rad", (-1e-6, 1.1, NAN, INFINITY)),
+        (EncoderSettings, "resolution_rad", (-1e-6, 1.1, NAN, -INFINITY)),
+        (CameraSettings, "mean_m", (-1.1, 1.1, NAN, INFINITY)),
+        (CameraSettings, "sd_m", (-1e-6, 1.1, NAN, INFINITY)),
+        (CameraSettings, "frame_sd_m", (-1e-6, 1.1, NAN, INFINITY)),
+        (RobotSettings, "assumed_delay_s", (0.0, -1.0, 60.1, NAN, INFINITY)),
+        (RobotSettings, "spheres", (0, -3, 1001)),
+        (RobotSettings, "probability", (0.0, 1.0, -0.1, 1.5, NAN)),
+        (RobotSettings, "duration", (0.0, -1.0, NAN, INFINITY)),
+        (RobotSettings, "seed", (-1,)),
+    ],
+)
+def test_every_value_out_of_range_is_named_with_what_is_valid(
+    kind: Callable[..., Any], name: str, values: tuple[float, ...]
+) -> None:
+    for value in values:
+        with pytest.raises(ValueError, match=name) as caught:
+            kind(**{name: value})
+        assert str(value) in str(caught.value)
+        assert "valid" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"kinematic_mean_m": (0.0, NAN, 0.0)}, "kinematic_mean_m"),
+        ({"kinematic_mean_m": (INFINITY, 0.0, 0.0)}, "kinematic_mean_m"),
+        ({"measure": "largest"}, "measure = 'largest'"),
+        ({"mode": "twice"}, "mode = 'twice'"),
+        ({"direction": "forwards"}, "direction = 'forwards'"),
+    ],
+)
+def test_bad_enlargement_options_are_found_before_anything_starts(options: dict[str, Any], named: str) -> None:
+    with pytest.raises(ConfigurationError, match=named) as caught:
+        RobotSettings(enlargement=EnlargementOptions(**options))
+    assert "finite" in str(caught.value) or "valid" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        (EncoderSettings, {"sigma_rad": 0.0, "resolution_rad": 0.0}),
+        (EncoderSettings, {"sigma_rad": 1.0, "resolution_rad": 1.0}),
+        (CameraSettings, {"mean_m": -1.0, "sd_m": 0.0, "frame_sd_m": 1.0}),
+        (RobotSettings, {"assumed_delay_s": 0.001, "spheres": 1, "probability": 1e-9}),
+        (RobotSettings, {"assumed_delay_s": 60.0, "spheres": 1000, "probability": 1.0 - 1e-9}),
+    ],
+)
+def test_the_ends_of_the_ranges_are_valid(kind: Callable[..., Any], values: dict[str, Any]) -> None:
+    kept = kind(**values)
+    assert {name: getattr(kept, name) for name in values} == values
+
+
+def test_model_and_site_come_together() -> None:
+    with pytest.raises(ValueError, match="--model is given without --site; valid: both, or neither"):
+        RobotSettings(model=Path("arm.xml"))
+    with pytest.raises(ValueError, match="--site is given without --model; valid: both, or neither"):
+        RobotSettings(site="tool")
+    both = RobotSettings(model=Path("arm.xml"), site="tool")
+    assert (both.model, both.site) == (Path("arm.xml"), "tool")
+    assert RobotSettings().model is None
+
+
+def test_the_enlargement_knows_both_parts_of_the_cameras_error() -> None:
+    settings = RobotSettings(
+        probability=0.9,
+        camera=CameraSettings(mean_m=-0.002, sd_m=0.003, frame_sd_m=0.004),
+        enlargement=EnlargementOptions(
+            kinematic_mean_m=(0.001, 0.0, -0.001), measure="trace", mode="once", direction="towards_object"
+        ),
+    ).enlargement_settings()
+    assert settings.probability == 0.9
+    assert settings.camera_mean_m == -0.002
+    assert settings.camera_sd_m == pytest.approx(0.005)
+    assert settings.kinematic_mean_m == (0.001, 0.0, -0.001)
+    assert (settings.measure, settings.mode, settings.direction) == ("trace", "once", "towards_object")
+
+
+ROBOT_TOML = """
+probability = 0.95
+spheres = 24
+model = "arms/arm.xml"
+site = "tool"
+[roles]
+post = "ignored"
+box = "target"
+[camera]
+sd_m = 0.001
+[enlargement]
+kinematic_mean_m = [0.0, 0.001, 0.0]
+direction = "towards_object"
+[safety]
+gap_s = 0.2
+"""
+
+
+def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(ROBOT_TOML)
+    settings = parse_settings(RobotSettings, "robot", ["--config", str(path), "--spheres", "8", "--camera.mean-m=0.01"])
+    assert settings.probability == 0.95
+    assert settings.spheres == 8
+    assert (settings.model, settings.site) == (Path("arms/arm.xml"), "tool")
+    assert settings.roles == {"post": Role.IGNORED, "box": Role.TARGET}
+    assert settings.camera == CameraSettings(mean_m=0.01, sd_m=0.001)
+    assert settings.enlargement.kinematic_mean_m == (0.0, 0.001, 0.0)
+    assert settings.enlargement.direction == "towards_object"
+    assert settings.safety.gap_s == 0.2
+    assert settings.motion == RobotSettings().motion
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ('[roles]\npost = "enemy"', "enemy"),
+        ("[enlargement]\nkinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
+        ("[camera]\nsd_m = nan", "sd_m = nan"),
+        ("[encoder]\nsigma_rad = 2.0", "sigma_rad = 2.0"),
+        ('model = "arm.xml"', "--site"),
+        ("model = 3", "model"),
+        ("spheres = 0", "--spheres 0"),
+        ("spheres = 8.5", "spheres"),
+        ("[stiffness]\nreference = 'volume'", "volume"),
+        ("[motion]\nstick_speed_m_s = 9.0", "stick_speed_m_s = 9.0"),
+        ("[safety]\ngap_s = 0", "gap_s = 0"),
+    ],
+)
+def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, named: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError) as caught:
+        load_toml(path, RobotSettings)
+    text = str(caught.value)
+    assert named in text
+    assert "robot.toml" in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--model", "arm.xml"], "--site"),
+        (["--site", "tool"], "--model"),
+        (["--encoder.sigma-rad", "-1"], "sigma_rad = -1"),
+        (["--camera.frame-sd-m", "2"], "frame_sd_m = 2"),
+        (["--assumed-delay-s", "0"], "assumed_delay_s = 0"),
+        (["--enlargement.direction", "up"], "up"),
+        (["--motion.turn-speed-rad-s", "nan"], "turn_speed_rad_s = nan"),
+        (["--safety.max-delay-s", "0"], "max_delay_s = 0"),
+    ],
+)
+def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        parse_settings(RobotSettings, "robot", arguments)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
