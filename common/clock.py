@@ -33,9 +33,9 @@ class VirtualClock:
         return self._now_s
 
     def advance_to(self, now_s: float) -> None:
-        """Move on to `now_s`; ValueError when that lies in the past."""
-        if now_s < self._now_s:
-            raise ValueError(f"now_s = {now_s} lies before the clock's present time {self._now_s}")
+        """Move on to `now_s`; ValueError when that lies in the past or is no number."""
+        if not now_s >= self._now_s:
+            raise ValueError(f"now_s = {now_s} does not lie at or after the clock's present time {self._now_s}")
         self._now_s = now_s
 
 
