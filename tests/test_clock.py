@@ -1,0 +1,84 @@
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.clock import Clock, MonotonicClock, VirtualClock, clock_domain
+from common.link_end import LinkEnd
+
+
+@pytest.fixture
+def fresh_domain() -> Iterator[None]:
+    clock_domain.cache_clear()
+    yield
+    clock_domain.cache_clear()
+
+
+def test_the_monotonic_clock_is_the_machines_own() -> None:
+    before_s = time.monotonic()
+    clock: Clock = MonotonicClock()
+    readings = [clock.now() for _ in range(1000)]
+    assert readings == sorted(readings)
+    assert before_s <= readings[0]
+    assert readings[-1] <= time.monotonic()
+
+
+def test_a_virtual_clock_stands_still_until_it_is_told() -> None:
+    clock = VirtualClock()
+    assert [clock.now(), clock.now()] == [0.0, 0.0]
+    clock.advance_to(0.25)
+    assert [clock.now(), clock.now()] == [0.25, 0.25]
+    clock.advance_to(0.25)
+    assert clock.now() == 0.25
+    assert VirtualClock(17.5).now() == 17.5
+
+
+@pytest.mark.parametrize("past_s", [0.999, -1.0, -math.inf, math.nan])
+def test_a_virtual_clock_never_runs_backwards(past_s: float) -> None:
+    clock = VirtualClock(1.0)
+    with pytest.raises(ValueError, match=f"now_s = {past_s}"):
+        clock.advance_to(past_s)
+    assert clock.now() == 1.0
+    clock.advance_to(2.0)
+    with pytest.raises(ValueError, match="now_s"):
+        clock.advance_to(1.5)
+
+
+@pytest.mark.skipif(not Path("/proc/self/ns/time").is_symlink(), reason="the kernel has no time namespaces")
+def test_processes_on_one_machine_share_a_domain() -> None:
+    mine = clock_domain()
+    assert mine
+    script = "from common.clock import clock_domain; print(clock_domain())"
+    other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert other.stdout.strip() == mine
+
+
+@pytest.mark.usefixtures("fresh_domain")
+@pytest.mark.parametrize("missing", ["read_text", "readlink"])
+def test_a_clock_that_cannot_be_named_is_shared_with_nobody(monkeypatch: pytest.MonkeyPatch, missing: str) -> None:
+    def fail(*_: object, **__: object) -> str:
+        raise FileNotFoundError(2, "no such file")
+
+    monkeypatch.setattr(Path, missing, fail)
+    assert clock_domain() == ""
+
+
+@pytest.mark.usefixtures("fresh_domain")
+def test_another_boot_or_time_namespace_is_another_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    def domain(boot: str, namespace: str) -> str:
+        monkeypatch.setattr(Path, "read_text", lambda *_, **__: f"{boot}\n")
+        monkeypatch.setattr(Path, "readlink", lambda *_: Path(namespace))
+        clock_domain.cache_clear()
+        return clock_domain()
+
+    names = [domain(boot, space) for boot in ("boot1", "boot2") for space in ("time:[1]", "time:[2]")]
+    assert len(set(names)) == 4
+    assert all("\n" not in name for name in names)
+
+
+def test_a_domain_fits_into_a_hello() -> None:
+    LinkEnd("robot", 1, clock_domain()).hello(0.0)

@@ -1,0 +1,154 @@
+import contextlib
+import json
+import os
+import sys
+from typing import Any
+
+import pytest
+
+from common.status import Status, StatusMode, Value
+
+
+def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    return capsys.readouterr().out.splitlines()
+
+
+def events(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in shown(capsys)]
+
+
+def run(mode: StatusMode, seconds: float, start_s: float = 100.0) -> None:
+    """`show` once a millisecond."""
+    with Status(mode, "robot") as status:
+        for tick in range(round(seconds * 1000)):
+            status.show(start_s + tick / 1000, {"tick": tick})
+
+
+def test_json_is_one_event_a_line_five_times_a_second(capsys: pytest.CaptureFixture[str]) -> None:
+    run("json", 2.0)
+    found = events(capsys)
+    assert [event["event"] for event in found] == ["status"] * 10
+    assert [event["tick"] for event in found] == pytest.approx(range(0, 2000, 200), abs=10)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 1e6])
+def test_the_first_values_are_shown_at_once(capsys: pytest.CaptureFixture[str], start_s: float) -> None:
+    run("json", 0.05, start_s)
+    assert events(capsys) == [{"event": "status", "tick": 0}]
+
+
+def test_json_keeps_the_values_types(capsys: pytest.CaptureFixture[str]) -> None:
+    values: dict[str, Value] = {"a": 0.125, "b": 3, "c": "armed", "d": True, "e": None}
+    with Status("json", "robot") as status:
+        status.show(0.0, values)
+        status.event("listening", control="tcp://127.0.0.1:5555")
+        status.event("bare")
+    assert events(capsys) == [
+        {"event": "status"} | values,
+        {"event": "listening", "control": "tcp://127.0.0.1:5555"},
+        {"event": "bare"},
+    ]
+
+
+def test_events_do_not_wait_for_their_turn(capsys: pytest.CaptureFixture[str]) -> None:
+    with Status("json", "robot") as status:
+        for number in range(5):
+            status.event("count", number=number)
+    assert [event["number"] for event in events(capsys)] == [0, 1, 2, 3, 4]
+
+
+def test_without_a_terminal_there_is_a_line_every_two_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    run("line", 5.0)
+    found = shown(capsys)
+    assert len(found) == 3
+    assert found[0] == "robot  tick 0"
+
+
+def test_values_are_written_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    with Status("line", "robot") as status:
+        status.show(0.0, {"L2": 0.5, "R2": 1 / 3, "n": 12, "held": None, "armed": True, "far": False, "at": "[up]"})
+    assert shown(capsys) == ["robot  L2 0.50  R2 0.33  n 12  held –  armed yes  far no  at [up]"]
+
+
+def test_notes_are_for_people_and_events_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "listening at [bold]tcp://127.0.0.1:5555[/bold]" + ", and so on" * 30
+    modes: tuple[StatusMode, ...] = ("line", "json", "none")
+    of_mode = {}
+    for mode in modes:
+        with Status(mode, "robot") as status:
+            status.note(text)
+            status.event("listening")
+        of_mode[mode] = shown(capsys)
+    # Long notes are not broken into lines, and brackets are no markup.
+    assert of_mode == {"line": [f"robot: {text}"], "json": ['{"event": "listening"}'], "none": []}
+
+
+def test_nothing_is_due_when_nothing_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    with Status("none", "robot") as status:
+        assert not status.due(0.0)
+        assert not status.due(1e9)
+        status.show(0.0, {"tick": 0})
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("mode", "period_s"), [("json", 0.2), ("line", 2.0)])
+def test_due_says_whether_show_would_show(
+    capsys: pytest.CaptureFixture[str], mode: StatusMode, period_s: float
+) -> None:
+    with Status(mode, "robot") as status:
+        assert status.due(10.0)
+        assert status.due(10.0)
+        status.show(10.0, {"tick": 0})
+        assert not status.due(10.0)
+        assert not status.due(10.0 + 0.99 * period_s)
+        assert status.due(10.0 + 1.01 * period_s)
+        status.show(10.0 + 0.99 * period_s, {"tick": 1})
+        status.show(10.0 + 1.01 * period_s, {"tick": 2})
+    assert len(shown(capsys)) == 2
+
+
+def test_on_a_terminal_one_line_is_kept_up_to_date(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "40")
+    with Status("line", "robot") as status:
+        for tick in range(1000):
+            status.show(tick / 1000, {"tick": tick, "what": "it does " * 20})
+        status.note("a line that stays")
+    written = capsys.readouterr().out
+    updates = [tick for tick in range(1000) if f"tick {tick} " in written]
+    assert updates == pytest.approx([0, 200, 400, 600, 800], abs=5)
+    assert "a line that stays" in written
+    # The line is cut rather than wrapped, and the cursor that was hidden comes back.
+    assert "…" in written
+    assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
+
+
+def test_the_terminal_is_given_back_after_an_error_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+
+    def fail() -> None:
+        with Status("line", "robot") as status:
+            status.show(0.0, {"tick": 1})
+            raise RuntimeError("in the loop")
+
+    with pytest.raises(RuntimeError, match="in the loop"):
+        fail()
+    written = capsys.readouterr().out
+    assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
+
+
+def test_a_json_reader_that_has_gone_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    read_end, write_end = os.pipe()
+    stream = os.fdopen(write_end, "w", encoding="utf-8")
+    os.close(read_end)
+    monkeypatch.setattr(sys, "stdout", stream)
+    with Status("json", "robot") as status, pytest.raises(BrokenPipeError):
+        status.show(0.0, {"tick": 0})
+    with contextlib.suppress(BrokenPipeError):
+        stream.close()
