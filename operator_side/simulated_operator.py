@@ -113,6 +113,8 @@ class SimulatedOperator:
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
+        if self._hands_s is None:
+            self._since_s = now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
             self._seen.append((now_s, screen))
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
