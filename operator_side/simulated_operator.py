@@ -109,6 +109,7 @@ class SimulatedOperator:
         self._holding_s = 0.0
         self._calibration = calibration or TravelCalibration()
         self._insistence_n = 0.0
+        self._pulling: int | None = None
         self._hands_s: float | None = None
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
@@ -221,6 +222,8 @@ class SimulatedOperator:
         step_s = 0.0 if self._hands_s is None else now_s - self._hands_s
         self._hands_s = now_s
         force_n = 0.0
+        if trigger != self._pulling:
+            self._pulling, self._insistence_n = trigger, 0.0
         if meant > 0.0:
             free = self._calibration.dead_zone + meant * (self._calibration.saturation - self._calibration.dead_zone)
             mechanical = free * SENSED_TRAVEL
