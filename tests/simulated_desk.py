@@ -1,0 +1,152 @@
+"""A simulated person at a controller, before a screen on which a test puts views of a robot that is not there."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from common.messages import Header, Telemetry, Vector3
+from operator_side.dualsense.controller_state import Button, Stick
+from operator_side.dualsense.effects import TriggerEffect
+from operator_side.dualsense.report import build_output_report
+from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.dualsense.trigger_model import SENSED_TRAVEL, SPRING_PRELOAD_N, SPRING_RISE_N
+from operator_side.simulated_operator import PersonSettings, Phase, SimulatedOperator
+from operator_side.trigger_effect import stiffness_to_effect
+from operator_side.trigger_motion import TravelCalibration
+
+TICK_S, FRAME_S = 0.004, 0.02
+CALIBRATION = TravelCalibration()
+GRASP_M = 0.02
+CLEAR_SIGHTED = PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M)
+"""A person who judges distances rightly, so that a test can say where the target seems to be."""
+VIEW = Telemetry(
+    Header(epoch=1, sequence=1, sent_s=0.0),
+    state="disarmed",
+    tool_position_m=(0.5, 0.0, 0.3),
+    tool_speed_m_s=0.0,
+    target="target",
+    target_in_tool_m=(0.0, 0.0, 0.3),
+    up_in_tool=(0.0, -1.0, 0.0),
+    gripper_opening_m=0.08,
+    holding=False,
+    enlargement_m=0.01,
+    l2=0.0,
+    r2=0.0,
+)
+IN_REACH: Vector3 = (0.0, 0.0, -GRASP_M)
+
+
+def view(**changes: Any) -> Telemetry:
+    return msgspec.structs.replace(VIEW, **changes)
+
+
+def armed(target_in_tool_m: Vector3 | None = IN_REACH, **changes: Any) -> Telemetry:
+    return view(state="armed", target_in_tool_m=target_in_tool_m, **changes)
+
+
+@dataclass(frozen=True)
+class Hands:
+    """What the hands did in one tick."""
+
+    now_s: float
+    phase: Phase
+    l2_n: float
+    r2_n: float
+    left: Stick
+    right: Stick
+    buttons: frozenset[Button]
+
+
+class WatchedDualSense(SimulatedDualSense):
+    """Remembers what the hands do to it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.forces_n = (0.0, 0.0)
+        self.sticks: tuple[Stick, Stick] = ((0.0, 0.0), (0.0, 0.0))
+        self.buttons: frozenset[Button] = frozenset()
+
+    def set_finger_force(self, l2_n: float, r2_n: float) -> None:
+        super().set_finger_force(l2_n, r2_n)
+        self.forces_n = (l2_n, r2_n)
+
+    def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
+        super().set_sticks(left, right)
+        self.sticks = (left, right)
+
+    def set_buttons(self, pressed: frozenset[Button]) -> None:
+        super().set_buttons(pressed)
+        self.buttons = pressed
+
+
+class Desk:
+    """A person with a controller before a screen on which the test puts views."""
+
+    def __init__(self, settings: PersonSettings = CLEAR_SIGHTED, seed: int = 0, start_s: float = 0.0) -> None:
+        self.device = WatchedDualSense()
+        self.person = SimulatedOperator(self.device, settings, seed, CALIBRATION)
+        self.start_s = start_s
+        self.ticks = 0
+        self.hands: list[Hands] = []
+
+    @property
+    def now_s(self) -> float:
+        return self.start_s + self.ticks * TICK_S
+
+    def tick(self, screen: Telemetry | None, delay_s: float = 0.0) -> Hands:
+        self.person.tick(self.now_s, screen, delay_s)
+        self.device.read(self.now_s)
+        left, right = self.device.sticks
+        done = Hands(self.now_s, self.person.phase, *self.device.forces_n, left, right, self.device.buttons)
+        self.hands.append(done)
+        self.ticks += 1
+        return done
+
+    def watch(self, screen: Telemetry | None, duration_s: float, delay_s: float = 0.0) -> list[Hands]:
+        """The same picture for a while, as a stream of frames."""
+        seen = []
+        frames = self._frames(screen)
+        for _ in range(round(duration_s / TICK_S)):
+            seen.append(self.tick(next(frames), delay_s))
+        return seen
+
+    def until(self, phase: Phase, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
+        """Watch until the person gets to `phase`; how long that took."""
+        start_s, frames = self.now_s, self._frames(screen)
+        while self.person.phase != phase:
+            assert self.now_s - start_s <= at_most_s, f"still in {self.person.phase} after {at_most_s} s"
+            self.tick(next(frames), delay_s)
+        return self.now_s - start_s
+
+    def arm(self, screen: Telemetry | None = None) -> None:
+        """Up to the advance, from where the person sees `screen`."""
+        self.until("arm", VIEW, 3.0)
+        self.until("advance", screen or armed((0.0, 0.0, 0.3)), 1.0)
+
+    def resist(self, r2: TriggerEffect, l2: TriggerEffect | None = None) -> None:
+        off = stiffness_to_effect(0.0)
+        report = build_output_report(l2=l2 or off, r2=r2)
+        self.device.write(report, self.now_s)
+
+    def _frames(self, screen: Telemetry | None) -> Iterator[Telemetry | None]:
+        sequence = self.ticks
+        while True:
+            sequence += 1
+            frame = None
+            if screen is not None:
+                frame = msgspec.structs.replace(screen, header=Header(epoch=1, sequence=sequence, sent_s=0.0))
+            for _ in range(round(FRAME_S / TICK_S)):
+                yield frame
+
+
+def habitual_force_n(meant: float) -> float:
+    """What a free trigger takes for that calibrated travel."""
+    raw = CALIBRATION.dead_zone + meant * (CALIBRATION.saturation - CALIBRATION.dead_zone)
+    return SPRING_PRELOAD_N + SPRING_RISE_N * raw * SENSED_TRAVEL
+
+
+def crossover(lag_s: float, settings: PersonSettings = CLEAR_SIGHTED) -> float:
+    return min(4.5, (math.pi / 2 - settings.phase_margin_rad) / lag_s)
