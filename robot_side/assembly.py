@@ -15,6 +15,7 @@ from robot_side.encoders import Encoder
 from robot_side.enlargement import Enlargement
 from robot_side.joint_reference import MotionLimits
 from robot_side.kinematic_error import position_covariance
+from robot_side.operator_session import OperatorSession
 from robot_side.run_figures import RunFigures
 from robot_side.safety import Safety
 from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
@@ -68,11 +69,10 @@ def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> 
             StiffnessMap(settings.stiffness),
             encoder_sigma_rad,
         ),
-        Safety(settings.safety),
+        OperatorSession(LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed),
         LoopAge(settings.assumed_delay_s),
         np.full(arm.joint_count, limits.velocity_rad_s),
         settings.motion,
-        LinkEnd("robot", epoch, clock_domain, settings.seed),
         SimulationObserver(scene),
         settings.seed,
     )

@@ -5,9 +5,10 @@ import pytest
 
 from common.codec import decode, encode
 from common.link_end import LinkEnd
-from common.messages import Hello, MotionCommand, StiffnessUpdate, Telemetry
+from common.messages import Header, Hello, MotionCommand, StiffnessUpdate, Telemetry
 from robot_side.assembly import build_robot_side
-from robot_side.core import OPERATOR_SILENT_S, RobotSide
+from robot_side.core import RobotSide
+from robot_side.operator_session import OPERATOR_SILENT_S
 from robot_side.settings import EnlargementOptions, RobotSettings
 
 PEER = b"operator"
@@ -52,7 +53,7 @@ class Bench:
     def arm(self, operator: LinkEnd, peer: bytes = PEER) -> None:
         self.run(1.1, operator, peer)
         self.run(0.02, operator, peer, arm=True)
-        assert self.robot.safety.arming.state == "armed"
+        assert self.robot.session.safety.arming.state == "armed"
 
     @property
     def tool_m(self) -> np.ndarray:
@@ -76,7 +77,7 @@ def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench
     assert np.abs(moved[1:]).max() < 0.01
     for _ in range(400):
         bench.tick()
-    assert bench.robot.safety.arming.state == "disarmed"
+    assert bench.robot.session.safety.arming.state == "disarmed"
     rest = bench.tool_m
     for _ in range(300):
         bench.tick()
@@ -99,8 +100,8 @@ def test_a_second_operator_is_kept_out_until_the_first_is_silent(bench: Bench) -
     intruding = MotionCommand(second.stamp(bench.now_s), l2=1.0, r2=0.0, run=True)
     bench.robot.receive(b"second", encode(intruding), bench.now_s)
     bench.run(0.1, first, r2=0.2)
-    assert bench.robot.safety.arming.state == "armed"
-    permission = bench.robot.safety.permission(bench.now_s)
+    assert bench.robot.session.safety.arming.state == "armed"
+    permission = bench.robot.session.safety.permission(bench.now_s)
     assert permission.command is not None
     assert permission.command.l2 == 0.0
     assert not any(isinstance(message, StiffnessUpdate) for message in bench.inbox.get(b"second", []))
@@ -118,7 +119,7 @@ def test_a_second_operator_cannot_stop_the_first(bench: Bench) -> None:
     stop = MotionCommand(second.stamp(bench.now_s), l2=0.0, r2=0.0, emergency_stop=True)
     bench.robot.receive(b"second", encode(stop), bench.now_s)
     bench.run(0.02, first)
-    assert bench.robot.safety.arming.state == "armed"
+    assert bench.robot.session.safety.arming.state == "armed"
 
 
 def test_the_operator_may_come_back_over_another_connection(bench: Bench) -> None:
@@ -126,7 +127,7 @@ def test_the_operator_may_come_back_over_another_connection(bench: Bench) -> Non
     bench.arm(operator)
     bench.run(0.05, operator, peer=b"reconnected")
     assert isinstance(bench.inbox[b"reconnected"][-1], StiffnessUpdate)
-    assert bench.robot.safety.arming.state == "armed"
+    assert bench.robot.session.safety.arming.state == "armed"
 
 
 def test_a_restarted_operator_finds_the_arm_disarmed(bench: Bench) -> None:
@@ -134,7 +135,7 @@ def test_a_restarted_operator_finds_the_arm_disarmed(bench: Bench) -> None:
     bench.now_s += OPERATOR_SILENT_S + 0.1
     restarted = bench.join(PEER, 3)
     bench.run(0.2, restarted, r2=1.0)
-    assert bench.robot.safety.arming.state == "disarmed"
+    assert bench.robot.session.safety.arming.state == "disarmed"
 
 
 def test_an_operator_unknown_to_a_restarted_robot_is_told_so(bench: Bench) -> None:
@@ -144,13 +145,13 @@ def test_an_operator_unknown_to_a_restarted_robot_is_told_so(bench: Bench) -> No
     bench.tick()
     [answer] = bench.inbox[PEER]
     assert isinstance(answer, Hello)
-    assert bench.robot.rejected == 1
+    assert bench.robot.session.rejected == 1
 
 
 @pytest.mark.parametrize("payload", [b"", b"\x00", b"\xff" * 100, bytes(100_000)])
 def test_garbage_is_counted_and_nothing_else(bench: Bench, payload: bytes) -> None:
     bench.robot.receive(PEER, payload, 0.0)
-    assert bench.robot.rejected == 1
+    assert bench.robot.session.rejected == 1
     bench.tick()
     assert bench.inbox == {}
 
@@ -193,3 +194,14 @@ def test_every_way_of_enlarging_ticks(direction: str, mode: str) -> None:
     for _ in range(3):
         bench.tick()
     assert bench.robot.summary()["enlargement_mm"]["min"] > 0.0
+
+
+def test_an_echo_from_the_future_ages_nothing(bench: Bench) -> None:
+    operator = bench.join(PEER, 2)
+    bench.run(0.05, operator)
+    invented = operator.stamp(bench.now_s)
+    header = Header(invented.epoch, invented.sequence, invented.sent_s, echo_sent_s=bench.now_s + 60.0, echo_held_s=0.0)
+    bench.robot.receive(PEER, encode(MotionCommand(header, l2=0.0, r2=0.0)), bench.now_s)
+    for _ in range(10):
+        bench.tick()
+    assert bench.robot.session.loop_age_s(bench.now_s) is None
