@@ -78,7 +78,7 @@ def test_the_smallest_distance_is_kept_and_absence_is_no_distance() -> None:
     figures = RunFigures()
     figures.truth(truth(), ROLES, 0.0)
     assert figures.summary()["min_distance_mm"] is None
-    for nearest, obstacle in ((0.3, None), (0.05, 0.4), (None, None), (-0.001, 0.2), (0.2, 0.3)):
+    for nearest, obstacle in ((0.3, None), (0.05, 0.4), (None, None), (-0.001, 0.2), (0.2, 0.3), (None, None)):
         figures.truth(truth(min_distance_m=nearest, min_obstacle_distance_m=obstacle), ROLES, 0.0)
     assert figures.summary()["min_distance_mm"] == pytest.approx(-1.0)
     assert figures.summary()["task"]["min_obstacle_distance_mm"] == pytest.approx(200.0)
