@@ -6,6 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.delay import LoopAge
+from common.errors import ConfigurationError
 from common.link_end import LinkEnd
 from robot_side.arm import MujocoArm, MujocoKinematics
 from robot_side.arm_port import ArmState
@@ -40,6 +41,9 @@ class SimulationObserver:
 
 def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
     """Put a robot side together; ConfigurationError for a model that cannot be used."""
+    if (settings.model is None) != (settings.site is None):
+        given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
+        raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
     scene = load_scene(settings.model, settings.site, settings.roles)
     noise, camera_noise, samples = np.random.SeedSequence(settings.seed).generate_state(3)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))

@@ -18,7 +18,7 @@ def plane_overlaps(
     enlarged ones is the sum of the caps π d² (3R - d) / 3, d being how deep each lies behind it.
 
     So a plane at the gripper's surface gives s = 1 at every delay: with a fixed share of the enlarged gripper's
-    volume it would give a stiffness that grows from 0.07 to 1 as the enlargement grows from 7 to 60 mm
+    volume it would give a stiffness that grows from 0.05 to 0.69 as the enlargement grows from 7 to 60 mm
     (docs/architecture.md).
     """
     enlarged_m = radii_m + np.maximum(enlargement_m, _LEAST_ENLARGEMENT_M)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 MOVING_M_S = 0.01
 """A tool faster than this counts as moving."""
 _CONTACT_REST_S = 0.1
-"""A contact that comes back within this time is the same one: a sliding touch chatters."""
+"""A contact with an object that comes back within this time, on any part of the gripper, is the same one: a sliding
+touch chatters, and two fingers do not close at the same instant."""
 
 
 class RunFigures:
@@ -32,7 +33,7 @@ class RunFigures:
         self._r2 = RunningStatistics(seed)
         self._min_distance_m: float | None = None
         self._min_obstacle_distance_m: float | None = None
-        self._touched_s: dict[tuple[str, str], float] = {}
+        self._touched_s: dict[str, float] = {}
         self._contacts: dict[str, int] = {}
         self._obstacle_contacts = 0
         self._armed_s: float | None = None
@@ -55,11 +56,11 @@ class RunFigures:
         """What really happened, from the simulation: distances and contact onsets."""
         self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
         self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
-        for pair in truth.contacts:
-            if now_s - self._touched_s.get(pair, -np.inf) > _CONTACT_REST_S:
-                self._contacts[pair[1]] = self._contacts.get(pair[1], 0) + 1
-                self._obstacle_contacts += roles[pair[1]] is Role.OBSTACLE
-            self._touched_s[pair] = now_s
+        for name in {name for _, name in truth.contacts}:
+            if now_s - self._touched_s.get(name, -np.inf) > _CONTACT_REST_S:
+                self._contacts[name] = self._contacts.get(name, 0) + 1
+                self._obstacle_contacts += roles[name] is Role.OBSTACLE
+            self._touched_s[name] = now_s
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
         """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""

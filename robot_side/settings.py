@@ -105,9 +105,6 @@ class RobotSettings(RunOptions):
             raise ValueError(f"--spheres {self.spheres}: valid: 1 to 1000")
         _require("assumed_delay_s", self.assumed_delay_s, 0.001, 60.0)
         self.enlargement_settings()
-        if (self.model is None) != (self.site is None):
-            given, missing = ("--model", "--site") if self.site is None else ("--site", "--model")
-            raise ValueError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
 
     def enlargement_settings(self) -> EnlargementSettings:
         """What eq. 10 is computed from; ConfigurationError for a probability outside (0, 1)."""

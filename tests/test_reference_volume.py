@@ -6,11 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from robot_side.arm import MujocoArm, MujocoKinematics
+from robot_side.encoders import Encoder
 from robot_side.overlap import sphere_half_space
 from robot_side.overlapping import evaluate
 from robot_side.perceived_objects import PerceivedObjects
 from robot_side.proximity import candidate_pairs
 from robot_side.reference_volume import plane_overlaps
+from robot_side.scene import load_scene
 from robot_side.stiffness import StiffnessMap, StiffnessSettings
 from tests.gripper_poses import BOX_CENTERS_M, BOX_HALF_SIZES_M, cover_gripper
 from tests.perceived_scenes import Scene
@@ -174,3 +177,17 @@ def test_no_fineness_of_the_cover_feels_less_than_all_when_the_true_gripper_touc
     for enlargement_m in ENLARGEMENTS_M:
         felt = stiffness_towards_plane(cover.centers_m, cover.radii_m, enlargement_m, direction, surface_m)
         assert felt == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_figures_that_the_documents_give_for_a_fixed_share() -> None:
+    scene = load_scene()
+    pose = MujocoKinematics(scene).pose(MujocoArm(scene, Encoder()).state(0.0))
+    felt = []
+    for enlargement_m in (0.007, 0.03, 0.06):
+        enlarged_m = pose.sphere_radii_m + enlargement_m
+        enlargements = np.full(len(enlarged_m), enlargement_m)
+        [touching_m3] = plane_overlaps(
+            pose.sphere_centers_m, pose.sphere_radii_m, enlargements, pose.tool_rotation[None, :, 2]
+        )
+        felt.append(touching_m3 / (0.05 * 4.0 / 3.0 * math.pi * (enlarged_m**3).sum()))
+    assert felt == pytest.approx([0.05, 0.35, 0.69], abs=0.005)

@@ -7,6 +7,7 @@ import pytest
 
 from common.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
+from robot_side.assembly import build_robot_side
 from robot_side.perceived_objects import Role
 from robot_side.settings import CameraSettings, EncoderSettings, EnlargementOptions, RobotSettings
 
@@ -71,12 +72,16 @@ def test_the_ends_of_the_ranges_are_valid(kind: Callable[..., Any], values: dict
 
 def test_model_and_site_come_together() -> None:
     with pytest.raises(ValueError, match="--model is given without --site; valid: both, or neither"):
-        RobotSettings(model=Path("arm.xml"))
+        build_robot_side(RobotSettings(model=Path("arm.xml")), 1, "")
     with pytest.raises(ValueError, match="--site is given without --model; valid: both, or neither"):
-        RobotSettings(site="tool")
-    both = RobotSettings(model=Path("arm.xml"), site="tool")
+        build_robot_side(RobotSettings(site="tool"), 1, "")
+
+
+def test_one_of_them_may_stand_in_the_file_and_the_other_on_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text('model = "arm.xml"')
+    both = parse_settings(RobotSettings, "robot", ["--config", str(path), "--site", "tool"])
     assert (both.model, both.site) == (Path("arm.xml"), "tool")
-    assert RobotSettings().model is None
 
 
 def test_the_enlargement_knows_both_parts_of_the_cameras_error() -> None:
@@ -134,7 +139,6 @@ def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
         ("[enlargement]\nkinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
         ("[camera]\nsd_m = nan", "sd_m = nan"),
         ("[encoder]\nsigma_rad = 2.0", "sigma_rad = 2.0"),
-        ('model = "arm.xml"', "--site"),
         ("model = 3", "model"),
         ("spheres = 0", "--spheres 0"),
         ("spheres = 8.5", "spheres"),
@@ -157,8 +161,6 @@ def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["--model", "arm.xml"], "--site"),
-        (["--site", "tool"], "--model"),
         (["--encoder.sigma-rad", "-1"], "sigma_rad = -1"),
         (["--camera.frame-sd-m", "2"], "frame_sd_m = 2"),
         (["--assumed-delay-s", "0"], "assumed_delay_s = 0"),

@@ -118,6 +118,14 @@ def test_contacts_are_counted_by_object_and_those_with_obstacles_apart() -> None
     assert summary["task"]["obstacle_contacts"] == 2
 
 
+def test_two_fingers_that_close_on_an_object_are_one_contact() -> None:
+    figures = RunFigures()
+    figures.truth(truth(("left", "cup")), ROLES, 0.0)
+    figures.truth(truth(("left", "cup"), ("right", "cup")), ROLES, 0.05)
+    figures.truth(truth(("right", "cup")), ROLES, 0.1)
+    assert figures.summary()["contacts"] == 1
+
+
 def test_the_time_to_the_grasp_counts_from_the_first_arming() -> None:
     figures = RunFigures()
     for now_s, armed, held in ((1.0, False, False), (2.0, True, False), (3.0, False, False), (4.0, True, False)):
