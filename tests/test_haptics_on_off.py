@@ -1,4 +1,5 @@
 import csv
+import io
 from pathlib import Path
 
 import pytest
@@ -23,7 +24,7 @@ def outcome(seed: int, *, haptics: bool, grasp_s: float | None, contacts: int = 
 
 
 def printed(outcomes: list[Outcome]) -> str:
-    console = Console(width=200, record=True, quiet=True)
+    console = Console(width=200, record=True, file=io.StringIO())
     console.print(table(outcomes))
     return console.export_text()
 
