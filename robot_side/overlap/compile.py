@@ -33,6 +33,24 @@ def output_array(dimensions: int) -> Any:
     return numba.types.Array(numba.types.float64, dimensions, "C")
 
 
+def input_indices() -> Any:
+    """The Numba type of a C-contiguous int64 array (n,) that the kernel only reads."""
+    return numba.types.Array(numba.types.int64, 1, "C", readonly=True)
+
+
+def output_indices() -> Any:
+    """The Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
+    return numba.types.Array(numba.types.int64, 1, "C")
+
+
+NUMBER: Any = numba.types.float64
+"""The Numba type of a float."""
+TRUTH: Any = numba.types.boolean
+"""The Numba type of a bool."""
+COUNT: Any = numba.types.int64
+"""The Numba type of an int."""
+
+
 def inlined(function: _Function) -> _Function:
     """Compile `function` into whichever kernel calls it."""
     return cast(_Function, numba.njit(forceinline=True, **_OPTIONS)(function))
@@ -43,6 +61,14 @@ def building_block(function: _Function) -> _Function:
     return cast(_Function, numba.njit(**_OPTIONS)(function))
 
 
+_kernels: list["Compiled"] = []
+
+
+def imported_kernels() -> tuple["Compiled", ...]:
+    """The kernels of every module that has been imported so far."""
+    return tuple(_kernels)
+
+
 class Compiled:
     """A kernel with one signature, compiled (or loaded from the cache on disk) when it is first needed.
 
@@ -50,14 +76,16 @@ class Compiled:
     dimensions or layout raises TypeError instead of stalling a running tick.
     """
 
-    def __init__(self, function: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+    def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
+        self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         # Without any writable place for it (a read-only image, say) the kernel works uncached.
         with contextlib.suppress(RuntimeError):
             self._dispatcher._cache = cast(Any, _PackageCache)(function)
-        self._signature = numba.types.void(*arguments)
+        self._signature = (returns or numba.types.void)(*arguments)
         self.ready = False
         """Whether it is compiled, so that the next call takes no longer than any other."""
+        _kernels.append(self)
 
     def prepare(self) -> None:
         """Compile or load now."""
@@ -66,11 +94,11 @@ class Compiled:
             self._dispatcher.disable_compile()
             self.ready = True
 
-    def __call__(self, *arguments: Any) -> None:
+    def __call__(self, *arguments: Any) -> Any:
         """Run the kernel; TypeError for arrays that its signature does not name."""
         if not self.ready:
             self.prepare()
-        self._dispatcher(*arguments)
+        return self._dispatcher(*arguments)
 
     @property
     def cache_hits(self) -> int:
@@ -78,9 +106,12 @@ class Compiled:
         return sum(self._dispatcher.stats.cache_hits.values())
 
 
-def compiled(*arguments: Any) -> Callable[[Callable[..., None]], Compiled]:
-    """Make a function of these Numba argument types, which fills its output arrays, a `Compiled` kernel."""
-    return functools.partial(Compiled, arguments=arguments)
+def compiled(*arguments: Any, returns: Any = None) -> Callable[[Callable[..., Any]], Compiled]:
+    """Make a function of these Numba argument types a `Compiled` kernel.
+
+    It fills its output arrays, and returns a value of the type `returns` unless that is None.
+    """
+    return functools.partial(Compiled, arguments=arguments, returns=returns)
 
 
 @functools.cache
@@ -96,7 +127,8 @@ class _PackageCache(FunctionCache):
     """Numba's cache on disk, with the whole package in its key.
 
     Numba by itself looks only at the file of the kernel, and would go on running machine code with an old
-    version of a building block from another file.
+    version of a building block from another file. A kernel outside of this package therefore takes its building
+    blocks from here or from its own file.
     """
 
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:

@@ -12,7 +12,7 @@ from common.arrays import FloatArray
 from common.clock import MonotonicClock
 from robot_side.overlap.ball import sphere_overlap
 from robot_side.overlap.box import box_overlap
-from robot_side.overlap.compile import compiled, inlined, input_array, output_array
+from robot_side.overlap.compile import compiled, imported_kernels, inlined, input_array, output_array
 from robot_side.overlap.half_space import half_space_overlap
 from robot_side.overlap.solid import Overlap
 from robot_side.overlap.tetrahedron import tetrahedron_overlap
@@ -61,12 +61,14 @@ def tetrahedron_pairs(centers: FloatArray, radii: FloatArray, vertices: FloatArr
 
 
 def warm_up() -> float:
-    """Compile every kernel, or load it from the cache on disk, and run it once; how long that took (s).
+    """Compile every kernel of the imported modules, or load it from the cache on disk; how long that took (s).
 
-    Without it the first call for each kind of primitive does so, which takes up to seconds.
+    These run once, too. Without it the first call of each kernel does so, which takes up to seconds.
     """
     clock = MonotonicClock()
     start_s = clock.now()
+    for kernel in imported_kernels():
+        kernel.prepare()
     center, radius = np.zeros((1, 3)), np.ones(1)
     sphere_pairs(center, radius, center, radius)
     half_space_pairs(center, radius, np.array([[0.0, 0.0, 1.0]]), np.zeros(1))
