@@ -16,6 +16,7 @@ from robot_side.kinematic_error import (
     require_finite,
     scalar_variance,
 )
+from robot_side.overlap.compile import NUMBER, TRUTH, compiled, input_array, output_array
 
 _PER_AXIS_TO_LENGTH = math.sqrt(3.0)
 
@@ -34,6 +35,12 @@ def _non_negative(name: str, value: npt.ArrayLike) -> FloatArray:
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise ValueError(f"{name} = {values} is negative or not finite; valid: finite and at least 0")
     return values
+
+
+def _require_age(loop_age_s: float) -> None:
+    """ValueError when `loop_age_s` is negative or not finite."""
+    if not 0.0 <= loop_age_s < math.inf:
+        raise ValueError(f"loop_age_s = {loop_age_s} is negative or not finite; valid: finite and at least 0")
 
 
 @overload
@@ -79,10 +86,12 @@ def delay_displacement(velocities_m_s: FloatArray, loop_age_s: float) -> FloatAr
     caller that does not know it gives the configured worst case, never 0. ValueError for a negative or
     non-finite argument.
     """
-    require_finite("velocities_m_s", velocities_m_s)
-    age_s = _non_negative("loop_age_s", loop_age_s)
-    speed_m_s: FloatArray = np.sqrt(np.einsum("mi,mi->m", velocities_m_s, velocities_m_s))
-    return speed_m_s * age_s
+    _require_age(loop_age_s)
+    displacement_m: FloatArray = np.sqrt(np.einsum("mi,mi->m", velocities_m_s, velocities_m_s)) * loop_age_s
+    # A velocity that is not finite shows in its displacement.
+    if not np.isfinite(displacement_m).all():
+        require_finite("velocities_m_s", velocities_m_s)
+    return displacement_m
 
 
 def combined_mean(kinematic_mean_m: float, camera_mean_m: float) -> float:
@@ -156,14 +165,24 @@ class Enlargement:
         covariances (m, 3, 3) from `position_covariance`, not looked at in the mode `once`;
         velocities_m_s (m, 3) of the centres. With P >= 0.5 it is an upper bound of `distances_towards`.
         """
-        variance = (
-            scalar_variance(covariances, self.settings.measure)
-            if self._variance_once_m2 is None
-            else np.full(len(velocities_m_s), self._variance_once_m2)
-        )
-        sd = np.sqrt(combined_variance(variance, self.settings.camera_sd_m))
-        statistical = np.maximum(0.0, self._mean_m + self._z * sd)
-        return delay_displacement(velocities_m_s, loop_age_s) + statistical
+        _require_age(loop_age_s)
+        if self._variance_once_m2 is None:
+            variance_m2 = scalar_variance(covariances, self.settings.measure)
+        else:
+            variance_m2 = np.full(len(velocities_m_s), self._variance_once_m2)
+        distances_m = np.empty(len(velocities_m_s))
+        if not _distance_loop(
+            np.ascontiguousarray(velocities_m_s),
+            variance_m2,
+            loop_age_s,
+            self._mean_m,
+            self.settings.camera_sd_m,
+            self._z,
+            distances_m,
+        ):
+            require_finite("velocities_m_s", velocities_m_s)
+            require_finite("covariances", covariances)
+        return distances_m
 
     def distances_towards(
         self,
@@ -180,7 +199,7 @@ class Enlargement:
         is shorter than the perceived one by the sum of both errors' parts along û.
         """
         require_finite("velocities_m_s", velocities_m_s)
-        age_s = _non_negative("loop_age_s", loop_age_s)
+        _require_age(loop_age_s)
         variance = (
             directional_variance(covariances, directions)
             if self._variance_once_m2 is None
@@ -190,4 +209,27 @@ class Enlargement:
         statistical = np.maximum(0.0, directions @ self._mean_vector_m + self._z * sd)
         velocities = velocities_m_s if directions.ndim == 2 else velocities_m_s[:, None, :]
         closing_m_s: FloatArray = np.einsum("...i,...i->...", velocities, directions)
-        return np.maximum(0.0, closing_m_s) * age_s + statistical
+        return np.maximum(0.0, closing_m_s) * loop_age_s + statistical
+
+
+@compiled(input_array(2), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, output_array(1), returns=TRUTH)
+def _distance_loop(
+    velocities: FloatArray,
+    variances: FloatArray,
+    loop_age: float,
+    mean: float,
+    camera_sd: float,
+    z: float,
+    distances: FloatArray,
+) -> bool:
+    """`enlargement_distance` with `delay_displacement` and `combined_variance` for each sphere; whether all is finite.
+
+    z: Φ⁻¹(P; 0, 1).
+    """
+    finite = True
+    for sphere in range(variances.size):
+        quantile = mean + z * math.sqrt(variances[sphere] + camera_sd * camera_sd)
+        speed = math.sqrt(velocities[sphere, 0] ** 2 + velocities[sphere, 1] ** 2 + velocities[sphere, 2] ** 2)
+        distances[sphere] = speed * loop_age + max(quantile, 0.0)
+        finite &= math.isfinite(speed * loop_age + quantile)
+    return finite

@@ -6,11 +6,17 @@ from typing import Literal
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.overlap.compile import TRUTH, compiled, inlined, input_array, output_array
 
 VarianceMeasure = Literal["isotropic", "trace"]
 """How a covariance becomes one variance: its largest eigenvalue, or the paper's sum over the axes."""
 
 _UNIT_TOLERANCE = 1e-6
+
+_NEGLIGIBLE = 1e-17
+"""Share of the trace below which what lies off the diagonal changes no digit of the largest eigenvalue."""
+_MOST_SWEEPS = 20
+"""Jacobi's method converges quadratically: five sweeps are usual."""
 
 
 def require_finite(name: str, values: FloatArray) -> None:
@@ -49,12 +55,32 @@ def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) ->
             f"encoder_sigma_rad has the shape {encoder_sigma_rad.shape}; valid: {jacobians.shape[2:]},"
             " one value for each joint of jacobians"
         )
-    require_finite("jacobians", jacobians)
-    require_finite("encoder_sigma_rad", encoder_sigma_rad)
-    if (encoder_sigma_rad < 0.0).any():
+    covariances = np.empty((len(jacobians), 3, 3))
+    if not _covariance_loop(np.ascontiguousarray(jacobians), np.ascontiguousarray(encoder_sigma_rad), covariances):
+        require_finite("jacobians", jacobians)
+        require_finite("encoder_sigma_rad", encoder_sigma_rad)
         raise ValueError(f"encoder_sigma_rad = {encoder_sigma_rad.min()} is negative; valid: 0 or more")
-    scaled = jacobians * encoder_sigma_rad
-    return scaled @ scaled.swapaxes(1, 2)
+    return covariances
+
+
+@compiled(input_array(3), input_array(1), output_array(3), returns=TRUTH)
+def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: FloatArray) -> bool:
+    """Σ_ee of each point, and whether every argument is finite and no deviation negative."""
+    valid = True
+    for joint in range(sigma.size):
+        valid &= 0.0 <= sigma[joint] < math.inf
+    for point in range(jacobians.shape[0]):
+        for row in range(3):
+            for joint in range(sigma.size):
+                valid &= math.isfinite(jacobians[point, row, joint])
+            for column in range(row + 1):
+                covariance = 0.0
+                for joint in range(sigma.size):
+                    variance = sigma[joint] * sigma[joint]
+                    covariance += jacobians[point, row, joint] * variance * jacobians[point, column, joint]
+                covariances[point, row, column] = covariance
+                covariances[point, column, row] = covariance
+    return valid
 
 
 def scalar_variance(covariances: FloatArray, measure: VarianceMeasure = "isotropic") -> FloatArray:
@@ -67,10 +93,47 @@ def scalar_variance(covariances: FloatArray, measure: VarianceMeasure = "isotrop
         total: FloatArray = np.trace(covariances, axis1=-2, axis2=-1)
         return total
     if measure == "isotropic":
-        # A singular covariance (n < 3 joints) may have a largest eigenvalue of -1e-20 where it has 0.
-        largest: FloatArray = np.maximum(np.linalg.eigvalsh(covariances)[..., -1], 0.0)
+        largest: FloatArray = np.empty(covariances.shape[:-2])
+        _largest_eigenvalue_loop(np.ascontiguousarray(covariances).reshape(-1, 3, 3), largest.reshape(-1))
         return largest
     raise ValueError(f"measure = {measure!r} is unknown; valid: 'isotropic', 'trace'")
+
+
+@inlined
+def _rotated(pp: float, qq: float, pq: float, rp: float, rq: float) -> tuple[float, float, float, float]:
+    """The entries pp, qq, rp and rq of a symmetric matrix after the rotation that makes its entry pq 0."""
+    if pq == 0.0:
+        return pp, qq, rp, rq
+    ratio = (qq - pp) / (2.0 * pq)
+    # The smaller of the two angles, so that the iteration converges.
+    tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
+    cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
+    sine = tangent * cosine
+    return pp - tangent * pq, qq + tangent * pq, cosine * rp - sine * rq, sine * rp + cosine * rq
+
+
+@compiled(input_array(3), output_array(1))
+def _largest_eigenvalue_loop(matrices: FloatArray, largest: FloatArray) -> None:
+    """The largest eigenvalue of each symmetric matrix (k, 3, 3), or 0 where all are negative, by Jacobi's method.
+
+    Golub and Van Loan, Matrix Computations, section 8.5. A singular covariance (n < 3 joints) may have -1e-20
+    where it has 0. NaN for a matrix that is not finite.
+    """
+    for k in range(largest.size):
+        xx, yy, zz = matrices[k, 0, 0], matrices[k, 1, 1], matrices[k, 2, 2]
+        xy, xz, yz = matrices[k, 1, 0], matrices[k, 2, 0], matrices[k, 2, 1]
+        trace = abs(xx) + abs(yy) + abs(zz)
+        if not math.isfinite(trace + abs(xy) + abs(xz) + abs(yz)):
+            largest[k] = math.nan
+            continue
+        for _ in range(_MOST_SWEEPS):
+            if abs(xy) + abs(xz) + abs(yz) <= _NEGLIGIBLE * trace:
+                break
+            xx, yy, xz, yz = _rotated(xx, yy, xy, xz, yz)
+            xx, zz, xy, yz = _rotated(xx, zz, xz, 0.0, yz)
+            yy, zz, xy, xz = _rotated(yy, zz, yz, xy, 0.0)
+            yz = 0.0
+        largest[k] = max(xx, yy, zz, 0.0)
 
 
 def directional_variance(covariances: FloatArray, directions: FloatArray) -> FloatArray:

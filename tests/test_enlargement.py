@@ -186,3 +186,16 @@ def test_retreat_needs_no_delay_displacement_towards_the_object() -> None:
 def test_bad_settings_are_named(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(bad))):
         EnlargementSettings(**bad)
+
+
+def test_a_velocity_or_covariance_that_is_not_finite_is_no_distance() -> None:
+    enlargement = Enlargement(EnlargementSettings())
+    covariances, still = _covariances(3), np.zeros((4, 3))
+    for bad in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="velocities_m_s"):
+            enlargement.distances(covariances, np.full((4, 3), bad), 0.1)
+        with pytest.raises(ValueError, match="covariances"):
+            enlargement.distances(np.full((4, 3, 3), bad), still, 0.1)
+    for age in (-0.1, math.nan, math.inf):
+        with pytest.raises(ValueError, match="loop_age_s"):
+            enlargement.distances(covariances, still, age)
