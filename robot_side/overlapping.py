@@ -3,19 +3,19 @@
     pairs = candidate_pairs(centers_m, enlarged_radii_m, objects)
     nearest = nearest_surfaces(centers_m, objects, pairs)
     pair_radii_m, binding = radii_for_role(radii_m, enlargement_m[pairs.sphere_index], pairs, objects.roles, gap_m)
+    pairs, nearest, pair_radii_m = touching_pairs(pairs, nearest, pair_radii_m)
     overlaps = evaluate(centers_m, pair_radii_m, objects, pairs, nearest)
 
 `candidate_pairs` has checked the centres and the objects, so the kernels are called without checking again.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side import nearest_point
+from robot_side import nearest_kernels
 from robot_side.overlap import kernels
 from robot_side.perceived_objects import PerceivedObjects, Role
 from robot_side.proximity import CandidatePairs
@@ -60,20 +60,50 @@ class Overlaps:
         return len(self.sphere_index)
 
 
+_NO_ROWS = np.empty(0, dtype=np.int64)
+_NO_NUMBERS: FloatArray = np.empty(0)
+_NO_VECTORS: FloatArray = np.empty((0, 3))
+_NO_OVERLAPS = Overlaps(
+    _NO_ROWS,
+    _NO_ROWS,
+    _NO_NUMBERS,
+    _NO_NUMBERS,
+    _NO_VECTORS,
+    _NO_NUMBERS,
+    _NO_VECTORS,
+    _NO_VECTORS,
+    np.empty(0, dtype=np.bool_),
+)
+
+
 def nearest_surfaces(centers_m: FloatArray, objects: PerceivedObjects, pairs: CandidatePairs) -> NearestSurfaces:
     """Distance and direction from the sphere centres (m, 3) to the primitives of `pairs`."""
-    points = centers_m[pairs.sphere_index]
-    distance = np.empty(len(pairs))
-    direction = np.empty((len(pairs), 3))
-    deepening = np.empty((len(pairs), 3))
-    for kind in _kinds_present(objects, pairs):
-        part = kind.part
-        distance[part], direction[part] = kind.nearest(points[part], *kind.primitives)
-        deepening[part] = direction[part]
-        inside = part.start + np.flatnonzero(distance[part] < 0.0)
-        if kind.deepening is not None and len(inside) > 0:
-            primitives = (array[inside - part.start] for array in kind.primitives)
-            deepening[inside] = kind.deepening(points[inside], *primitives)
+    count, centers_m = len(pairs), np.ascontiguousarray(centers_m)
+    distance, direction, deepening = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
+    for part, kernel, primitives in (
+        (pairs.spheres, nearest_kernels.sphere_pairs, (objects.sphere_centers_m, objects.sphere_radii_m)),
+        (
+            pairs.boxes,
+            nearest_kernels.box_pairs,
+            (objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m),
+        ),
+        (pairs.tetrahedra, nearest_kernels.tetrahedron_pairs, (objects.tetrahedron_vertices_m,)),
+        (
+            pairs.half_spaces,
+            nearest_kernels.half_space_pairs,
+            (objects.half_space_normals, objects.half_space_offsets_m),
+        ),
+    ):
+        if part.start < part.stop:
+            kernel(
+                centers_m,
+                *primitives,
+                pairs.sphere_index[part],
+                pairs.primitive_index[part],
+                distance[part],
+                direction[part],
+                deepening[part],
+            )
     return NearestSurfaces(distance, direction, deepening)
 
 
@@ -96,11 +126,14 @@ def radii_for_role(
         return radii_m[pairs.sphere_index] + enlargement_m, 0
     if not 0.0 <= gap_m < np.inf:
         raise ValueError(f"gap_m = {gap_m} is negative or not finite; valid: 0 or more, or None without a gripper")
+    too_large = enlargement_m > 0.5 * gap_m
+    if not too_large.any():
+        return radii_m.take(pairs.sphere_index) + enlargement_m, 0
     limited = np.array([roles[index] is Role.TARGET for index in pairs.object_index.tolist()], dtype=np.bool_)
     if between_fingers is not None:
         limited |= between_fingers
-    binding = limited & (enlargement_m > 0.5 * gap_m)
-    return radii_m[pairs.sphere_index] + np.where(binding, 0.5 * gap_m, enlargement_m), int(binding.sum())
+    binding = limited & too_large
+    return radii_m.take(pairs.sphere_index) + np.where(binding, 0.5 * gap_m, enlargement_m), int(binding.sum())
 
 
 def evaluate(
@@ -117,14 +150,23 @@ def evaluate(
     """
     if pair_radii_m.shape != (len(pairs),):
         raise ValueError(f"pair_radii_m has the shape {pair_radii_m.shape}; valid: ({len(pairs)},), one a pair")
+    if len(pairs) == 0:
+        return _NO_OVERLAPS
     if nearest is None:
         nearest = nearest_surfaces(centers_m, objects, pairs)
-    points = centers_m[pairs.sphere_index]
     volume = np.empty(len(pairs))
     gradient = np.empty((len(pairs), 3))
-    for kind in _kinds_present(objects, pairs):
-        part = kind.part
-        volume[part], gradient[part], _ = kind.overlap(points[part], pair_radii_m[part], *kind.primitives)
+    points = centers_m.take(pairs.sphere_index, axis=0)
+    for part, kernel, primitives in (
+        (pairs.spheres, kernels.sphere_pairs, (objects.sphere_centers_m, objects.sphere_radii_m)),
+        (pairs.boxes, kernels.box_pairs, (objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m)),
+        (pairs.tetrahedra, kernels.tetrahedron_pairs, (objects.tetrahedron_vertices_m,)),
+        (pairs.half_spaces, kernels.half_space_pairs, (objects.half_space_normals, objects.half_space_offsets_m)),
+    ):
+        if part.start < part.stop:
+            rows = pairs.primitive_index[part]
+            of_pairs = (array.take(rows, axis=0) for array in primitives)
+            volume[part], gradient[part], _ = kernel(points[part], pair_radii_m[part], *of_pairs)
     return Overlaps(
         pairs.sphere_index,
         pairs.object_index,
@@ -142,7 +184,7 @@ def select(overlaps: Overlaps, rows: IntArray) -> Overlaps:
     """The `rows` (q,) of `overlaps`, in rising order."""
     if len(rows) == len(overlaps):
         return overlaps
-    return Overlaps(*(values[rows] for values in vars(overlaps).values()))
+    return Overlaps(*(values.take(rows, axis=0) for values in vars(overlaps).values()))
 
 
 def by_object(overlaps: Overlaps) -> Overlaps:
@@ -155,10 +197,10 @@ def by_object(overlaps: Overlaps) -> Overlaps:
     """
     if len(overlaps) == 0:
         return overlaps
-    key = overlaps.sphere_index * (int(overlaps.object_index.max()) + 1) + overlaps.object_index
     # For the few pairs there are, a set finds out several times faster than a sort.
-    if len(set(key.tolist())) == len(key):
+    if len(set(zip(overlaps.sphere_index.tolist(), overlaps.object_index.tolist(), strict=True))) == len(overlaps):
         return overlaps
+    key = overlaps.sphere_index * (int(overlaps.object_index.max()) + 1) + overlaps.object_index
     order = np.lexsort((overlaps.signed_distance_m, key))
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
     nearest = order[starts]
@@ -176,53 +218,3 @@ def by_object(overlaps: Overlaps) -> Overlaps:
         np.where(touched, weighted / np.where(touched, volume[:, None], 1.0), overlaps.deepening[nearest]),
         overlaps.centre_inside[nearest],
     )
-
-
-class _Kind(NamedTuple):
-    """The pairs with one kind of primitive, and what is to be called with them."""
-
-    part: slice
-    primitives: tuple[FloatArray, ...]
-    nearest: Callable[..., tuple[FloatArray, FloatArray]]
-    deepening: Callable[..., FloatArray] | None
-    overlap: Callable[..., kernels.Overlaps]
-
-
-def _kinds_present(objects: PerceivedObjects, pairs: CandidatePairs) -> Iterator[_Kind]:
-    """The kinds of which there are pairs, with the primitive of each pair."""
-    if pairs.spheres.start < pairs.spheres.stop:
-        rows = pairs.primitive_index[pairs.spheres]
-        yield _Kind(
-            pairs.spheres,
-            (objects.sphere_centers_m[rows], objects.sphere_radii_m[rows]),
-            nearest_point.nearest_on_sphere,
-            nearest_point.sphere_deepening,
-            kernels.sphere_pairs,
-        )
-    if pairs.boxes.start < pairs.boxes.stop:
-        rows = pairs.primitive_index[pairs.boxes]
-        yield _Kind(
-            pairs.boxes,
-            (objects.box_centers_m[rows], objects.box_rotations[rows], objects.box_half_sizes_m[rows]),
-            nearest_point.nearest_on_box,
-            nearest_point.box_deepening,
-            kernels.box_pairs,
-        )
-    if pairs.tetrahedra.start < pairs.tetrahedra.stop:
-        rows = pairs.primitive_index[pairs.tetrahedra]
-        yield _Kind(
-            pairs.tetrahedra,
-            (objects.tetrahedron_vertices_m[rows],),
-            nearest_point.nearest_on_tetrahedron,
-            nearest_point.tetrahedron_deepening,
-            kernels.tetrahedron_pairs,
-        )
-    if pairs.half_spaces.start < pairs.half_spaces.stop:
-        rows = pairs.primitive_index[pairs.half_spaces]
-        yield _Kind(
-            pairs.half_spaces,
-            (objects.half_space_normals[rows], objects.half_space_offsets_m[rows]),
-            nearest_point.nearest_on_half_space,
-            None,
-            kernels.half_space_pairs,
-        )
