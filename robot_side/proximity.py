@@ -1,10 +1,11 @@
 """Which gripper spheres and perceived primitives can touch at all (the broad phase of eq. 11-12).
 
 Everything is compared by its bounding sphere: first the whole gripper with every primitive, then each of its
-spheres with the primitives that are left. What depends on the objects alone is worked out once for each
-frame of the camera.
+spheres with the primitives that are left. What depends on the objects alone is worked out, and checked, once
+for each frame of the camera.
 """
 
+import math
 import weakref
 from dataclasses import dataclass
 
@@ -12,12 +13,17 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.kinematic_error import require_finite
+from robot_side.overlap.compile import COUNT, compiled, inlined, input_array, input_indices, output_indices
+from robot_side.overlap.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.perceived_objects import PerceivedObjects
 
 _REACH = 1.0 + 1e-9
 """Radii are enlarged by this for the comparison, so that rounding never culls a pair that touches."""
 
 _UNIT_TOLERANCE = 1e-6
+
+_USUAL_PAIRS = 256
+"""Room for so many pairs is made at first; where there are more, they are counted and found again."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,8 @@ class _Bounds:
     centers_m: FloatArray
     radii_m: FloatArray
     object_index: IntArray
-    counts: tuple[int, int, int]
+    ends: IntArray
+    """(3,) where each kind's rows end"""
 
 
 _bounds: dict[int, tuple[weakref.ref[PerceivedObjects], _Bounds]] = {}
@@ -69,53 +76,138 @@ def candidate_pairs(centers_m: FloatArray, radii_m: FloatArray, objects: Perceiv
         raise ValueError(
             f"centers_m and radii_m have the shapes {centers_m.shape} and {radii_m.shape}; valid: (m, 3) and (m,)"
         )
-    require_finite("centers_m", centers_m)
-    require_finite("radii_m", radii_m)
-    if (radii_m < 0.0).any():
-        raise ValueError(f"radii_m = {radii_m.min()} is negative; valid: 0 or more")
     bounds = _bounds_of(objects)
-    sphere, bounded = _touching(centers_m, radii_m, bounds)
-    splits = np.cumsum(bounds.counts)
-    first_box, first_tetrahedron = np.searchsorted(bounded, splits[:2])
-    plane_sphere, plane = _near_half_spaces(centers_m, radii_m, objects)
-    kind = np.searchsorted(splits, bounded, side="right")
-    kept, bounded_kept = len(bounded) + len(plane), len(bounded)
+    room = max(_USUAL_PAIRS, len(radii_m))
+    while True:
+        sphere_index, primitive_index, object_index = np.empty((3, room), dtype=np.int64)
+        ends = np.zeros(3, dtype=np.int64)
+        count = _find_pairs(
+            np.ascontiguousarray(centers_m),
+            np.ascontiguousarray(radii_m),
+            bounds.centers_m,
+            bounds.radii_m,
+            bounds.object_index,
+            bounds.ends,
+            objects.half_space_normals,
+            objects.half_space_offsets_m,
+            objects.half_space_object,
+            sphere_index,
+            primitive_index,
+            object_index,
+            ends,
+        )
+        if count < 0:
+            _refuse(centers_m, radii_m)
+        if count <= room:
+            break
+        room = count
+    first_box, first_tetrahedron, first_half_space = ends.tolist()
     return CandidatePairs(
-        np.concatenate([sphere, plane_sphere]),
-        np.concatenate([bounded - (splits - bounds.counts)[kind], plane]),
-        np.concatenate([bounds.object_index[bounded], objects.half_space_object[plane]]),
-        slice(0, int(first_box)),
-        slice(int(first_box), int(first_tetrahedron)),
-        slice(int(first_tetrahedron), bounded_kept),
-        slice(bounded_kept, kept),
-        len(centers_m) * (len(bounds.radii_m) + len(objects.half_space_offsets_m)) - kept,
+        sphere_index[:count],
+        primitive_index[:count],
+        object_index[:count],
+        slice(0, first_box),
+        slice(first_box, first_tetrahedron),
+        slice(first_tetrahedron, first_half_space),
+        slice(first_half_space, count),
+        len(radii_m) * (len(bounds.radii_m) + len(objects.half_space_offsets_m)) - count,
     )
 
 
-def _touching(centers_m: FloatArray, radii_m: FloatArray, bounds: _Bounds) -> tuple[IntArray, IntArray]:
-    """Indices of gripper spheres and bounded primitives that touch, ordered by primitive."""
-    none = np.empty(0, dtype=np.int64)
-    if len(centers_m) == 0 or len(bounds.radii_m) == 0:
-        return none, none
-    middle = centers_m.mean(axis=0)
-    reach = float((np.sqrt(_squared(centers_m - middle)) + radii_m).max())
-    near = np.flatnonzero(_squared(bounds.centers_m - middle) <= ((bounds.radii_m + reach) * _REACH) ** 2)
-    if len(near) == 0:
-        return none, none
-    squared = _squared(bounds.centers_m[near, None, :] - centers_m)
-    row, sphere = np.nonzero(squared <= ((bounds.radii_m[near, None] + radii_m) * _REACH) ** 2)
-    return sphere, near[row]
+def _refuse(centers_m: FloatArray, radii_m: FloatArray) -> None:
+    """Raise the ValueError that names what is wrong with the gripper's spheres."""
+    require_finite("centers_m", centers_m)
+    require_finite("radii_m", radii_m)
+    raise ValueError(f"radii_m = {radii_m.min()} is negative; valid: 0 or more")
 
 
-def _near_half_spaces(
-    centers_m: FloatArray, radii_m: FloatArray, objects: PerceivedObjects
-) -> tuple[IntArray, IntArray]:
-    """Indices of gripper spheres and half-spaces that touch, ordered by half-space."""
-    if len(objects.half_space_offsets_m) == 0:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    heights = objects.half_space_normals @ centers_m.T - objects.half_space_offsets_m[:, None]
-    plane, sphere = np.nonzero(heights <= radii_m * _REACH)
-    return sphere, plane
+@inlined
+def _note(sphere: int, primitive: int, thing: int, pair: int, found: tuple[IntArray, IntArray, IntArray]) -> None:
+    """Write one pair, if there is room for it."""
+    sphere_index, primitive_index, object_index = found
+    if pair < sphere_index.size:
+        sphere_index[pair] = sphere
+        primitive_index[pair] = primitive
+        object_index[pair] = thing
+
+
+@inlined
+def _middle(centers: FloatArray) -> Vector:
+    x = y = z = 0.0
+    for sphere in range(centers.shape[0]):
+        x, y, z = add((x, y, z), load(centers, sphere))
+    return scale(1.0 / max(centers.shape[0], 1), (x, y, z))
+
+
+@inlined
+def _apart(a: Vector, b: Vector) -> float:
+    """The squared distance between two points."""
+    offset = subtract(a, b)
+    return dot(offset, offset)
+
+
+@inlined
+def _are_spheres(centers: FloatArray, radii: FloatArray) -> bool:
+    """Whether all is finite and no radius negative."""
+    valid = True
+    for sphere in range(radii.size):
+        valid &= 0.0 <= radii[sphere] < math.inf
+        for axis in range(3):
+            valid &= math.isfinite(centers[sphere, axis])
+    return valid
+
+
+@compiled(
+    *(input_array(2), input_array(1)),
+    *(input_array(2), input_array(1), input_indices(), input_indices()),
+    *(input_array(2), input_array(1), input_indices()),
+    *(output_indices(), output_indices(), output_indices(), output_indices()),
+    returns=COUNT,
+)
+def _find_pairs(
+    centers: FloatArray,
+    radii: FloatArray,
+    bound_centers: FloatArray,
+    bound_radii: FloatArray,
+    bound_object: IntArray,
+    bound_ends: IntArray,
+    normals: FloatArray,
+    offsets: FloatArray,
+    half_space_object: IntArray,
+    sphere_index: IntArray,
+    primitive_index: IntArray,
+    object_index: IntArray,
+    ends: IntArray,
+) -> int:
+    """Write the pairs that touch by kind, primitive and sphere, and in `ends` (3,) where each bounded kind's end.
+
+    The number of pairs; those for which there is no room are only counted. -1 for spheres that cannot be.
+    """
+    if not _are_spheres(centers, radii):
+        return -1
+    found = sphere_index, primitive_index, object_index
+    middle = _middle(centers)
+    reach = 0.0
+    for sphere in range(radii.size):
+        reach = max(reach, math.sqrt(_apart(load(centers, sphere), middle)) + radii[sphere])
+    count = 0
+    for kind in range(3):
+        first = 0 if kind == 0 else bound_ends[kind - 1]
+        for bound in range(first, bound_ends[kind]):
+            center = load(bound_centers, bound)
+            if _apart(center, middle) > ((bound_radii[bound] + reach) * _REACH) ** 2:
+                continue
+            for sphere in range(radii.size):
+                if _apart(center, load(centers, sphere)) <= ((bound_radii[bound] + radii[sphere]) * _REACH) ** 2:
+                    _note(sphere, bound - first, bound_object[bound], count, found)
+                    count += 1
+        ends[kind] = count
+    for plane in range(offsets.size):
+        for sphere in range(radii.size):
+            if dot(load(normals, plane), load(centers, sphere)) - offsets[plane] <= radii[sphere] * _REACH:
+                _note(sphere, plane, half_space_object[plane], count, found)
+                count += 1
+    return count
 
 
 def _bounds_of(objects: PerceivedObjects) -> _Bounds:
@@ -137,7 +229,7 @@ def _bounds_of(objects: PerceivedObjects) -> _Bounds:
         np.concatenate([objects.sphere_centers_m, objects.box_centers_m, middles]),
         np.concatenate(radii),
         np.concatenate([objects.sphere_object, objects.box_object, objects.tetrahedron_object]),
-        (len(radii[0]), len(radii[1]), len(radii[2])),
+        np.cumsum([len(part) for part in radii]),
     )
     _bounds[key] = weakref.ref(objects, lambda _: _bounds.pop(key, None)), bounds
     return bounds
@@ -146,7 +238,14 @@ def _bounds_of(objects: PerceivedObjects) -> _Bounds:
 def _require_valid(objects: PerceivedObjects) -> None:
     """Raise a ValueError that names the field of `objects` that no primitive can have."""
     for name, value in vars(objects).items():
-        if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        if not isinstance(value, np.ndarray):
+            continue
+        kind = "int64" if name.endswith("_object") else "float64"
+        if value.dtype != kind or not value.flags.c_contiguous:
+            raise ValueError(
+                f"objects.{name} holds {value.dtype} in steps of {value.strides}; valid: contiguous {kind}"
+            )
+        if kind == "float64":
             require_finite(f"objects.{name}", value)
     for name, value in (
         ("sphere_radii_m", objects.sphere_radii_m),
