@@ -5,16 +5,21 @@ object that the enlarged sphere has swallowed, for a plate through the sphere's 
 inside something. There the nearest point of the surface takes its place.
 """
 
+import math
+
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.overlap.compile import NUMBER, compiled, inlined, input_array, output_array
+from robot_side.overlap.vectors import Vector, add, dot, load, norm, scale
 from robot_side.overlapping import Overlaps
 
 
 def trust(overlaps: Overlaps, threshold: float) -> FloatArray:
     """Weight (p,) of the gradient as the direction: |∇V| / (threshold πR²), at most 1. Radii above 0."""
-    limit: FloatArray = np.minimum(1.0, _relative_steepness(overlaps) / threshold)
-    return limit
+    result = np.empty(len(overlaps))
+    _trust_loop(overlaps.gradient_m2, overlaps.radius_m, float(threshold), result)
+    return result
 
 
 def alignments(
@@ -36,34 +41,85 @@ def alignments(
     continuous in the centre, but at edges and corners that the centre itself meets. A motion that does not move
     the sphere has a = 0.
     """
-    steepness = _relative_steepness(overlaps)
-    length = steepness * np.pi * overlaps.radius_m**2
-    unit_gradient = overlaps.gradient_m2 / np.where(length > 0.0, length, 1.0)[:, None]
-    aligned = gradient_trust * np.maximum(0.0, _along(directions, unit_gradient))
-    if (gradient_trust < 1.0).any():
-        aligned += (1.0 - gradient_trust) * np.maximum(0.0, _along(directions, overlaps.nearest_direction))
-    margin_m = inside_margin * overlaps.radius_m
-    rows = np.flatnonzero(overlaps.signed_distance_m < margin_m)
-    if len(rows) > 0:
-        inside_share = np.minimum(1.0, 1.0 - overlaps.signed_distance_m[rows] / margin_m[rows])
-        # The gradients of overlapping primitives of one object may add up to more than the disc.
-        of_gradient = np.minimum(1.0, steepness[rows])[:, None]
-        inward = of_gradient * unit_gradient[rows] + (1.0 - of_gradient) * overlaps.deepening[rows]
-        moving = directions[:, rows].any(axis=2)
-        reduction = np.clip(-_along(directions[:, rows], inward), 0.0, 1.0)
-        aligned[:, rows] += inside_share * (np.where(moving, 1.0 - reduction, 0.0) - aligned[:, rows])
-    result: FloatArray = np.minimum(1.0, aligned)
+    result = np.empty(directions.shape[:2])
+    _alignment_loop(
+        overlaps.gradient_m2,
+        overlaps.radius_m,
+        overlaps.signed_distance_m,
+        overlaps.nearest_direction,
+        overlaps.deepening,
+        np.ascontiguousarray(directions),
+        gradient_trust,
+        float(inside_margin),
+        result,
+    )
     return result
 
 
-def _relative_steepness(overlaps: Overlaps) -> FloatArray:
-    """|∇V| / πR² (p,): at most 1 for one primitive, whose greatest gradient is the disc through the centre."""
-    gradient = overlaps.gradient_m2
-    steepness: FloatArray = np.sqrt(np.einsum("pi,pi->p", gradient, gradient)) / (np.pi * overlaps.radius_m**2)
-    return steepness
+@inlined
+def _steepness(gradient: Vector, radius: float) -> float:
+    """|∇V| / πR²: at most 1 for one primitive, whose greatest gradient is the disc through the centre."""
+    return norm(gradient) / (math.pi * radius * radius)
 
 
-def _along(directions: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Dot products (k, p) of directions (k, p, 3) with vectors (p, 3)."""
-    result: FloatArray = np.einsum("kpi,pi->kp", directions, vectors)
-    return result
+@compiled(input_array(2), input_array(1), NUMBER, output_array(1))
+def _trust_loop(gradients: FloatArray, radii: FloatArray, threshold: float, result: FloatArray) -> None:
+    for pair in range(radii.size):
+        result[pair] = min(_steepness(load(gradients, pair), radii[pair]) / threshold, 1.0)
+
+
+@inlined
+def _outside(gradient: Vector, weight: float, nearest: Vector, motion: Vector) -> float:
+    """The alignment while the centre is outside; `gradient` is a unit vector, or zero."""
+    return weight * max(dot(gradient, motion), 0.0) + (1.0 - weight) * max(dot(nearest, motion), 0.0)
+
+
+@inlined
+def _inside(gradient: Vector, weight: float, deepening: Vector, motion: Vector) -> float:
+    """The alignment while the centre is inside; `weight` is v."""
+    if dot(motion, motion) == 0.0:
+        return 0.0
+    inward = add(scale(weight, gradient), scale(1.0 - weight, deepening))
+    return 1.0 - min(max(-dot(inward, motion), 0.0), 1.0)
+
+
+@compiled(
+    input_array(2),
+    input_array(1),
+    input_array(1),
+    input_array(2),
+    input_array(2),
+    input_array(3),
+    input_array(1),
+    NUMBER,
+    output_array(2),
+)
+def _alignment_loop(
+    gradients: FloatArray,
+    radii: FloatArray,
+    distances: FloatArray,
+    nearest: FloatArray,
+    deepening: FloatArray,
+    directions: FloatArray,
+    gradient_trust: FloatArray,
+    inside_margin: float,
+    result: FloatArray,
+) -> None:
+    for pair in range(radii.size):
+        gradient = load(gradients, pair)
+        steepness = _steepness(gradient, radii[pair])
+        length = norm(gradient)
+        unit_gradient = scale(1.0 / length, gradient) if length > 0.0 else gradient
+        margin = inside_margin * radii[pair]
+        inside_share = min(max(1.0 - distances[pair] / margin, 0.0), 1.0)
+        for k in range(directions.shape[0]):
+            motion = load(directions[k], pair)
+            aligned = 0.0
+            if inside_share < 1.0:
+                outside = _outside(unit_gradient, gradient_trust[pair], load(nearest, pair), motion)
+                aligned += (1.0 - inside_share) * outside
+            if inside_share > 0.0:
+                # The gradients of overlapping primitives of one object may add up to more than the disc.
+                inside = _inside(unit_gradient, min(steepness, 1.0), load(deepening, pair), motion)
+                aligned += inside_share * inside
+            result[k, pair] = min(aligned, 1.0)

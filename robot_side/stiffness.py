@@ -5,26 +5,29 @@ reference volume: s_k = clip(Σ_ij V_ij a_ijk / V_ref, 0, 1), V_ref = f Σ_i V_i
 `alignments`. Roles bend that sum: the target's part is capped, a support counts beyond its value at arming.
 """
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray, IntArray
+from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.alignment import alignments, trust
+from robot_side.object_shares import Shares, object_shares
+from robot_side.overlap.compile import TRUTH, compiled, input_array
 from robot_side.overlapping import Overlaps, by_object, select
 from robot_side.perceived_objects import Role
 
 _TRIGGERS = ("l2", "r2")
 _UNIT_TOLERANCE = 1e-6
-_SMALLEST = 1e-300
-"""Stands for 0 in a divisor, where the quotient is limited."""
 
-_Felt = tuple[IntArray, FloatArray, FloatArray, bool, int]
-"""Objects (a,), their shares (a, 3), what the detent adds (2,), whether the target was capped, pairs blended."""
-_NOTHING: _Felt = np.empty(0, dtype=np.int64), np.empty((0, 3)), np.zeros(2), False, 0
+_Channels = tuple[float, ...]
+"""One value each for l2, r2 and rumble."""
+_Felt = tuple[dict[int, Shares], _Channels, bool, int]
+"""The objects' shares, what the detent adds, whether the target was capped, pairs blended."""
+_NOTHING = 0.0, 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -105,10 +108,10 @@ class StiffnessMap:
 
     def __init__(self, settings: StiffnessSettings) -> None:
         self.settings = settings
-        self._baseline: dict[int, FloatArray] = {}
-        self._supports: dict[int, FloatArray] | None = None
+        self._baseline: dict[int, Shares] = {}
+        self._supports: dict[int, Shares] | None = None
         self._detent_engaged = False
-        self._last: tuple[float, FloatArray] | None = None
+        self._last: tuple[float, _Channels] | None = None
 
     def set_support_baseline(self) -> None:
         """From now on each support counts only beyond its value at the last update: call it on arming.
@@ -142,135 +145,142 @@ class StiffnessMap:
         zero, a volume that is negative or not finite, or a time before the last one.
         """
         directions = _checked_directions(trigger_directions, len(enlarged_volumes_m3))
-        if not (np.isfinite(enlarged_volumes_m3) & (enlarged_volumes_m3 >= 0.0)).all():
+        enlarged_m3 = float(enlarged_volumes_m3.sum())
+        if not (math.isfinite(enlarged_m3) and enlarged_volumes_m3.min(initial=0.0) >= 0.0):
             raise ValueError("enlarged_volumes_m3 holds a negative or non-finite value; valid: 0 or more")
         if self._last is not None and now_s < self._last[0]:
             raise ValueError(f"now_s = {now_s} lies before the last update at {self._last[0]}")
-        counted = overlaps.volume_m3 > 0.0
-        if excluded_objects:
-            counted &= ~np.isin(overlaps.object_index, list(excluded_objects))
-        merged = by_object(select(overlaps, np.flatnonzero(counted)))
+        merged = _counted(overlaps, excluded_objects)
         if reference_m3 is None:
-            reference_m3 = np.full(2, self.settings.reference_fraction * float(enlarged_volumes_m3.sum()))
-        if len(merged) > 0 and not (np.isfinite(reference_m3) & (reference_m3 > 0.0)).all():
-            raise ValueError(f"the reference volume is {reference_m3} although spheres overlap; valid: above 0")
-
-        objects, shares, detent, capped, blended = _NOTHING
-        if len(merged) > 0:
-            moved = directions[:, merged.sphere_index]
-            objects, shares, detent, capped, blended = self._felt(
-                merged, roles, moved, reference_m3, unenlarged_radii_m
-            )
-        else:
-            self._detent_engaged, self._supports = False, {}
-        demand = shares.sum(axis=0)
-        demand[:2] += detent
+            reference_m3 = np.full(2, self.settings.reference_fraction * enlarged_m3)
+        shares, detent, capped, blended = self._felt(merged, roles, directions, reference_m3, unenlarged_radii_m)
+        demand = [sum(channel) for channel in zip(detent, *shares.values(), strict=True)]
         if not self.settings.rumble:
             demand[2] = 0.0
-        output, rate_limited = self._rate_limited(np.clip(demand, 0.0, 1.0), now_s)
+        (l2, r2, rumble), rate_limited = self._rate_limited(demand, now_s)
         return Stiffness(
-            l2=float(output[0]),
-            r2=float(output[1]),
-            rumble=float(output[2]),
-            object_index=objects,
-            contributions=shares,
+            l2=l2,
+            r2=r2,
+            rumble=rumble,
+            object_index=np.array(list(shares), dtype=np.int64),
+            contributions=np.array(list(shares.values()), dtype=np.float64).reshape(-1, 3),
             detent_engaged=self._detent_engaged,
             target_capped=capped,
             rate_limited=rate_limited,
             pairs_counted=len(merged),
             pairs_blended=blended,
-            pairs_inside=int(merged.centre_inside.sum()),
+            pairs_inside=int(np.count_nonzero(merged.centre_inside)),
         )
 
     def _felt(
         self,
         overlaps: Overlaps,
         roles: Sequence[Role],
-        directions: FloatArray,
+        directions: Sequence[FloatArray],
         reference_m3: FloatArray,
         unenlarged_radii_m: FloatArray | None,
     ) -> _Felt:
-        """What the overlaps (p,) give; directions (2, p, 3) of each one's sphere."""
+        """What the overlaps (p,) give; directions: û (m, 3) of each sphere for l2 and r2."""
+        if len(overlaps) == 0:
+            self._detent_engaged, self._supports = False, {}
+            return {}, _NOTHING, False, 0
+        if not all(0.0 < reference < math.inf for reference in reference_m3.tolist()):
+            raise ValueError(f"the reference volume is {reference_m3} although spheres overlap; valid: above 0")
         gradient_trust = trust(overlaps, self.settings.gradient_threshold)
         if self.settings.mode == "total":
             aligned = np.ones((2, len(overlaps)))
         else:
-            aligned = alignments(overlaps, directions, gradient_trust, self.settings.inside_margin)
-        channels = np.vstack([aligned, 1.0 - aligned.max(axis=0)]) * overlaps.volume_m3
-        objects = np.unique(overlaps.object_index)
-        belongs = objects[:, None] == overlaps.object_index
-        references = np.array([*reference_m3, reference_m3.max()])
-        shares: FloatArray = belongs.astype(np.float64) @ channels.T / references
-
-        present = [roles[index] for index in objects.tolist()]
-        is_target = np.array([role is Role.TARGET for role in present], dtype=np.bool_)
-        of_target = np.flatnonzero(belongs[is_target].any(axis=0))
-        detent = self._detent(overlaps, of_target, aligned, unenlarged_radii_m)
+            moved = np.array([motion.take(overlaps.sphere_index, axis=0) for motion in directions])
+            aligned = alignments(overlaps, moved, gradient_trust, self.settings.inside_margin)
+        shares = object_shares(overlaps, aligned, reference_m3)
+        detent = self._detent(overlaps, roles, aligned, unenlarged_radii_m)
         # The detent's step is kept free below the cap, so that it is felt however much overlaps already.
         reserved = 0.0 if unenlarged_radii_m is None else self.settings.detent_step
-        capped = _cap(shares, is_target, self.settings.target_cap - reserved)
-        self._apply_baseline(objects, present, shares)
-        shares[[role is Role.IGNORED for role in present]] = 0.0
-        return objects, shares, detent, capped, int((gradient_trust < 1.0).sum())
-
-    def _apply_baseline(self, objects: IntArray, roles: Sequence[Role], shares: FloatArray) -> None:
-        """Take from each support's share (a, 3) its value at arming, in place."""
-        self._supports = {}
-        for row, role in enumerate(roles):
-            if role is Role.SUPPORT:
-                index = int(objects[row])
-                self._supports[index] = shares[row].copy()
-                shares[row] = np.maximum(0.0, shares[row] - self._baseline.get(index, 0.0))
+        targets = [share for index, share in shares.items() if roles[index] is Role.TARGET]
+        capped = _cap(targets, self.settings.target_cap - reserved)
+        self._supports = {index: share for index, share in shares.items() if roles[index] is Role.SUPPORT}
+        for index, share in shares.items():
+            if roles[index] is Role.SUPPORT:
+                baseline = self._baseline.get(index, _NOTHING)
+                shares[index] = [max(0.0, value - before) for value, before in zip(share, baseline, strict=True)]
+            elif roles[index] is Role.IGNORED:
+                shares[index] = [*_NOTHING]
+        return shares, detent, capped, int(np.count_nonzero(gradient_trust < 1.0))
 
     def _detent(
-        self, overlaps: Overlaps, rows: IntArray, aligned: FloatArray, radii_m: FloatArray | None
-    ) -> FloatArray:
-        """What the detent adds to l2 and r2: its step, as far as the trigger leads to where the target touches.
-
-        rows: the overlaps with the target.
-        """
-        if radii_m is None or len(rows) == 0:
+        self, overlaps: Overlaps, roles: Sequence[Role], aligned: FloatArray, radii_m: FloatArray | None
+    ) -> _Channels:
+        """What the detent adds: its step, as far as the trigger leads to where the target touches."""
+        if radii_m is None:
             self._detent_engaged = False
-            return np.zeros(2)
-        gaps_m = overlaps.signed_distance_m[rows] - radii_m[overlaps.sphere_index[rows]]
+            return _NOTHING
         limit_m = self.settings.detent_release_m if self._detent_engaged else self.settings.detent_engage_m
-        touching = rows[gaps_m <= limit_m]
-        self._detent_engaged = len(touching) > 0
-        if not self._detent_engaged:
-            return np.zeros(2)
-        step: FloatArray = self.settings.detent_step * aligned[:, touching].max(axis=1)
-        return step
+        pairs = zip(
+            overlaps.object_index.tolist(),
+            overlaps.sphere_index.tolist(),
+            overlaps.signed_distance_m.tolist(),
+            strict=True,
+        )
+        rows = [
+            row
+            for row, (index, sphere, distance_m) in enumerate(pairs)
+            if roles[index] is Role.TARGET and distance_m - radii_m[sphere] <= limit_m
+        ]
+        self._detent_engaged = len(rows) > 0
+        if not rows:
+            return _NOTHING
+        l2, r2 = aligned[:, rows].max(axis=1).tolist()
+        return self.settings.detent_step * l2, self.settings.detent_step * r2, 0.0
 
-    def _rate_limited(self, demand: FloatArray, now_s: float) -> tuple[FloatArray, bool]:
-        """The demand (3,), reached no faster than the settings allow, and whether that held it back."""
-        output = demand
+    def _rate_limited(self, demand: Sequence[float], now_s: float) -> tuple[_Channels, bool]:
+        """The demand, clipped to 0 to 1 and reached no faster than the settings allow, and whether that held it."""
+        wanted = tuple(min(max(value, 0.0), 1.0) for value in demand)
+        output = wanted
         if self._last is not None:
             last_s, last = self._last
-            elapsed_s = now_s - last_s
-            output = np.clip(
-                demand, last - self.settings.fall_per_s * elapsed_s, last + self.settings.rise_per_s * elapsed_s
-            )
+            fall = self.settings.fall_per_s * (now_s - last_s)
+            rise = self.settings.rise_per_s * (now_s - last_s)
+            output = tuple(min(max(new, old - fall), old + rise) for new, old in zip(wanted, last, strict=True))
         self._last = now_s, output
-        return output, bool((output != demand).any())
+        return output, output != wanted
 
 
-def _cap(shares: FloatArray, capped: BoolArray, limit: float) -> bool:
-    """Shrink the shares (a, 3) of the `capped` objects so that no channel's sum exceeds `limit`; whether any did."""
-    totals = shares[capped].sum(axis=0)
-    if not (totals > limit).any():
-        return False
-    shares[capped] *= np.minimum(1.0, limit / np.maximum(totals, _SMALLEST))
-    return True
+def _counted(overlaps: Overlaps, excluded_objects: Collection[int]) -> Overlaps:
+    """One row for each sphere and object that overlap, without the excluded objects."""
+    counts = overlaps.volume_m3 > 0.0
+    for index in excluded_objects:
+        counts &= overlaps.object_index != index
+    return by_object(select(overlaps, np.flatnonzero(counts)))
 
 
-def _checked_directions(trigger_directions: Mapping[str, FloatArray], count: int) -> FloatArray:
-    """The directions of l2 and r2 in one array (2, m, 3)."""
-    for name in _TRIGGERS:
-        shape = np.shape(trigger_directions[name])
-        if shape != (count, 3):
-            raise ValueError(f"trigger_directions[{name!r}] has the shape {shape}; valid: ({count}, 3)")
-    directions = np.stack([trigger_directions[name] for name in _TRIGGERS])
-    squared = np.einsum("kmi,kmi->km", directions, directions)
-    if not ((np.abs(squared - 1.0) <= 2.0 * _UNIT_TOLERANCE) | (squared == 0.0)).all():
-        raise ValueError("trigger_directions holds a vector that is neither unit nor zero; valid: these")
+def _cap(targets: Sequence[Shares], limit: float) -> bool:
+    """Shrink the targets' shares, in place, so that no channel's sum exceeds `limit`; whether any did."""
+    capped = False
+    for channel in range(3):
+        total = sum(share[channel] for share in targets)
+        if total > limit:
+            capped = True
+            for share in targets:
+                share[channel] *= limit / total
+    return capped
+
+
+def _checked_directions(trigger_directions: Mapping[str, FloatArray], count: int) -> list[FloatArray]:
+    """The directions (m, 3) of l2 and r2."""
+    directions = [np.ascontiguousarray(trigger_directions[name]) for name in _TRIGGERS]
+    for name, vectors in zip(_TRIGGERS, directions, strict=True):
+        if vectors.shape != (count, 3):
+            raise ValueError(f"trigger_directions[{name!r}] has the shape {vectors.shape}; valid: ({count}, 3)")
+        if not _are_unit_or_zero(vectors):
+            raise ValueError("trigger_directions holds a vector that is neither unit nor zero; valid: these")
     return directions
+
+
+@compiled(input_array(2), returns=TRUTH)
+def _are_unit_or_zero(vectors: FloatArray) -> bool:
+    for row in range(vectors.shape[0]):
+        squared = vectors[row, 0] ** 2 + vectors[row, 1] ** 2 + vectors[row, 2] ** 2
+        # False for NaN, too.
+        if not (squared == 0.0 or abs(squared - 1.0) <= 2.0 * _UNIT_TOLERANCE):
+            return False
+    return True
