@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from robot_side.arm_port import GripperPose
 from robot_side.nearest_object import distance_to_object
+from robot_side.overlap.compile import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.overlap.vectors import dot, load, negative, scale, subtract, unit
 from robot_side.overlapping import NearestSurfaces
 from robot_side.perceived_objects import PerceivedObjects, Role
 from robot_side.proximity import CandidatePairs
@@ -25,21 +27,45 @@ def outside_share(
     finger, or as the target reaches the point between the fingertips: from then on what lies ahead of the palm
     counts. None while no pair is of a finger and the target, which is 1 for all.
     """
-    concerned = pose.sphere_on_finger[pairs.sphere_index]
-    if not concerned.any():
+    on_finger = pose.sphere_on_finger.take(pairs.sphere_index).tolist()
+    rows = [
+        row
+        for row, (finger, index) in enumerate(zip(on_finger, pairs.object_index.tolist(), strict=True))
+        if finger and objects.roles[index] is Role.TARGET
+    ]
+    if not rows:
         return None
-    targets = np.array([role is Role.TARGET for role in objects.roles], dtype=np.bool_)
-    rows = np.flatnonzero(concerned & targets[pairs.object_index])
-    if len(rows) == 0:
-        return None
-    offset = pose.sphere_centers_m[pairs.sphere_index[rows]] - pose.tool_position_m
-    approach = pose.tool_rotation[:, 2]
-    across = offset - (offset @ approach)[:, None] * approach
-    length = np.sqrt(np.einsum("pi,pi->p", across, across))
-    inward = -across / np.where(length > 0.0, length, 1.0)[:, None]
-    cosine = np.einsum("pi,pi->p", inward, nearest.direction[rows])
-    x = np.clip((cosine - _BESIDE) / (_BETWEEN - _BESIDE), 0.0, 1.0)
-    share: FloatArray = np.ones(len(pairs))
-    gap_m = min(distance_to_object(objects, index, pose.tool_position_m) for index in np.flatnonzero(targets).tolist())
-    share[rows] = (1.0 - x * x * (3.0 - 2.0 * x)) * min(1.0, max(0.0, gap_m / _ENTERED_M))
+    targets = [index for index, role in enumerate(objects.roles) if role is Role.TARGET]
+    gap_m = min(distance_to_object(objects, index, pose.tool_position_m) for index in targets)
+    share = np.ones(len(pairs))
+    _share_loop(
+        np.array(rows),
+        pose.sphere_centers_m.take(pairs.sphere_index.take(rows), axis=0) - pose.tool_position_m,
+        np.ascontiguousarray(pose.tool_rotation),
+        nearest.direction,
+        min(1.0, max(0.0, gap_m / _ENTERED_M)),
+        share,
+    )
     return share
+
+
+@compiled(input_indices(), input_array(2), input_array(2), input_array(2), NUMBER, output_array(1))
+def _share_loop(
+    rows: IntArray,
+    offsets: FloatArray,
+    tool_rotation: FloatArray,
+    directions: FloatArray,
+    entering: float,
+    share: FloatArray,
+) -> None:
+    """Write the share of each of `rows`, whose spheres stand at `offsets` from the tool.
+
+    `entering`: 0 when the target is between the fingertips, 1 when it is clear of them.
+    """
+    approach = load(tool_rotation.T, 2)
+    for k in range(rows.size):
+        offset = load(offsets, k)
+        inward = negative(unit(subtract(offset, scale(dot(offset, approach), approach))))
+        cosine = dot(inward, load(directions, rows[k]))
+        x = min(max((cosine - _BESIDE) / (_BETWEEN - _BESIDE), 0.0), 1.0)
+        share[rows[k]] = (1.0 - x * x * (3.0 - 2.0 * x)) * entering

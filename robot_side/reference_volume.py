@@ -1,8 +1,12 @@
 """V_ref of §4.2 by calibration: the overlap that a plane gives which the gripper just touches."""
 
+import math
+
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.overlap.compile import compiled, input_array, output_array
+from robot_side.overlap.vectors import dot, load
 
 _LEAST_ENLARGEMENT_M = 1e-3
 """A gripper that is hardly enlarged would make the step from nothing to s = 1 within micrometres."""
@@ -21,10 +25,30 @@ def plane_overlaps(
     volume it would give a stiffness that grows from 0.05 to 0.69 as the enlargement grows from 7 to 60 mm
     (docs/architecture.md).
     """
-    enlarged_m = radii_m + np.maximum(enlargement_m, _LEAST_ENLARGEMENT_M)
-    along = directions @ centers_m.T
-    fronts = (along + radii_m).max(axis=1, keepdims=True)
-    depth = np.clip(along + enlarged_m - fronts, 0.0, 2.0 * enlarged_m)
-    caps: FloatArray = np.pi / 3.0 * depth**2 * (3.0 * enlarged_m - depth)
-    total: FloatArray = caps.sum(axis=1)
-    return total
+    volumes = np.empty(len(directions))
+    _plane_loop(
+        np.ascontiguousarray(centers_m),
+        np.ascontiguousarray(radii_m),
+        np.ascontiguousarray(enlargement_m).reshape(-1, len(radii_m)),
+        np.ascontiguousarray(directions),
+        volumes,
+    )
+    return volumes
+
+
+@compiled(input_array(2), input_array(1), input_array(2), input_array(2), output_array(1))
+def _plane_loop(
+    centers: FloatArray, radii: FloatArray, enlargement: FloatArray, directions: FloatArray, volumes: FloatArray
+) -> None:
+    for k in range(volumes.size):
+        direction = load(directions, k)
+        row = k if enlargement.shape[0] > 1 else 0
+        front = -math.inf
+        for sphere in range(radii.size):
+            front = max(front, dot(direction, load(centers, sphere)) + radii[sphere])
+        volumes[k] = 0.0
+        for sphere in range(radii.size):
+            enlarged = radii[sphere] + max(enlargement[row, sphere], _LEAST_ENLARGEMENT_M)
+            reached = dot(direction, load(centers, sphere)) + enlarged
+            depth = min(max(reached - front, 0.0), 2.0 * enlarged)
+            volumes[k] += math.pi / 3.0 * depth * depth * (3.0 * enlarged - depth)

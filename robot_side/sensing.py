@@ -12,12 +12,19 @@ from robot_side.arm_port import GripperPose
 from robot_side.between_fingers import outside_share
 from robot_side.enlargement import Enlargement
 from robot_side.kinematic_error import position_covariance
-from robot_side.overlapping import evaluate, nearest_surfaces, radii_for_role
+from robot_side.overlapping import (
+    NearestSurfaces,
+    Overlaps,
+    evaluate,
+    nearest_surfaces,
+    radii_for_role,
+)
 from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import candidate_pairs
+from robot_side.proximity import CandidatePairs, candidate_pairs
 from robot_side.reference_volume import plane_overlaps
 from robot_side.stiffness import Stiffness, StiffnessMap
 from robot_side.tool_motion import trigger_directions
+from robot_side.touching import touching_pairs
 
 
 @dataclass(frozen=True)
@@ -84,21 +91,14 @@ class AheadSensing:
                 covariances[sphere], velocities[sphere], loop_age_s, nearest.direction
             )
         else:
-            pair_enlargement_m = enlargement_m[pairs.sphere_index]
+            pair_enlargement_m = enlargement_m.take(pairs.sphere_index)
         radii_m, binding = radii_for_role(pose.sphere_radii_m, pair_enlargement_m, pairs, objects.roles, gap_m)
         self.skipped.enlargement_limits += binding
-        overlaps = evaluate(pose.sphere_centers_m, radii_m, objects, pairs, nearest)
-        share = outside_share(pose, objects, pairs, nearest)
-        if share is not None:
-            overlaps = replace(
-                overlaps,
-                volume_m3=share * overlaps.volume_m3,
-                gradient_m2=share[:, None] * overlaps.gradient_m2,
-            )
+        overlaps = _overlaps(pose, objects, *touching_pairs(pairs, nearest, radii_m, excluded))
         directions = trigger_directions(pose.tool_rotation, len(enlarged_m))
         reference_m3 = None
-        if self.stiffness_map.settings.reference == "plane":
-            axes = np.stack([directions["l2"][0], directions["r2"][0]])
+        if len(overlaps) > 0 and self.stiffness_map.settings.reference == "plane":
+            axes = np.array([directions[trigger][0] for trigger in ("l2", "r2")])
             # The enlargement that a plane square to the trigger's direction would meet.
             towards_plane_m = enlargement_m
             if towards_object:
@@ -109,12 +109,21 @@ class AheadSensing:
         stiffness = self.stiffness_map.update(
             overlaps,
             objects.roles,
-            4.0 / 3.0 * np.pi * enlarged_m**3,
+            4.0 / 3.0 * np.pi * enlarged_m * enlarged_m * enlarged_m,
             directions,
             now_s,
             reference_m3=reference_m3,
             unenlarged_radii_m=pose.sphere_radii_m,
-            excluded_objects=() if excluded is None else (excluded,),
         )
-        counted = slice(None) if excluded is None else overlaps.object_index != excluded
-        return Sensed(enlargement_m, float(overlaps.volume_m3[counted].sum()), stiffness)
+        return Sensed(enlargement_m, float(overlaps.volume_m3.sum()), stiffness)
+
+
+def _overlaps(
+    pose: GripperPose, objects: PerceivedObjects, pairs: CandidatePairs, nearest: NearestSurfaces, radii_m: FloatArray
+) -> Overlaps:
+    """The overlaps of `pairs` without what lies between the fingers; radii_m (p,) enlarged."""
+    overlaps = evaluate(pose.sphere_centers_m, radii_m, objects, pairs, nearest)
+    share = outside_share(pose, objects, pairs, nearest)
+    if share is None:
+        return overlaps
+    return replace(overlaps, volume_m3=share * overlaps.volume_m3, gradient_m2=share[:, None] * overlaps.gradient_m2)

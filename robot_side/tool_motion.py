@@ -55,5 +55,7 @@ def trigger_directions(tool_rotation: FloatArray, count: int) -> dict[str, Float
 
     Both triggers translate the whole gripper, so that one direction holds for every sphere.
     """
-    approach = np.tile(tool_rotation[:, 2], (count, 1))
-    return {"l2": -approach, "r2": approach}
+    directions = np.empty((2, count, 3))
+    directions[1] = tool_rotation[:, 2]
+    np.negative(directions[1], out=directions[0])
+    return {"l2": directions[0], "r2": directions[1]}
