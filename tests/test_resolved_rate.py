@@ -97,3 +97,18 @@ def test_wrong_arguments_are_named() -> None:
             joint_velocities(np.eye(6), np.zeros(6), np.full(6, limit))
     with pytest.raises(ValueError, match="largest_damping"):
         joint_velocities(np.eye(6), np.zeros(6), FREE, largest_damping=0.0)
+
+
+@pytest.mark.parametrize("joints", [5, 6, 7])
+@pytest.mark.parametrize("smallest", [0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
+def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest: float, joints: int) -> None:
+    """Above the threshold it is found without the singular values."""
+    twist = np.random.default_rng(7).uniform(-0.2, 0.2, 6)
+    for seed in range(20):
+        singular_values = np.append(np.linspace(2.0, 0.3, min(joints, 6) - 1), smallest)
+        jacobian = jacobian_with(singular_values, seed, joints)
+        left, values, right = np.linalg.svd(jacobian, full_matrices=False)
+        damping_squared = 0.06**2 * (1.0 - min(values[-1] / 0.06, 1.0) ** 2)
+        expected = right.T @ (values / (values**2 + damping_squared) * (left.T @ twist))
+        velocity = joint_velocities(jacobian, twist, np.full(joints, np.inf))
+        np.testing.assert_allclose(velocity, expected, atol=1e-11)
