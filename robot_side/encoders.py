@@ -26,9 +26,13 @@ class Encoder:
 
     def read(self, true_positions: FloatArray) -> FloatArray:
         """Readings (n,) of joints that stand at `true_positions` (n,), radians; metres for a prismatic joint."""
-        readings: FloatArray = true_positions + self._sigma_rad * self._noise.standard_normal(true_positions.shape)
+        readings: FloatArray = self._noise.standard_normal(true_positions.shape)
+        readings *= self._sigma_rad
+        readings += true_positions
         if self._resolution_rad > 0.0:
-            readings = self._resolution_rad * np.round(readings / self._resolution_rad)
+            readings /= self._resolution_rad
+            np.rint(readings, out=readings)
+            readings *= self._resolution_rad
         return readings
 
     def standard_deviation_rad(self) -> float:

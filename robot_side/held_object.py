@@ -1,6 +1,6 @@
 """An object between the fingers moves with them: it leaves the surroundings and joins the gripper as spheres."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,11 +74,19 @@ def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
     lever = held.centers_in_tool_m @ pose.tool_rotation.T
     linear, angular = pose.tool_jacobian[:3], pose.tool_jacobian[3:]
     # Velocity of a point fixed to the tool: v + ω × r, for each joint's unit velocity.
-    turning = np.cross(angular.T[None, :, :], lever[:, None, :]).swapaxes(1, 2)
-    return replace(
-        pose,
+    own, all_of_them = len(pose.sphere_radii_m), len(pose.sphere_radii_m) + len(lever)
+    jacobians = np.empty((all_of_them, 3, linear.shape[1]))
+    jacobians[:own] = pose.sphere_jacobians
+    for axis in range(3):
+        second, third = (axis + 1) % 3, (axis + 2) % 3
+        turning = lever[:, third, None] * angular[second] - lever[:, second, None] * angular[third]
+        jacobians[own:, axis] = linear[axis] + turning
+    return GripperPose(
+        tool_position_m=pose.tool_position_m,
+        tool_rotation=pose.tool_rotation,
+        tool_jacobian=pose.tool_jacobian,
         sphere_centers_m=np.concatenate([pose.sphere_centers_m, pose.tool_position_m + lever]),
         sphere_radii_m=np.concatenate([pose.sphere_radii_m, held.radii_m]),
-        sphere_jacobians=np.concatenate([pose.sphere_jacobians, linear + turning]),
+        sphere_jacobians=jacobians,
         sphere_on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(lever), dtype=np.bool_)]),
     )
