@@ -1,0 +1,80 @@
+"""The pipeline's kernels: all ready before the first tick, and never fed what they cannot read."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robot_side.assembly import build_robot_side
+from robot_side.overlap.compile import Compiled, imported_kernels
+from robot_side.overlap.kernels import warm_up
+from robot_side.proximity import candidate_pairs
+from robot_side.settings import EnlargementOptions, RobotSettings
+from tests.perceived_scenes import random_scene
+
+
+def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
+    warm_up()
+    assert all(kernel.ready for kernel in imported_kernels())
+    modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
+    assert {
+        "robot_side.alignment",
+        "robot_side.between_fingers",
+        "robot_side.enlargement",
+        "robot_side.kinematic_error",
+        "robot_side.nearest_kernels",
+        "robot_side.object_shares",
+        "robot_side.overlap.kernels",
+        "robot_side.proximity",
+        "robot_side.reference_volume",
+        "robot_side.resolved_rate",
+        "robot_side.stiffness",
+        "robot_side.touching",
+    } <= modules
+
+
+@pytest.mark.parametrize("direction", ["isotropic", "towards_object"])
+def test_nothing_is_compiled_within_a_tick(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    warm_up()
+
+    def late(kernel: Compiled) -> None:
+        raise AssertionError(f"{kernel.name} was not ready")
+
+    options = EnlargementOptions(direction=direction)  # type: ignore[arg-type]
+    robot = build_robot_side(RobotSettings(enlargement=options), 1, "clock")
+    monkeypatch.setattr(Compiled, "prepare", late)
+    for tick in range(20):
+        robot.tick(0.001 * tick)
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("box_centers_m", np.asfortranarray),
+        ("sphere_radii_m", lambda values: np.repeat(values, 2)[::2]),
+        ("tetrahedron_vertices_m", np.float32),
+        ("half_space_object", np.int32),
+    ],
+)
+def test_arrays_that_a_kernel_cannot_read_are_named(field: str, change: Callable[[Any], Any]) -> None:
+    objects = random_scene(np.random.default_rng(0), 3)
+    changed = dataclasses.replace(objects, **{field: change(getattr(objects, field))})
+    with pytest.raises(ValueError, match=f"objects.{field} holds"):
+        candidate_pairs(np.zeros((1, 3)), np.ones(1), changed)
+
+
+def test_more_pairs_than_there_is_room_for_at_first_are_found_all_the_same() -> None:
+    rng = np.random.default_rng(2)
+    objects = random_scene(rng, 20, 0.2)
+    centers, radii = rng.uniform(-0.2, 0.2, (30, 3)), np.full(30, 0.3)
+    pairs = candidate_pairs(centers, radii, objects)
+    assert len(pairs) > 1000
+    one_by_one = [candidate_pairs(centers[row : row + 1], radii[row : row + 1], objects) for row in range(30)]
+    assert len(pairs) == sum(len(found) for found in one_by_one)
+    for row, found in enumerate(one_by_one):
+        for part in ("spheres", "boxes", "tetrahedra", "half_spaces"):
+            of_sphere = pairs.sphere_index[getattr(pairs, part)] == row
+            expected = found.primitive_index[getattr(found, part)]
+            np.testing.assert_array_equal(pairs.primitive_index[getattr(pairs, part)][of_sphere], expected)
