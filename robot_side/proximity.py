@@ -13,14 +13,21 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.kinematic_error import require_finite
-from robot_side.overlap.compile import COUNT, compiled, inlined, input_array, input_indices, output_indices
+from robot_side.overlap.compile import (
+    COUNT,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_array,
+    output_indices,
+)
 from robot_side.overlap.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.perceived_objects import PerceivedObjects
+from robot_side.valid_objects import require_valid
 
 _REACH = 1.0 + 1e-9
 """Radii are enlarged by this for the comparison, so that rounding never culls a pair that touches."""
-
-_UNIT_TOLERANCE = 1e-6
 
 _USUAL_PAIRS = 256
 """Room for so many pairs is made at first; where there are more, they are counted and found again."""
@@ -216,54 +223,28 @@ def _bounds_of(objects: PerceivedObjects) -> _Bounds:
     known = _bounds.get(key)
     if known is not None and known[0]() is objects:
         return known[1]
-    _require_valid(objects)
-    lowest, highest = objects.tetrahedron_vertices_m.min(axis=1), objects.tetrahedron_vertices_m.max(axis=1)
-    middles = 0.5 * (lowest + highest)
-    to_vertices = _squared(objects.tetrahedron_vertices_m - middles[:, None, :])
-    radii = (
-        objects.sphere_radii_m,
-        np.sqrt(_squared(objects.box_half_sizes_m)),
-        np.sqrt(to_vertices.max(axis=1)),
-    )
+    require_valid(objects)
+    tetrahedra = objects.tetrahedron_vertices_m
+    middles, radii = np.empty((len(tetrahedra), 3)), np.empty(len(tetrahedra))
+    _enclose(tetrahedra, middles, radii)
+    half_sizes = objects.box_half_sizes_m
+    by_kind = objects.sphere_radii_m, np.sqrt(np.einsum("bi,bi->b", half_sizes, half_sizes)), radii
     bounds = _Bounds(
         np.concatenate([objects.sphere_centers_m, objects.box_centers_m, middles]),
-        np.concatenate(radii),
+        np.concatenate(by_kind),
         np.concatenate([objects.sphere_object, objects.box_object, objects.tetrahedron_object]),
-        np.cumsum([len(part) for part in radii]),
+        np.cumsum([len(part) for part in by_kind]),
     )
     _bounds[key] = weakref.ref(objects, lambda _: _bounds.pop(key, None)), bounds
     return bounds
 
 
-def _require_valid(objects: PerceivedObjects) -> None:
-    """Raise a ValueError that names the field of `objects` that no primitive can have."""
-    for name, value in vars(objects).items():
-        if not isinstance(value, np.ndarray):
-            continue
-        kind = "int64" if name.endswith("_object") else "float64"
-        if value.dtype != kind or not value.flags.c_contiguous:
-            raise ValueError(
-                f"objects.{name} holds {value.dtype} in steps of {value.strides}; valid: contiguous {kind}"
-            )
-        if kind == "float64":
-            require_finite(f"objects.{name}", value)
-    for name, value in (
-        ("sphere_radii_m", objects.sphere_radii_m),
-        ("box_half_sizes_m", objects.box_half_sizes_m),
-    ):
-        if (value < 0.0).any():
-            raise ValueError(f"objects.{name} = {value.min()} is negative; valid: 0 or more")
-    grams = objects.box_rotations.swapaxes(1, 2) @ objects.box_rotations
-    for name, error in (
-        ("box_rotations", np.abs(grams - np.eye(3))),
-        ("half_space_normals", np.abs(_squared(objects.half_space_normals) - 1.0)),
-    ):
-        if (error > _UNIT_TOLERANCE).any():
-            raise ValueError(
-                f"objects.{name} is {error.max():.1e} off unit length or a right angle; valid: at most 1e-6"
-            )
-
-
-def _squared(vectors: FloatArray) -> FloatArray:
-    result: FloatArray = np.einsum("...i,...i->...", vectors, vectors)
-    return result
+@compiled(input_array(3), output_array(2), output_array(1))
+def _enclose(vertices: FloatArray, middles: FloatArray, radii: FloatArray) -> None:
+    """A sphere around each tetrahedron (t, 4, 3), about the middle of its extent along the axes."""
+    for row in range(radii.size):
+        for axis in range(3):
+            middles[row, axis] = 0.5 * (vertices[row, :, axis].min() + vertices[row, :, axis].max())
+        radii[row] = 0.0
+        for corner in range(4):
+            radii[row] = max(radii[row], math.sqrt(_apart(load(vertices[row], corner), load(middles, row))))

@@ -10,6 +10,7 @@ from robot_side import proximity
 from robot_side.overlap import kernels
 from robot_side.perceived_objects import PerceivedObjects
 from robot_side.proximity import CandidatePairs, candidate_pairs
+from robot_side.valid_objects import require_valid
 from tests.perceived_scenes import Scene, random_scene
 
 seeds = st.integers(0, 2**32 - 1)
@@ -91,13 +92,12 @@ def test_exact_contact_is_kept() -> None:
 
 def test_bounds_are_worked_out_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[PerceivedObjects] = []
-    original = proximity._require_valid
 
     def counting(objects: PerceivedObjects) -> None:
         seen.append(objects)
-        original(objects)
+        require_valid(objects)
 
-    monkeypatch.setattr(proximity, "_require_valid", counting)
+    monkeypatch.setattr("robot_side.proximity.require_valid", counting)
     first, second = (random_scene(np.random.default_rng(count), count) for count in (2, 8))
     centers, radii = np.zeros((2, 3)), np.full(2, 0.3)
     answers = [candidate_pairs(centers, radii, objects) for objects in (first, first, second, first, second)]
