@@ -16,7 +16,7 @@ from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.alignment import alignments, trust
 from robot_side.object_shares import Shares, object_shares
-from robot_side.overlap.compile import TRUTH, compiled, input_array
+from robot_side.overlap.compile import NUMBER, TRUTH, compiled, input_array
 from robot_side.overlapping import Overlaps, by_object, select
 from robot_side.perceived_objects import Role
 
@@ -145,8 +145,8 @@ class StiffnessMap:
         zero, a volume that is negative or not finite, or a time before the last one.
         """
         directions = _checked_directions(trigger_directions, len(enlarged_volumes_m3))
-        enlarged_m3 = float(enlarged_volumes_m3.sum())
-        if not (math.isfinite(enlarged_m3) and enlarged_volumes_m3.min(initial=0.0) >= 0.0):
+        enlarged_m3: float = _total_volume(np.ascontiguousarray(enlarged_volumes_m3))
+        if math.isnan(enlarged_m3):
             raise ValueError("enlarged_volumes_m3 holds a negative or non-finite value; valid: 0 or more")
         if self._last is not None and now_s < self._last[0]:
             raise ValueError(f"now_s = {now_s} lies before the last update at {self._last[0]}")
@@ -163,7 +163,7 @@ class StiffnessMap:
             r2=r2,
             rumble=rumble,
             object_index=np.array(list(shares), dtype=np.int64),
-            contributions=np.array(list(shares.values()), dtype=np.float64).reshape(-1, 3),
+            contributions=np.array(list(shares.values()), dtype=np.float64).reshape(len(shares), 3),
             detent_engaged=self._detent_engaged,
             target_capped=capped,
             rate_limited=rate_limited,
@@ -247,6 +247,8 @@ class StiffnessMap:
 
 def _counted(overlaps: Overlaps, excluded_objects: Collection[int]) -> Overlaps:
     """One row for each sphere and object that overlap, without the excluded objects."""
+    if len(overlaps) == 0:
+        return overlaps
     counts = overlaps.volume_m3 > 0.0
     for index in excluded_objects:
         counts &= overlaps.object_index != index
@@ -284,3 +286,14 @@ def _are_unit_or_zero(vectors: FloatArray) -> bool:
         if not (squared == 0.0 or abs(squared - 1.0) <= 2.0 * _UNIT_TOLERANCE):
             return False
     return True
+
+
+@compiled(input_array(1), returns=NUMBER)
+def _total_volume(volumes: FloatArray) -> float:
+    """The sum of the volumes (m,); NaN when one of them is negative or not finite."""
+    total = 0.0
+    for volume in volumes:
+        if not 0.0 <= volume < math.inf:
+            return math.nan
+        total += volume
+    return total
