@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import io
+import signal
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
@@ -65,14 +66,16 @@ def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
-    """Run `command(arguments)` and exit: a FeelaheadError becomes one line and exit code 2."""
+    """Run `command(arguments)` and exit: a FeelaheadError becomes one line, with exit code 2 for bad input, else 1."""
     try:
         code = command(sys.argv[1:])
     except FeelaheadError as error:
         print(f"{program}: {error}", file=sys.stderr)
-        code = 2
+        code = 2 if isinstance(error, ConfigurationError) else 1
     except KeyboardInterrupt:
         code = 0
+    # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.exit(code)
 
 

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
-from common.errors import FeelaheadError
+from common.errors import ConfigurationError, FeelaheadError
+
+_BAD_INPUT = 2
 
 
 class SideFailedError(FeelaheadError):
@@ -34,6 +36,7 @@ class SideProcess:
             # Ctrl-C reaches this process alone, which then ends the sides in order.
             start_new_session=True,
         )
+        self._interrupted = False
         self._events: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=1000)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -83,17 +86,21 @@ class SideProcess:
                 raise SideFailedError(f"the {self.name} side ended early")
 
     def check(self) -> None:
-        """SideFailedError when it has ended with an error, in its own words."""
+        """SideFailedError when it has ended with an error, in its own words; ConfigurationError for bad input."""
         code = self._process.poll()
         if code not in (None, 0):
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
             reason = said[-1] if said else "without a word"
+            if code == _BAD_INPUT:
+                # It is ours that was bad: what we were given went on to the side.
+                raise ConfigurationError(reason.partition(": ")[2] or reason)
             raise SideFailedError(f"the {self.name} side ended with code {code}: {reason}")
 
     def interrupt(self) -> None:
-        """Ask it to end, as Ctrl-C would; nothing once it has."""
-        if self.running:
+        """Ask it to end, as Ctrl-C would, once: a second signal could hit it while it writes its summary."""
+        if self.running and not self._interrupted:
+            self._interrupted = True
             self._process.send_signal(signal.SIGINT)
 
     def wait(self, timeout_s: float) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
 from common.sockets import OperatorSockets
 from common.status import Status
@@ -49,17 +50,23 @@ def command(arguments: Sequence[str]) -> int:
             person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
         else:
             device = HidDualSense()
+        failure: FeelaheadError | None = None
         try:
             _loop(settings, core, line, sockets, device, person, stop, status)
         except BrokenPipeError:
             ignore_broken_output()
+        except FeelaheadError as error:
+            failure = error
         finally:
             device.close()
-    if settings.summary is not None:
         # A real controller cannot be asked, but closing it raises when the release cannot be written.
         released = device.released if isinstance(device, SimulatedDualSense) else True
-        summary = core.summary() | {"triggers_released": released}
-        settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        errors = [] if failure is None else [str(failure)]
+        summary = core.summary() | {"triggers_released": released, "errors": errors}
+        if settings.summary is not None:
+            settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if failure is not None:
+            raise failure
     return 0
 
 

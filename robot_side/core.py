@@ -257,7 +257,6 @@ class RobotSide:
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
             "stops": stops,
-            "errors": [],
         }
 
 

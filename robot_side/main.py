@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
 from common.sockets import RobotSockets
 from common.statistics import RunningStatistics
@@ -46,13 +47,20 @@ def command(arguments: Sequence[str]) -> int:
         tick_time = RunningStatistics(settings.seed)
         clock = MonotonicClock()
         start_s = clock.now()
+        failure: FeelaheadError | None = None
         try:
             _loop(settings, core, link, sockets, stop, status, tick_time)
         except BrokenPipeError:
             ignore_broken_output()
+        except FeelaheadError as error:
+            failure = error
         summary = {"duration_s": clock.now() - start_s, "tick_us": tick_microseconds(tick_time)} | core.summary()
-    if settings.summary is not None:
-        settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        # A run that failed has figures, too.
+        summary["errors"] = [] if failure is None else [str(failure)]
+        if settings.summary is not None:
+            settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if failure is not None:
+            raise failure
     return 0
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from feelahead.processes import SideFailedError, SideProcess
+from common.errors import ConfigurationError
+from feelahead.processes import SideProcess
 
 pytestmark = pytest.mark.processes
 
@@ -129,6 +130,6 @@ def test_the_operator_side_may_start_first() -> None:
 def test_a_side_that_fails_says_why() -> None:
     with (
         SideProcess("robot_side.main", "robot", ["--probability=2"]) as side,
-        pytest.raises(SideFailedError, match="probability"),
+        pytest.raises(ConfigurationError, match="probability"),
     ):
         side.wait_for("listening", LIMIT_S)
