@@ -10,10 +10,11 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError, FeelaheadError
 from robot_side.arm_port import ArmState, GripperPose
-from robot_side.encoders import Encoder
-from robot_side.gripper_drive import GripperDrive
 from robot_side.gripper_spheres import cover_boxes
-from robot_side.gripper_travel import (
+from robot_side.scene import Scene
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.gripper_drive import GripperDrive
+from robot_side.simulation.gripper_travel import (
     GripperSample,
     GripperServo,
     GripperTravel,
@@ -22,8 +23,7 @@ from robot_side.gripper_travel import (
     jaw_stroke_m,
     travel_from_samples,
 )
-from robot_side.joint_reference import JointReference, MotionLimits
-from robot_side.scene import Scene
+from robot_side.simulation.joint_reference import JointReference, MotionLimits
 
 _LONGEST_ADVANCE_S = 2.0
 _LIMIT_MARGIN_RAD = 0.005

@@ -10,11 +10,8 @@ from common.errors import ConfigurationError
 from common.link_end import LinkEnd
 from robot_side.arm import MujocoArm, MujocoKinematics
 from robot_side.arm_port import ArmState
-from robot_side.camera_error import CameraError
 from robot_side.core import RobotSide
-from robot_side.encoders import Encoder
 from robot_side.enlargement import Enlargement
-from robot_side.joint_reference import MotionLimits
 from robot_side.kinematic_error import position_covariance
 from robot_side.operator_session import OperatorSession
 from robot_side.run_figures import RunFigures
@@ -22,6 +19,9 @@ from robot_side.safety import Safety
 from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
 from robot_side.sensing import AheadSensing
 from robot_side.settings import RobotSettings
+from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.stiffness import StiffnessMap
 
 _SAMPLED_CONFIGURATIONS = 256

@@ -13,12 +13,12 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.camera_error import CameraError
-from robot_side.model_enums import GeomKind
-from robot_side.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.object_roles import assign_roles
 from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.robot_model import RobotModel, can_touch, find_robot
+from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.model_enums import GeomKind
+from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject
+from robot_side.simulation.robot_model import RobotModel, can_touch, find_robot
 
 _LOG = logging.getLogger(__name__)
 _ASSETS = Path(__file__).parent / "assets"

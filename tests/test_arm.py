@@ -5,9 +5,9 @@ import pytest
 
 from common.errors import ConfigurationError, FeelaheadError
 from robot_side.arm import MujocoArm, measure_gripper
-from robot_side.encoders import Encoder
-from robot_side.joint_reference import MotionLimits
 from robot_side.scene import GroundTruth, Scene, load_scene
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.joint_reference import MotionLimits
 from tests.arm_models import (
     COUPLING,
     MIRRORED_GRIPPER,

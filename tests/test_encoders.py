@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from robot_side.encoders import Encoder
+from robot_side.simulation.encoders import Encoder
 
 
 def test_the_standard_deviation_is_what_the_readings_show() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.gripper_drive import GripperDrive
-from robot_side.gripper_travel import (
+from robot_side.simulation.gripper_drive import GripperDrive
+from robot_side.simulation.gripper_travel import (
     GripperSample,
     GripperServo,
     GripperTravel,

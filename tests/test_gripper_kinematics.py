@@ -7,8 +7,8 @@ import pytest
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.arm import MujocoKinematics
-from robot_side.encoders import Encoder
 from robot_side.scene import Scene, load_scene
+from robot_side.simulation.encoders import Encoder
 from tests.tool_driver import PERIOD_S, ToolDriver
 
 

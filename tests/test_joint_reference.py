@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.joint_drives import JointDrives
-from robot_side.joint_reference import JointReference, MotionLimits
+from robot_side.simulation.joint_drives import JointDrives
+from robot_side.simulation.joint_reference import JointReference, MotionLimits
 
 STEP_S = 0.001
 LIMITS = MotionLimits(velocity_rad_s=2.0, acceleration_rad_s2=8.0, deceleration_rad_s2=12.0, windup_rad=0.02)

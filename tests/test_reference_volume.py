@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from robot_side.arm import MujocoArm, MujocoKinematics
-from robot_side.encoders import Encoder
 from robot_side.overlap import sphere_half_space
 from robot_side.overlapping import evaluate
 from robot_side.perceived_objects import PerceivedObjects
 from robot_side.proximity import candidate_pairs
 from robot_side.reference_volume import plane_overlaps
 from robot_side.scene import load_scene
+from robot_side.simulation.encoders import Encoder
 from robot_side.stiffness import StiffnessMap, StiffnessSettings
 from tests.gripper_poses import BOX_CENTERS_M, BOX_HALF_SIZES_M, cover_gripper
 from tests.perceived_scenes import Scene

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.camera_error import CameraError
 from robot_side.perceived_objects import PerceivedObjects, Role
 from robot_side.scene import MujocoCamera, Scene, load_scene
+from robot_side.simulation.camera_error import CameraError
 from tests.arm_models import SHAPES, STONE, planar_arm
 
 

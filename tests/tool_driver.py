@@ -8,9 +8,9 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm import MujocoArm, MujocoKinematics
 from robot_side.arm_port import ArmState, GripperPose
-from robot_side.encoders import Encoder
 from robot_side.resolved_rate import joint_velocities
 from robot_side.scene import GroundTruth, Scene, load_scene
+from robot_side.simulation.encoders import Encoder
 
 PERIOD_S = 0.004
 VALID_S = 0.05

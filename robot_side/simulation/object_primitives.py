@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.model_enums import GeomKind
 from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.simulation.model_enums import GeomKind
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.gripper_travel import GripperTravel
+from robot_side.simulation.gripper_travel import GripperTravel
 
 # Beyond this share of the stroke between where the drive would stand freely and where it stands, and below this
 # share of the stroke per second, for this long, something stops the fingers.

@@ -7,8 +7,8 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.joint_drives import JointDrives
-from robot_side.model_enums import BiasKind, GainKind, JointKind, TransmissionKind, WrappedKind
+from robot_side.simulation.joint_drives import JointDrives
+from robot_side.simulation.model_enums import BiasKind, GainKind, JointKind, TransmissionKind, WrappedKind
 
 _TURNING_OR_SLIDING = (JointKind.HINGE, JointKind.SLIDE)
 
