@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import io
+import re
 import signal
 import sys
 import tomllib
@@ -16,6 +17,8 @@ import tyro
 from common.errors import ConfigurationError, FeelaheadError
 
 Settings = TypeVar("Settings")
+
+_LONGEST_COMPLAINT = 400
 
 
 def parse_settings(settings_type: type[Settings], program: str, arguments: Sequence[str]) -> Settings:
@@ -115,11 +118,26 @@ def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path
 
 
 def _one_line(box: str, program: str) -> str:
-    """The first paragraph of tyro's boxed complaint as one line."""
+    """The first paragraph of tyro's complaint as one line; its box is drawn in ASCII where nothing else can be."""
     words: list[str] = []
     for line in box.splitlines()[1:]:
-        text = line.strip("│ \t")
-        if text.startswith(("──", "╰─")):
+        text = line.strip("│╭╮╰╯|+ \t")
+        ruled = text.strip("─-") == ""
+        if words and (ruled or text == "Got errors:"):
             break
-        words += text.split()
-    return f"{' '.join(words)} (see {program} --help)"
+        if not ruled:
+            words += text.split()
+    said = " ".join(words).removeprefix("Error parsing ")
+    said = re.sub(r"^\w+Settings: ", "", said)
+    said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
+    if fits:
+        return f"{_shortened(said)}; valid: a number"
+    for kind, valid in (("float", "a number"), ("int()", "a whole number")):
+        if kind in said:
+            return f"{_shortened(said)}; valid: {valid}"
+    return f"{_shortened(said)} (valid flags and values: {program} --help)"
+
+
+def _shortened(text: str) -> str:
+    """So that a value of a thousand digits does not bury what is wrong with it."""
+    return text if len(text) <= _LONGEST_COMPLAINT else f"{text[:_LONGEST_COMPLAINT]}..."

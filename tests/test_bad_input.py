@@ -64,7 +64,7 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (ROBOT, ["--duration", "-3"], "-3", "above 0"),
         (OPERATOR, ["--device", "keyboard"], "keyboard", "simulated"),
         (DEMO, ["--link", "dealy 5ms"], "dealy", "delay"),
-        (DEMO, ["--duration", "soon"], "soon", "--help"),
+        (DEMO, ["--duration", "soon"], "soon", "a number"),
         (feelahead.main.command, ["dmeo"], "dmeo", "demo"),
     ],
 )

@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -93,3 +96,30 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
         parse("--help")
     assert stop.value.code == 0
     assert "--probability" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_the_line_is_the_same_where_no_box_can_be_drawn(encoding: str) -> None:
+    code = (
+        "from tests.test_command_line import parse\n"
+        "from common.errors import ConfigurationError\n"
+        "for arguments in (['--duration', 'x'], ['--nonsense', '1'], ['--seed', 'y'], ['--link-model', 'pigeon']):\n"
+        "    try: parse(*arguments)\n"
+        "    except ConfigurationError as error: print(error)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "LC_ALL": "C"},
+        cwd=Path(__file__).parents[1],
+    )
+    lines = ended.stdout.splitlines()
+    assert lines == [
+        "--duration: 'x'; valid: a number",
+        "Unrecognized options: --nonsense, 1 (valid flags and values: prog --help)",
+        "--seed: invalid literal for int() with base 10: 'y'; valid: a whole number",
+        "invalid choice 'pigeon' for argument '--link-model'. Expected one of ('datagram', 'stream'). "
+        "(valid flags and values: prog --help)",
+    ]
