@@ -87,8 +87,9 @@ def _sampled_covariances(
 ) -> FloatArray:
     """Σ_ee (k, m, 3, 3) of every gripper sphere in configurations all over the joints' ranges."""
     generator = np.random.default_rng(seed)
-    lower = np.maximum(scene.robot.lower_rad, -np.pi)
-    upper = np.minimum(scene.robot.upper_rad, np.pi)
+    # A joint without limits is sampled over one turn.
+    lower = np.where(np.isfinite(scene.robot.lower_rad), scene.robot.lower_rad, -np.pi)
+    upper = np.where(np.isfinite(scene.robot.upper_rad), scene.robot.upper_rad, np.pi)
     present: ArmState = arm.state(0.0)
     configurations = generator.uniform(lower, upper, (_SAMPLED_CONFIGURATIONS, arm.joint_count))
     return np.stack(

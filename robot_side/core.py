@@ -28,6 +28,8 @@ OutgoingStream = Literal["haptics", "telemetry"]
 
 TELEMETRY_PERIOD_S = 0.02
 TRUTH_PERIOD_S = 0.01
+_SHOWN_NAME = 100
+"""Characters of an object's name that telemetry carries; a message has a limit."""
 _LET_GO_S = 0.1
 """Fingers that move for a moment, as they follow a slipping object, still hold it."""
 
@@ -212,13 +214,14 @@ class RobotSide:
                 self.session.link.stamp(now_s),
                 state=permission.state,
                 tool_position_m=_vector3(pose.tool_position_m),
-                tool_speed_m_s=speed_m_s,
-                target=None if target is None else objects.names[target],
+                # A simulation about to become unstable shows wild figures, and must get as far as saying so.
+                tool_speed_m_s=min(speed_m_s, 100.0),
+                target=None if target is None else objects.names[target][:_SHOWN_NAME],
                 target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
                 up_in_tool=_vector3(pose.tool_rotation[2]),
                 gripper_opening_m=max(0.0, state.gripper_opening_m),
                 holding=self._held is not None,
-                enlargement_m=float(sensed.enlargement_m.max()),
+                enlargement_m=min(float(sensed.enlargement_m.max()), 100.0),
                 l2=stiffness.l2,
                 r2=stiffness.r2,
             )

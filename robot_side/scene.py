@@ -70,11 +70,16 @@ def load_scene(
         start = _start_configuration(model, robot)
         if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot) for geom in thing.geoms):
             # Attaching extends the keyframes by what is attached, so that one carries the configuration over.
-            spec.add_key(name=_START_KEY, qpos=start)
+            start_key = _START_KEY
+            while any(model.key(key).name == start_key for key in range(model.nkey)):
+                start_key += "_"
+            spec.add_key(name=start_key, qpos=start)
             _attach_table(spec, model, robot, start)
             model = _compile(spec)
             robot = find_robot(model, site)
-            start = model.key(_START_KEY).qpos
+            start = model.key(start_key).qpos
+    if not (math.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):
+        raise ConfigurationError(f"model: timestep = {model.opt.timestep}; valid: above 0 s, such as 0.002")
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_forward(model, data)
@@ -222,7 +227,10 @@ def _start_configuration(model: Any, robot: RobotModel) -> FloatArray:
     keyframes = [model.key(key).name for key in range(model.nkey)]
     start: FloatArray
     if keyframes:
-        start = model.key_qpos[keyframes.index("home") if "home" in keyframes else 0].copy()
+        chosen = keyframes.index("home") if "home" in keyframes else 0
+        start = model.key_qpos[chosen].copy()
+        if not np.isfinite(start).all():
+            raise ConfigurationError(f"model: keyframe {keyframes[chosen]!r} holds NaN or infinity; valid: finite qpos")
         return start
     start = model.qpos0.copy()
     limited = np.isfinite(robot.lower_rad)

@@ -266,3 +266,24 @@ def test_the_gripper_is_found_beyond_the_last_arm_link(tmp_path: Path) -> None:
     assert names == ["palm", "left_tip", "right_tip"]
     np.testing.assert_array_equal(scene.robot.geom_on_finger, [False, True, True])
     assert [scene.model.actuator(int(index)).name for index in scene.robot.gripper_actuators] == ["hand"]
+
+
+def test_a_timestep_that_cannot_advance_is_named(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path)
+    path.write_text(path.read_text().replace("<worldbody>", '<option timestep="0"/><worldbody>', 1))
+    with pytest.raises(ConfigurationError, match="timestep"):
+        load_scene(path, "tcp")
+
+
+def test_a_keyframe_that_is_no_number_is_named(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path, extra_bottom='<keyframe><key name="home" qpos="nan 0 0 0"/></keyframe>')
+    with pytest.raises(ConfigurationError, match="'home'"):
+        load_scene(path, "tcp")
+
+
+def test_a_keyframe_may_have_the_name_that_the_table_would_take(tmp_path: Path) -> None:
+    keys = '<key name="home" qpos="0.1 -0.2 0.01 0.01"/><key name="feelahead_start" qpos="0 0 0 0"/>'
+    floor = '<geom type="plane" size="1 1 0.1"/>'
+    scene = load_scene(planar_arm(tmp_path, world=floor, extra_bottom=f"<keyframe>{keys}</keyframe>"), "tcp")
+    assert scene.roles["target"] is Role.TARGET
+    assert scene.data.qpos[0] == pytest.approx(0.1)
