@@ -8,6 +8,7 @@ from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
+from common.priority import raise_priority
 from common.sockets import OperatorSockets
 from common.status import Status
 from common.stop_signal import StopSignal, ignore_broken_output
@@ -50,6 +51,7 @@ def command(arguments: Sequence[str]) -> int:
             person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
         else:
             device = HidDualSense()
+        raise_priority()
         failure: FeelaheadError | None = None
         try:
             _loop(settings, core, line, sockets, device, person, stop, status)

@@ -9,6 +9,7 @@ from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
+from common.priority import raise_priority
 from common.sockets import RobotSockets
 from common.statistics import RunningStatistics
 from common.status import Status
@@ -44,6 +45,7 @@ def command(arguments: Sequence[str]) -> int:
             status.note(f"compiled the overlap kernels in {compile_s:.1f} s; the next start finds them ready")
         status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
         status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
+        raise_priority()
         tick_time = RunningStatistics(settings.seed)
         clock = MonotonicClock()
         start_s = clock.now()
