@@ -36,5 +36,7 @@ class RunOptions:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
+        if self.summary is not None and self.summary.is_dir():
+            raise ValueError(f"--summary {self.summary}: is a folder; valid: a file's path")
         if self.summary is not None and not self.summary.absolute().parent.is_dir():
             raise ValueError(f"--summary {self.summary}: there is no folder {self.summary.absolute().parent}")

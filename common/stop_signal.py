@@ -8,7 +8,8 @@ from types import FrameType, TracebackType
 class StopSignal:
     """Set by SIGINT or SIGTERM while the context is open; the old handlers come back after it."""
 
-    _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+    # A closed terminal, too: a controller must not be left with stiff triggers.
+    _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def __init__(self) -> None:
         self.is_set = False

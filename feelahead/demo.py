@@ -158,8 +158,8 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _report(summary: dict[str, Any]) -> list[str]:
     """The run in a few lines for people."""
-    if "stiffness" not in summary:
-        return []
+    if not summary.get("ticks"):
+        return ["ended before the first tick"]
     delays = summary.get("delay_ms", {})
     shown = [
         f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"
