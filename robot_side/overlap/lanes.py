@@ -1,0 +1,94 @@
+"""Columns of numbers, one lane a pair: the working memory of the vectorised loops.
+
+A block's columns lie one after another in a single array at distances that are known when compiling, so that LLVM
+can tell them apart and turn a loop over lanes into vector instructions.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+from common.arrays import FloatArray
+from robot_side.overlap.compile import inlined
+from robot_side.overlap.solid import Overlap
+from robot_side.overlap.vectors import Vector
+
+LANES = 64
+"""Pairs in a block: small enough for the columns to stay in the first-level cache."""
+
+WIDTH = 8
+"""Lanes come in groups of as many as the widest vectors hold, which spares the loops a scalar remainder."""
+
+RESULT_COLUMNS = 6
+"""V, the gradient, the area, and 1 where the pair is unsettled."""
+
+NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
+"""What a pair's bounds tell: no contact, the sphere within the solid, the solid within the sphere, or neither."""
+
+
+@inlined
+def column(lanes: FloatArray, index: int, lane: int) -> float:
+    """Column `index` of `lane`."""
+    return lanes[np.uint64(index * LANES + lane)]
+
+
+@inlined
+def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
+    """Columns `index` to `index` + 2 of `lane`."""
+    return (
+        lanes[np.uint64(index * LANES + lane)],
+        lanes[np.uint64((index + 1) * LANES + lane)],
+        lanes[np.uint64((index + 2) * LANES + lane)],
+    )
+
+
+@inlined
+def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, size: float, unsettled: float) -> None:
+    """Write an overlap that was worked out with lengths divided by `size` to the columns from `index`."""
+    area = size * size
+    lanes[np.uint64(index * LANES + lane)] = overlap[0] * (area * size)
+    lanes[np.uint64((index + 1) * LANES + lane)] = overlap[1][0] * area
+    lanes[np.uint64((index + 2) * LANES + lane)] = overlap[1][1] * area
+    lanes[np.uint64((index + 3) * LANES + lane)] = overlap[1][2] * area
+    lanes[np.uint64((index + 4) * LANES + lane)] = overlap[2] * area
+    lanes[np.uint64((index + 5) * LANES + lane)] = unsettled
+
+
+@inlined
+def copy_lane(lanes: FloatArray, lane: int, target: FloatArray, target_lane: int, columns: int) -> None:
+    """Copy the first `columns` of `lane`."""
+    for index in range(columns):
+        target[np.uint64(index * LANES + target_lane)] = lanes[np.uint64(index * LANES + lane)]
+
+
+@inlined
+def scatter(
+    lanes: FloatArray, index: int, lane: int, pair: int, volumes: FloatArray, gradients: FloatArray, areas: FloatArray
+) -> None:
+    """Write the result of `lane`, in the columns from `index`, to row `pair` of the results."""
+    volumes[pair] = lanes[np.uint64(index * LANES + lane)]
+    gradients[pair, 0] = lanes[np.uint64((index + 1) * LANES + lane)]
+    gradients[pair, 1] = lanes[np.uint64((index + 2) * LANES + lane)]
+    gradients[pair, 2] = lanes[np.uint64((index + 3) * LANES + lane)]
+    areas[pair] = lanes[np.uint64((index + 4) * LANES + lane)]
+
+
+@inlined
+def lane_groups(count: int) -> int:
+    """How many groups of `WIDTH` lanes hold `count` pairs."""
+    return (count + (WIDTH - 1)) // WIDTH
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def power_of_two_below(_typing_context: Any, length: Any) -> Any:
+    """The largest power of two that is at most `length` (positive, normal): dividing by it loses nothing."""
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        integer, double = context.get_value_type(types.int64), context.get_value_type(types.float64)
+        bits = builder.bitcast(arguments[0], integer)
+        return builder.bitcast(builder.and_(bits, integer(0x7FF0000000000000)), double)
+
+    del length
+    return types.float64(types.float64), generate
