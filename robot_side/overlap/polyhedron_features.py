@@ -13,23 +13,24 @@ from robot_side.overlap.double_double import (
     is_less,
     minus,
     negated,
-    plus,
     square_root,
-    times,
+    two_product,
 )
 from robot_side.overlap.double_double_vectors import (
     load_number,
     load_vector,
-    precise_add,
     precise_cross,
     precise_dot,
-    precise_negative,
     precise_scale,
     precise_subtract,
     precise_unit,
     store_number,
     store_vector,
 )
+from robot_side.overlap.expansion import exact_power
+
+UNCERTAIN = 1e-28
+"""Powers of corners below this, for R = 1, are taken again without rounding."""
 
 
 class Topology(NamedTuple):
@@ -118,39 +119,47 @@ def new_features() -> Features:
 
 
 @building_block
-def measure_corners_and_edges(features: Features, topology: Topology, radius: float) -> None:
-    """Fill in all about corners and edges from `points` and the `radius` (m)."""
-    radius_2 = times((radius, 0.0), (radius, 0.0))
-    for corner in range(topology.corner_edges.shape[0]):
-        point = load_vector(features.points, corner)
-        distance_2 = precise_dot(point, point)
-        store_number(features.corners, corner, 0, square_root(distance_2))
-        store_number(features.corners, corner, 1, minus(radius_2, distance_2))
-    for edge in range(topology.edge_ends.shape[0]):
-        start_corner, end_corner = topology.edge_ends[edge]
-        start = load_vector(features.points, start_corner)
-        end = load_vector(features.points, end_corner)
-        parallel = topology.parallel_edges[edge]
-        if parallel == edge:
-            direction, _ = precise_unit(precise_subtract(end, start))
-        else:
-            direction = load_vector(features.directions, parallel)
-        start_along, end_along = precise_dot(start, direction), precise_dot(end, direction)
-        # From the nearer end, as it rounds less.
-        if abs(start_along[0]) <= abs(end_along[0]):
-            foot = precise_subtract(start, precise_scale(start_along, direction))
-        else:
-            foot = precise_subtract(end, precise_scale(end_along, direction))
-        base_2 = precise_dot(foot, foot)
-        half_chord = square_root(minus(radius_2, base_2))
-        store_vector(features.directions, edge, direction)
-        store_vector(features.feet, edge, foot)
-        store_number(features.edges, edge, 0, start_along)
-        store_number(features.edges, edge, 1, end_along)
-        store_number(features.edges, edge, 2, base_2)
-        store_number(features.edges, edge, 3, half_chord)
-        crosses = is_less(start_along, half_chord) and is_less(negated(half_chord), end_along)
-        features.reached[edge] = 1.0 if crosses and half_chord[0] > 0.0 else 0.0
+def measure_corner(features: Features, corner: int, radius: float) -> None:
+    """Fill in the measures of `corner` from `points` and the `radius` (m)."""
+    point = load_vector(features.points, corner)
+    distance_2 = precise_dot(point, point)
+    power = minus(two_product(radius, radius), distance_2)
+    if abs(power[0]) < UNCERTAIN * radius * radius:
+        power = exact_power(point, radius), 0.0
+    store_number(features.corners, corner, 0, square_root(distance_2))
+    store_number(features.corners, corner, 1, power)
+
+
+@building_block
+def measure_direction(features: Features, topology: Topology, edge: int) -> None:
+    """Fill in the direction of `edge` from `points`."""
+    start, end = topology.edge_ends[edge]
+    side = precise_subtract(load_vector(features.points, end), load_vector(features.points, start))
+    direction, _ = precise_unit(side)
+    store_vector(features.directions, edge, direction)
+
+
+@building_block
+def measure_edge(features: Features, topology: Topology, edge: int, radius: float) -> None:
+    """Fill in the measures of `edge` from `points`, `directions` and the `radius` (m)."""
+    start_corner, end_corner = topology.edge_ends[edge]
+    start, end = load_vector(features.points, start_corner), load_vector(features.points, end_corner)
+    direction = load_vector(features.directions, edge)
+    start_along, end_along = precise_dot(start, direction), precise_dot(end, direction)
+    # From the nearer end, as it rounds less.
+    if abs(start_along[0]) <= abs(end_along[0]):
+        foot = precise_subtract(start, precise_scale(start_along, direction))
+    else:
+        foot = precise_subtract(end, precise_scale(end_along, direction))
+    base_2 = precise_dot(foot, foot)
+    half_chord = square_root(minus(two_product(radius, radius), base_2))
+    store_vector(features.feet, edge, foot)
+    store_number(features.edges, edge, 0, start_along)
+    store_number(features.edges, edge, 1, end_along)
+    store_number(features.edges, edge, 2, base_2)
+    store_number(features.edges, edge, 3, half_chord)
+    crosses = is_less(start_along, half_chord) and is_less(negated(half_chord), end_along)
+    features.reached[edge] = 1.0 if crosses and half_chord[0] > 0.0 else 0.0
 
 
 @building_block
@@ -193,3 +202,19 @@ def distance_in_face(features: Features, topology: Topology, face: int, side: in
     outward = precise_cross(load_vector(features.directions, edge), load_vector(features.normals, face))
     distance = precise_dot(load_vector(features.feet, edge), outward)
     return distance if sign > 0.0 else negated(distance)
+
+
+@building_block
+def measure_all(features: Features, topology: Topology, radius: float) -> None:
+    """Fill in everything from `points` and the `radius` (m)."""
+    for corner in range(topology.corner_edges.shape[0]):
+        measure_corner(features, corner, radius)
+    for edge in range(topology.edge_ends.shape[0]):
+        parallel = topology.parallel_edges[edge]
+        if parallel == edge:
+            measure_direction(features, topology, edge)
+        else:
+            store_vector(features.directions, edge, load_vector(features.directions, parallel))
+        measure_edge(features, topology, edge, radius)
+    for face in range(topology.face_corners.shape[0]):
+        measure_face(features, topology, face)

@@ -71,9 +71,7 @@ def arctangent(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble:
         return 0.0, 0.0
     step = int(math.atan(across[0] / along[0]) * (STEPS / math.pi) + 0.5)
     cosine, sine = (TABLE[step, 0, 0], TABLE[step, 0, 1]), (TABLE[step, 1, 0], TABLE[step, 1, 1])
-    tangent = divided(
-        minus(times(across, cosine), times(along, sine)), plus(times(along, cosine), times(across, sine))
-    )
+    tangent = divided(minus(times(across, cosine), times(along, sine)), plus(times(along, cosine), times(across, sine)))
     square = times(tangent, tangent)
     q = square[0]
     rest = q * (1.0 / 9.0 - q * (1.0 / 11.0 - q * (1.0 / 13.0 - q * (1.0 / 15.0))))

@@ -6,29 +6,20 @@ Nothing is validated here, as in `kernels`. Each function overwrites the results
 import math
 
 from common.arrays import FloatArray, IntArray
-from robot_side.overlap.compile import building_block, compiled, inlined, input_array, input_indices, output_array
-from robot_side.overlap.double_double import DoubleDouble, multiple, two_product, two_sum, negated, plus
+from robot_side.overlap.compile import compiled, inlined, input_array, input_indices, output_array
+from robot_side.overlap.double_double import two_product, two_sum
 from robot_side.overlap.double_double_vectors import (
     PreciseVector,
     load_vector,
-    precise_cross,
-    precise_dot,
-    precise_negative,
     precise_add,
+    precise_negative,
     precise_subtract,
     store_vector,
 )
-from robot_side.overlap.polyhedron_features import (
-    BOX,
-    TETRAHEDRON,
-    Features,
-    Topology,
-    measure_corners_and_edges,
-    measure_face,
-    new_features,
-)
-from robot_side.overlap.precise_sum import sum_over_faces
-from robot_side.overlap.solid import Overlap, bounded, nothing
+from robot_side.overlap.expansion import determinant
+from robot_side.overlap.polyhedron_features import BOX, TETRAHEDRON, new_features
+from robot_side.overlap.precise_polyhedron import polyhedron_overlap
+from robot_side.overlap.solid import Overlap
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
@@ -52,19 +43,18 @@ def precise_tetrahedra(
             for axis in range(3):
                 difference = two_sum(scale * vertices[pair, corner, axis], -scale * centers[pair, axis])
                 features.points[corner, axis, 0], features.points[corner, axis, 1] = difference
-        a, b = load_vector(features.points, 0), load_vector(features.points, 1)
-        c, d = load_vector(features.points, 2), load_vector(features.points, 3)
-        volume_6 = _triple_product(precise_subtract(b, a), precise_subtract(c, a), precise_subtract(d, a))
-        if volume_6[0] < 0.0:
-            store_vector(features.points, 2, d)
-            store_vector(features.points, 3, c)
-        overlap = _overlap(features, TETRAHEDRON, radius, abs(volume_6[0]) / 6.0)
+        volume_6 = determinant(
+            _side(vertices, pair, 1, scale), _side(vertices, pair, 2, scale), _side(vertices, pair, 3, scale)
+        )
+        if volume_6 < 0.0:
+            third = load_vector(features.points, 2)
+            store_vector(features.points, 2, load_vector(features.points, 3))
+            store_vector(features.points, 3, third)
+        overlap = polyhedron_overlap(features, TETRAHEDRON, radius, abs(volume_6) / 6.0)
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 
 
-@compiled(
-    input_array(2), input_array(1), input_array(2), input_array(3), input_array(2), input_indices(), *_RESULTS
-)
+@compiled(input_array(2), input_array(1), input_array(2), input_array(3), input_array(2), input_indices(), *_RESULTS)
 def precise_boxes(
     centers: FloatArray,
     radii: FloatArray,
@@ -89,26 +79,16 @@ def precise_boxes(
         u = _half_edge(box_rotations, box_half_sizes, pair, 0, scale)
         v = _half_edge(box_rotations, box_half_sizes, pair, 1, scale)
         w = _half_edge(box_rotations, box_half_sizes, pair, 2, scale)
-        volume_8th = _triple_product(u, v, w)
-        if volume_8th[0] < 0.0:
+        volume_8th = determinant(u, v, w)
+        if volume_8th < 0.0:
             u = precise_negative(u)
         for corner in range(8):
             point = precise_add(middle, u) if corner & 1 else precise_subtract(middle, u)
             point = precise_add(point, v) if corner & 2 else precise_subtract(point, v)
             point = precise_add(point, w) if corner & 4 else precise_subtract(point, w)
             store_vector(features.points, corner, point)
-        overlap = _overlap(features, BOX, radius, 8.0 * abs(volume_8th[0]))
+        overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
-
-
-@building_block
-def _overlap(features: Features, topology: Topology, radius: float, solid_volume: float) -> Overlap:
-    if solid_volume == 0.0 or radius == 0.0:
-        return nothing()
-    measure_corners_and_edges(features, topology, radius)
-    for face in range(topology.face_corners.shape[0]):
-        measure_face(features, topology, face)
-    return bounded(sum_over_faces(features, topology, radius), radius, solid_volume)
 
 
 @inlined
@@ -123,9 +103,14 @@ def _half_edge(
     )
 
 
-@building_block
-def _triple_product(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> DoubleDouble:
-    return precise_dot(a, precise_cross(b, c))
+@inlined
+def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> PreciseVector:
+    """The exact vector from the first corner to another, times `scale`."""
+    return (
+        two_sum(scale * vertices[pair, corner, 0], -scale * vertices[pair, 0, 0]),
+        two_sum(scale * vertices[pair, corner, 1], -scale * vertices[pair, 0, 1]),
+        two_sum(scale * vertices[pair, corner, 2], -scale * vertices[pair, 0, 2]),
+    )
 
 
 @inlined
