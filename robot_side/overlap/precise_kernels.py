@@ -5,6 +5,8 @@ Nothing is validated here, as in `kernels`. Each function overwrites the results
 
 import math
 
+import numpy as np
+
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import compiled, inlined, input_array, input_indices, output_array
 from robot_side.overlap.double_double import two_product, two_sum
@@ -17,7 +19,7 @@ from robot_side.overlap.double_double_vectors import (
     store_vector,
 )
 from robot_side.overlap.expansion import determinant
-from robot_side.overlap.polyhedron_features import BOX, TETRAHEDRON, new_features
+from robot_side.overlap.polyhedron_features import BOX, POINTS, ROWS, TETRAHEDRON
 from robot_side.overlap.precise_polyhedron import polyhedron_overlap
 from robot_side.overlap.solid import Overlap
 
@@ -35,21 +37,21 @@ def precise_tetrahedra(
     areas: FloatArray,
 ) -> None:
     """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
-    features = new_features()
+    features = np.empty((ROWS, 3, 2))
     for index in range(rows.size):
         pair = rows[index]
         radius, scale = _scaled_radius(radii[pair])
         for corner in range(4):
             for axis in range(3):
                 difference = two_sum(scale * vertices[pair, corner, axis], -scale * centers[pair, axis])
-                features.points[corner, axis, 0], features.points[corner, axis, 1] = difference
+                features[POINTS + corner, axis, 0], features[POINTS + corner, axis, 1] = difference
         volume_6 = determinant(
             _side(vertices, pair, 1, scale), _side(vertices, pair, 2, scale), _side(vertices, pair, 3, scale)
         )
         if volume_6 < 0.0:
-            third = load_vector(features.points, 2)
-            store_vector(features.points, 2, load_vector(features.points, 3))
-            store_vector(features.points, 3, third)
+            third = load_vector(features, POINTS + 2)
+            store_vector(features, POINTS + 2, load_vector(features, POINTS + 3))
+            store_vector(features, POINTS + 3, third)
         overlap = polyhedron_overlap(features, TETRAHEDRON, radius, abs(volume_6) / 6.0)
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 
@@ -67,7 +69,7 @@ def precise_boxes(
     areas: FloatArray,
 ) -> None:
     """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows` (k,)."""
-    features = new_features()
+    features = np.empty((ROWS, 3, 2))
     for index in range(rows.size):
         pair = rows[index]
         radius, scale = _scaled_radius(radii[pair])
@@ -86,7 +88,7 @@ def precise_boxes(
             point = precise_add(middle, u) if corner & 1 else precise_subtract(middle, u)
             point = precise_add(point, v) if corner & 2 else precise_subtract(point, v)
             point = precise_add(point, w) if corner & 4 else precise_subtract(point, w)
-            store_vector(features.points, corner, point)
+            store_vector(features, POINTS + corner, point)
         overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 

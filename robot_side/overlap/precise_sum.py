@@ -8,7 +8,10 @@ Oosterom's and Strackee's (1983); the angle of each complex number is half of th
 of the ball are left as lengths. The result is continuous, like the orthoschemes', wherever rounding puts a crossing.
 """
 
-from robot_side.overlap.compile import building_block, inlined
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.overlap.compile import building_block
 from robot_side.overlap.double_double import (
     PI,
     ZERO,
@@ -22,52 +25,81 @@ from robot_side.overlap.double_double import (
     rounded,
     times,
 )
-from robot_side.overlap.double_double_vectors import load_number, load_vector, precise_dot
-from robot_side.overlap.polyhedron_features import Features, Topology, distance_in_face
+from robot_side.overlap.double_double_vectors import (
+    highs,
+    load_number,
+    load_vector,
+    precise_add,
+    precise_dot,
+    precise_scale,
+)
+from robot_side.overlap.polyhedron_features import (
+    BASES,
+    EDGE_ENDS,
+    ENDS,
+    FACE_CORNERS,
+    FACE_EDGES,
+    FACE_SIGNS,
+    FACES,
+    HALF_CHORDS,
+    HEIGHTS,
+    LENGTHS,
+    MOMENTS,
+    NORMALS,
+    POINTS,
+    REACHED,
+    SIDES,
+    STARTS,
+    distance_in_face,
+)
 from robot_side.overlap.precise_arctangent import NO_TURN, Turn, turned, whole_angle
 from robot_side.overlap.solid import Overlap
+from robot_side.overlap.vectors import negative
 
 
 @building_block
-def sum_over_faces(features: Features, topology: Topology, radius: float) -> Overlap:
+def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Overlap:
     """The overlap with the solid that `features` holds the measures of; it is not yet within its bounds."""
     ball = (radius, 0.0)
     radius_2 = times(ball, ball)
     solid_angle = NO_TURN
     moment, arcs = ZERO, ZERO
-    push_x, push_y, push_z = ZERO, ZERO, ZERO
-    for face in range(topology.face_corners.shape[0]):
-        height = load_number(features.faces, face, 0)
+    push = ZERO, ZERO, ZERO
+    for face in range(FACES[solid]):
+        height = load_number(features, HEIGHTS + face)
         below = height[0] < 0.0 or (height[0] == 0.0 and height[1] < 0.0)
         depth = negated(height) if below else height
-        sides = topology.face_corners.shape[1]
+        sides = SIDES[solid]
         foot_inside, side_reached = True, False
         in_reach = is_less(depth, ball)
         if in_reach:
             for side in range(sides):
-                side_reached = side_reached or features.reached[topology.face_edges[face, side]] > 0.0
-                foot_inside = foot_inside and distance_in_face(features, topology, face, side)[0] > 0.0
+                side_reached = side_reached or features[REACHED + FACE_EDGES[solid, face, side], 0, 0] > 0.0
+                foot_inside = foot_inside and distance_in_face(features, solid, face, side)[0] > 0.0
         if not in_reach or not (foot_inside or side_reached):
-            solid_angle = _whole_face(features, topology, face, solid_angle)
+            solid_angle = _whole_face(features, solid, face, solid_angle)
             continue
         plane_angle, triangle = NO_TURN, ZERO
         for side in range(sides):
-            edge, sign = topology.face_edges[face, side], topology.face_signs[face, side]
-            distance = distance_in_face(features, topology, face, side)
-            first, last = (0, 1) if sign > 0.0 else (1, 0)
-            start, end = load_number(features.edges, edge, first), load_number(features.edges, edge, last)
-            start_slant = load_number(features.corners, topology.edge_ends[edge, first], 0)
-            end_slant = load_number(features.corners, topology.edge_ends[edge, last], 0)
-            if sign < 0.0:
+            edge, sign = FACE_EDGES[solid, face, side], FACE_SIGNS[solid, face, side]
+            distance = distance_in_face(features, solid, face, side)
+            first, last = (0, 1) if sign > 0 else (1, 0)
+            start, end = (
+                load_number(features, (STARTS if sign > 0 else ENDS) + edge),
+                load_number(features, (ENDS if sign > 0 else STARTS) + edge),
+            )
+            start_slant = load_number(features, LENGTHS + EDGE_ENDS[solid, edge, first])
+            end_slant = load_number(features, LENGTHS + EDGE_ENDS[solid, edge, last])
+            if sign < 0:
                 start, end = negated(start), negated(end)
-            base_2 = load_number(features.edges, edge, 2)
+            base_2 = load_number(features, BASES + edge)
             frame = depth, distance, times(distance, distance), base_2, below
-            if features.reached[edge] == 0.0:
+            if features[REACHED + edge, 0, 0] == 0.0:
                 plane_angle, solid_angle = _outside(
                     frame, (start, start_slant), (end, end_slant), plane_angle, solid_angle
                 )
                 continue
-            half_chord = load_number(features.edges, edge, 3)
+            half_chord = load_number(features, HALF_CHORDS + edge)
             enter, leave = negated(half_chord), half_chord
             if is_less(start, enter):
                 plane_angle, solid_angle = _outside(
@@ -86,12 +118,10 @@ def sum_over_faces(features: Features, topology: Topology, radius: float) -> Ove
         moment = plus(moment, times(height, area))
         arc = times(minus(ball, depth), angle)
         arcs = minus(arcs, arc) if below else plus(arcs, arc)
-        push_x = plus(push_x, times(area, load_number(features.normals, face, 0)))
-        push_y = plus(push_y, times(area, load_number(features.normals, face, 1)))
-        push_z = plus(push_z, times(area, load_number(features.normals, face, 2)))
+        push = precise_add(push, precise_scale(area, load_vector(features, NORMALS + face)))
     surface = minus(multiple(2.0, times(radius_2, whole_angle(solid_angle))), times(ball, arcs))
     volume = divided(plus(moment, times(ball, surface)), (3.0, 0.0))
-    return rounded(volume), (-rounded(push_x), -rounded(push_y), -rounded(push_z)), rounded(surface)
+    return rounded(volume), negative(highs(push)), rounded(surface)
 
 
 Frame = tuple[DoubleDouble, DoubleDouble, DoubleDouble, DoubleDouble, bool]
@@ -117,15 +147,15 @@ def _outside(
 
 
 @building_block
-def _whole_face(features: Features, topology: Topology, face: int, solid_angle: Turn) -> Turn:
+def _whole_face(features: FloatArray, solid: np.int64, face: int, solid_angle: Turn) -> Turn:
     """`solid_angle` with that of a face added, which does not contain the centre."""
-    volume_6 = load_number(features.faces, face, 1)
-    a_corner = topology.face_corners[face, 0]
-    a, a_length = load_vector(features.points, a_corner), load_number(features.corners, a_corner, 0)
-    for side in range(1, topology.face_corners.shape[1] - 1):
-        b_corner, c_corner = topology.face_corners[face, side], topology.face_corners[face, side + 1]
-        b, b_length = load_vector(features.points, b_corner), load_number(features.corners, b_corner, 0)
-        c, c_length = load_vector(features.points, c_corner), load_number(features.corners, c_corner, 0)
+    volume_6 = load_number(features, MOMENTS + face)
+    a_corner = FACE_CORNERS[solid, face, 0]
+    a, a_length = load_vector(features, POINTS + a_corner), load_number(features, LENGTHS + a_corner)
+    for side in range(1, SIDES[solid] - 1):
+        b_corner, c_corner = FACE_CORNERS[solid, face, side], FACE_CORNERS[solid, face, side + 1]
+        b, b_length = load_vector(features, POINTS + b_corner), load_number(features, LENGTHS + b_corner)
+        c, c_length = load_vector(features, POINTS + c_corner), load_number(features, LENGTHS + c_corner)
         cosine = times(a_length, times(b_length, c_length))
         cosine = plus(cosine, times(precise_dot(a, b), c_length))
         cosine = plus(cosine, times(precise_dot(b, c), a_length))

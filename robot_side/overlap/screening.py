@@ -2,9 +2,23 @@
 
 import math
 
-from common.arrays import IntArray
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import building_block, inlined
-from robot_side.overlap.polyhedron_features import Features, Topology
+from robot_side.overlap.double_double_vectors import highs, load_vector
+from robot_side.overlap.polyhedron_features import (
+    CORNER_EDGES,
+    CORNER_FACES,
+    CORNERS,
+    EDGE_ENDS,
+    EDGE_FACES,
+    EDGES,
+    FACE_CORNERS,
+    FACES,
+    POINTS,
+    SIDES,
+)
 from robot_side.overlap.vectors import Vector, add, cross, dot, norm, scale
 
 NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER, ANYTHING = 0, 1, 2, 3, 4, 5
@@ -13,8 +27,8 @@ _MARGIN = 1e-14
 
 
 @building_block
-def screened(features: Features, topology: Topology, radius: float) -> tuple[int, int]:
-    """(what the ball reaches, the number of that feature) from `features.points` and `radius` (m).
+def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int, int]:
+    """(what the ball reaches, the number of that feature) from the corners in `features` and `radius` (m).
 
     - NOTHING or WHOLE_SPHERE: no point of the surface lies inside the ball, which is outside or inside the solid;
     - FACE: no edge has a point inside the ball, and one face at most;
@@ -22,7 +36,7 @@ def screened(features: Features, topology: Topology, radius: float) -> tuple[int
     - CORNER: no other corner and only edges and faces that meet in this one have a point inside the ball;
     - ANYTHING: what rounding may decide, and everything else.
     """
-    edges, corners, farthest = topology.edge_ends.shape[0], topology.corner_edges.shape[0], 0.0
+    edges, corners, farthest = EDGES[solid], CORNERS[solid], 0.0
     for corner in range(corners):
         farthest = max(farthest, norm(_point(features, corner)))
     margin = _MARGIN * farthest
@@ -33,7 +47,7 @@ def screened(features: Features, topology: Topology, radius: float) -> tuple[int
             corner = candidate
     reached_edges, edge = 0, 0
     for candidate in range(edges):
-        if _edge_distance(features, topology, candidate) < radius + margin:
+        if _edge_distance(features, solid, candidate) < radius + margin:
             reached_edges += 1
             edge = candidate
     if inside_corners > 1 or reached_edges > 3:
@@ -41,8 +55,8 @@ def screened(features: Features, topology: Topology, radius: float) -> tuple[int
 
     reached_faces, face, foreign_faces, all_above = 0, 0, 0, True
     certain = True
-    for candidate in range(topology.face_corners.shape[0]):
-        height, inside, face_margin = _face(features, topology, candidate, margin)
+    for candidate in range(FACES[solid]):
+        height, inside, face_margin = _face(features, solid, candidate, margin)
         certain = certain and face_margin < 0.25 * radius
         all_above = all_above and height > radius - face_margin
         if abs(height) > radius + face_margin or inside < -face_margin:
@@ -51,8 +65,8 @@ def screened(features: Features, topology: Topology, radius: float) -> tuple[int
         face = candidate
         certain = certain and inside > face_margin
         if inside_corners == 1:
-            foreign_faces += 0 if _is_one_of(candidate, topology.corner_faces[corner]) else 1
-        elif not _is_one_of(candidate, topology.edge_faces[edge]):
+            foreign_faces += 0 if _is_one_of(candidate, CORNER_FACES[solid, corner]) else 1
+        elif not _is_one_of(candidate, EDGE_FACES[solid, edge]):
             foreign_faces += 1
     what, feature = ANYTHING, 0
     if reached_edges == 0:
@@ -64,33 +78,33 @@ def screened(features: Features, topology: Topology, radius: float) -> tuple[int
         what, feature = EDGE, edge
     elif inside_corners == 1 and foreign_faces == 0:
         own_edges = 0
-        for own in topology.corner_edges[corner]:
-            own_edges += 1 if _edge_distance(features, topology, own) < radius + margin else 0
+        for own in CORNER_EDGES[solid, corner]:
+            own_edges += 1 if _edge_distance(features, solid, own) < radius + margin else 0
         if own_edges == reached_edges:
             what, feature = CORNER, corner
     return what, feature
 
 
 @inlined
-def _point(features: Features, corner: int) -> Vector:
-    return features.points[corner, 0, 0], features.points[corner, 1, 0], features.points[corner, 2, 0]
+def _point(features: FloatArray, corner: int) -> Vector:
+    return highs(load_vector(features, POINTS + corner))
 
 
 @building_block
-def _side(features: Features, start: int, end: int) -> Vector:
+def _side(features: FloatArray, start: int, end: int) -> Vector:
     """The vector from one corner to another, to full relative accuracy."""
-    points = features.points
+    a, b = load_vector(features, POINTS + start), load_vector(features, POINTS + end)
     return (
-        (points[end, 0, 0] - points[start, 0, 0]) + (points[end, 0, 1] - points[start, 0, 1]),
-        (points[end, 1, 0] - points[start, 1, 0]) + (points[end, 1, 1] - points[start, 1, 1]),
-        (points[end, 2, 0] - points[start, 2, 0]) + (points[end, 2, 1] - points[start, 2, 1]),
+        (b[0][0] - a[0][0]) + (b[0][1] - a[0][1]),
+        (b[1][0] - a[1][0]) + (b[1][1] - a[1][1]),
+        (b[2][0] - a[2][0]) + (b[2][1] - a[2][1]),
     )
 
 
 @building_block
-def _edge_distance(features: Features, topology: Topology, edge: int) -> float:
+def _edge_distance(features: FloatArray, solid: np.int64, edge: int) -> float:
     """The distance (m) from the centre to the edge, its ends included."""
-    start_corner, end_corner = topology.edge_ends[edge]
+    start_corner, end_corner = EDGE_ENDS[solid, edge]
     start, end = _point(features, start_corner), _point(features, end_corner)
     side = _side(features, start_corner, end_corner)
     length_2 = dot(side, side)
@@ -103,9 +117,9 @@ def _edge_distance(features: Features, topology: Topology, edge: int) -> float:
 
 
 @building_block
-def _face(features: Features, topology: Topology, face: int, margin: float) -> tuple[float, float, float]:
+def _face(features: FloatArray, solid: np.int64, face: int, margin: float) -> tuple[float, float, float]:
     """(signed height h, least signed distance d of a side, how far rounding may put them off), all in m."""
-    corners = topology.face_corners[face]
+    corners = FACE_CORNERS[solid, face]
     first, second = _side(features, corners[0], corners[1]), _side(features, corners[1], corners[2])
     across = cross(first, second)
     area_2 = norm(across)
@@ -114,9 +128,9 @@ def _face(features: Features, topology: Topology, face: int, margin: float) -> t
     normal = scale(1.0 / area_2, across)
     face_margin = margin * (1.0 + norm(first) * norm(second) / area_2)
     height = dot(_point(features, corners[1]), normal)
-    inside = math.inf
-    for side in range(corners.size):
-        end = corners[side + 1] if side + 1 < corners.size else corners[0]
+    inside, sides = math.inf, SIDES[solid]
+    for side in range(sides):
+        end = corners[side + 1] if side + 1 < sides else corners[0]
         along = _side(features, corners[side], end)
         start = _point(features, corners[side])
         inside = min(inside, dot(start, cross(along, normal)) / norm(along))
