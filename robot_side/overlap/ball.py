@@ -3,8 +3,9 @@
 import math
 
 from robot_side.overlap.compile import building_block
+from robot_side.overlap.double_double import minus, plus, rounded, square_root, times, two_sum
 from robot_side.overlap.solid import Overlap, bounded, nothing, sphere_volume, whole_solid, whole_sphere
-from robot_side.overlap.vectors import Vector, norm, scale, subtract
+from robot_side.overlap.vectors import Vector, scale
 
 
 @building_block
@@ -12,16 +13,20 @@ def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_ra
     """The lens that the sphere (`center`, `radius`) has in common with another; all in m.
 
     The volume of the lens is a product and a sum of terms that are positive throughout, formed from three
-    gaps that are differences of lengths: `overlap` between the surfaces facing each other and the distances
+    gaps that are differences of lengths, taken in double-double: `overlap` between the surfaces facing each other and the distances
     by which the smaller sphere still sticks out. Spheres that touch, inside or outside, give the limit
     exactly. Two equal spheres at the same place count as the first within the second.
     """
-    toward = subtract(other_center, center)
-    distance = norm(toward)
+    x = two_sum(other_center[0], -center[0])
+    y = two_sum(other_center[1], -center[1])
+    z = two_sum(other_center[2], -center[2])
+    toward = x[0], y[0], z[0]
+    precise_distance = square_root(plus(plus(times(x, x), times(y, y)), times(z, z)))
+    distance = precise_distance[0]
     large, small = max(radius, other_radius), min(radius, other_radius)
     # How far the smaller centre lies beyond the larger surface.
-    beyond = distance - large
-    overlap, sticking_out = small - beyond, small + beyond
+    beyond = minus(precise_distance, (large, 0.0))
+    overlap, sticking_out = rounded(minus((small, 0.0), beyond)), rounded(plus((small, 0.0), beyond))
     if overlap <= 0.0 or small == 0.0:
         return nothing()
     if sticking_out <= 0.0:

@@ -1,0 +1,137 @@
+"""Overlaps that need more than float64: tiny ones, and those of solids much larger or smaller than the sphere.
+
+Nothing is validated here, as in `kernels`. Each function overwrites the results of the pairs that `rows` names.
+"""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap.compile import compiled, inlined, input_array, input_indices, output_array
+from robot_side.overlap.double_double import two_product, two_sum
+from robot_side.overlap.double_double_vectors import (
+    PreciseVector,
+    load_vector,
+    precise_add,
+    precise_negative,
+    precise_subtract,
+    store_vector,
+)
+from robot_side.overlap.expansion import determinant
+from robot_side.overlap.polyhedron_features import BOX, POINTS, ROWS, TETRAHEDRON
+from robot_side.overlap.precise_polyhedron import polyhedron_overlap
+from robot_side.overlap.solid import Overlap
+
+_RESULTS = output_array(1), output_array(2), output_array(1)
+
+
+@compiled(input_array(2), input_array(1), input_array(3), input_indices(), *_RESULTS)
+def precise_tetrahedra(
+    centers: FloatArray,
+    radii: FloatArray,
+    vertices: FloatArray,
+    rows: IntArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+) -> None:
+    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
+    features = np.empty((ROWS, 3, 2))
+    for index in range(rows.size):
+        pair = rows[index]
+        radius, scale = _scaled_radius(radii[pair])
+        for corner in range(4):
+            for axis in range(3):
+                difference = two_sum(scale * vertices[pair, corner, axis], -scale * centers[pair, axis])
+                features[POINTS + corner, axis, 0], features[POINTS + corner, axis, 1] = difference
+        volume_6 = determinant(
+            _side(vertices, pair, 1, scale), _side(vertices, pair, 2, scale), _side(vertices, pair, 3, scale)
+        )
+        if volume_6 < 0.0:
+            third = load_vector(features, POINTS + 2)
+            store_vector(features, POINTS + 2, load_vector(features, POINTS + 3))
+            store_vector(features, POINTS + 3, third)
+        overlap = polyhedron_overlap(features, TETRAHEDRON, radius, abs(volume_6) / 6.0)
+        _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
+
+
+@compiled(input_array(2), input_array(1), input_array(2), input_array(3), input_array(2), input_indices(), *_RESULTS)
+def precise_boxes(
+    centers: FloatArray,
+    radii: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    rows: IntArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+) -> None:
+    """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows` (k,)."""
+    features = np.empty((ROWS, 3, 2))
+    for index in range(rows.size):
+        pair = rows[index]
+        radius, scale = _scaled_radius(radii[pair])
+        middle = (
+            two_sum(scale * box_centers[pair, 0], -scale * centers[pair, 0]),
+            two_sum(scale * box_centers[pair, 1], -scale * centers[pair, 1]),
+            two_sum(scale * box_centers[pair, 2], -scale * centers[pair, 2]),
+        )
+        u = _half_edge(box_rotations, box_half_sizes, pair, 0, scale)
+        v = _half_edge(box_rotations, box_half_sizes, pair, 1, scale)
+        w = _half_edge(box_rotations, box_half_sizes, pair, 2, scale)
+        volume_8th = determinant(u, v, w)
+        if volume_8th < 0.0:
+            u = precise_negative(u)
+        for corner in range(8):
+            point = precise_add(middle, u) if corner & 1 else precise_subtract(middle, u)
+            point = precise_add(point, v) if corner & 2 else precise_subtract(point, v)
+            point = precise_add(point, w) if corner & 4 else precise_subtract(point, w)
+            store_vector(features, POINTS + corner, point)
+        overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
+        _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
+
+
+@inlined
+def _half_edge(
+    box_rotations: FloatArray, box_half_sizes: FloatArray, pair: int, axis: int, scale: float
+) -> PreciseVector:
+    half_size = scale * box_half_sizes[pair, axis]
+    return (
+        two_product(box_rotations[pair, 0, axis], half_size),
+        two_product(box_rotations[pair, 1, axis], half_size),
+        two_product(box_rotations[pair, 2, axis], half_size),
+    )
+
+
+@inlined
+def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> PreciseVector:
+    """The exact vector from the first corner to another, times `scale`."""
+    return (
+        two_sum(scale * vertices[pair, corner, 0], -scale * vertices[pair, 0, 0]),
+        two_sum(scale * vertices[pair, corner, 1], -scale * vertices[pair, 0, 1]),
+        two_sum(scale * vertices[pair, corner, 2], -scale * vertices[pair, 0, 2]),
+    )
+
+
+@inlined
+def _scaled_radius(radius: float) -> tuple[float, float]:
+    """(the radius between 1 and 2, the power of two that makes it so)."""
+    if radius == 0.0:
+        return 0.0, 1.0
+    _, exponent = math.frexp(radius)
+    scale = math.ldexp(1.0, min(1 - exponent, 1000))
+    return scale * radius, scale
+
+
+@inlined
+def _store(
+    pair: int, overlap: Overlap, unit: float, volumes: FloatArray, gradients: FloatArray, areas: FloatArray
+) -> None:
+    """Put the results of `pair` into m², m³ from lengths in units of `unit` (m)."""
+    volume, gradient, area = overlap
+    volumes[pair] = volume * unit * unit * unit
+    for axis in range(3):
+        gradients[pair, axis] = gradient[axis] * unit * unit
+    areas[pair] = area * unit * unit
