@@ -12,19 +12,19 @@ from robot_side.overlap.compile import (
     input_array,
     output_array,
     output_indices,
+    power_of_two_below,
 )
 from robot_side.overlap.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
-    WIDTH,
     WHOLE_SOLID,
     WHOLE_SPHERE,
+    WIDTH,
     column,
     copy_lane,
     lane_groups,
-    power_of_two_below,
     scatter,
     store_result,
     vector_column,
@@ -159,7 +159,7 @@ def _bound(block: FloatArray, groups: int) -> None:
             max(z - half[2] - slack, 0.0),
         )
         corner = x + half[0] + slack, y + half[1] + slack, z + half[2] + slack
-        lowest = min(half[0] - x, min(half[1] - y, half[2] - z))
+        lowest = min(half[0] - x, half[1] - y, half[2] - z)
         radius_2 = radius * radius
         away = (dot(beyond, beyond) >= radius_2) | (volume == 0.0)
         within = dot(corner, corner) <= radius_2

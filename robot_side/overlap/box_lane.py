@@ -88,11 +88,11 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
     overlap = from_faces(moment_0 + moment_1 + moment_2, push, covered_0 + covered_1 + covered_2, radius)
 
     volume = 8.0 * abs(determinant) * (half[0] * half[1] * half[2])
-    lowest = min(min(min(heights_0[0], heights_0[1]), min(heights_1[0], heights_1[1])), min(heights_2[0], heights_2[1]))
+    lowest = min(heights_0[0], heights_0[1], heights_1[0], heights_1[1], heights_2[0], heights_2[1])
     depth = max(lowest, 0.0)
     nearest_2 = max(dot(reference, reference), depth * depth)
-    farthest = max(max(max(luu, uuu), max(lul, uul)), max(max(llu, ulu), max(lll, ull)))
-    extent = 2.0 * max(half[0], max(half[1], half[2]))
+    farthest = max(luu, uuu, lul, uul, llu, ulu, lll, ull)
+    extent = 2.0 * max(half[0], half[1], half[2])
     return settle(overlap, radius, volume, nearest_2, lowest, 0.0, farthest, extent)
 
 

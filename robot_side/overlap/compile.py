@@ -6,6 +6,7 @@ Numba is imported untyped; everything else in this package sees ordinary typed f
 import contextlib
 import functools
 import hashlib
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -55,14 +56,14 @@ COUNT: Any = numba.types.int64
 """The Numba type of an int."""
 
 
-@register_pass(mutates_CFG=False, analysis_only=True)
-class _ForCallers(LoweringPass):  # type: ignore[misc]
+@cast(Any, register_pass)(mutates_CFG=False, analysis_only=True)
+class _ForCallers(LoweringPass):
     """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
 
     _name = "for_callers"
 
     def __init__(self) -> None:
-        super().__init__()
+        cast(Any, super()).__init__()
 
     def run_pass(self, state: Any) -> bool:
         """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
@@ -72,7 +73,7 @@ class _ForCallers(LoweringPass):  # type: ignore[misc]
         return True
 
 
-class _WithoutMachineCode(CompilerBase):  # type: ignore[misc]
+class _WithoutMachineCode(CompilerBase):
     """Compile to what a kernel needs to link the function in.
 
     By default Numba also makes machine code of it, and wrappers by which Python and C may call it: more than half
@@ -84,7 +85,7 @@ class _WithoutMachineCode(CompilerBase):  # type: ignore[misc]
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes = cast(Any, DefaultPassBuilder).define_nopython_pipeline(self.state)
         passes.add_pass_after(_ForCallers, NativeLowering)
         passes.finalize()
         return [passes]
@@ -110,8 +111,21 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
     return NUMBER(NUMBER, NUMBER, NUMBER), generate
 
 
-fused_multiply_add: Callable[[float, float, float], float] = numba.extending.intrinsic(_fused_multiply_add)
+fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic(_fused_multiply_add))
 """The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
+
+
+def _power_of_two_below(_typing: Any, _length: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        integer, double = context.get_value_type(numba.types.int64), context.get_value_type(NUMBER)
+        exponent = builder.and_(builder.bitcast(arguments[0], integer), integer(0x7FF0000000000000))
+        return builder.bitcast(exponent, double)
+
+    return NUMBER(NUMBER), generate
+
+
+power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic(_power_of_two_below))
+"""The largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only."""
 
 _kernels: list["Compiled"] = []
 
@@ -135,16 +149,18 @@ class Compiled:
         with contextlib.suppress(RuntimeError):
             self._dispatcher._cache = cast(Any, _PackageCache)(function)
         self._signature = (returns or numba.types.void)(*arguments)
+        self._preparing = threading.Lock()
         self.ready = False
         """Whether it is compiled, so that the next call takes no longer than any other."""
         _kernels.append(self)
 
     def prepare(self) -> None:
         """Compile or load now."""
-        if not self.ready:
-            self._dispatcher.compile(self._signature)
-            self._dispatcher.disable_compile()
-            self.ready = True
+        with self._preparing:
+            if not self.ready:
+                self._dispatcher.compile(self._signature)
+                self._dispatcher.disable_compile()
+                self.ready = True
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the kernel; TypeError for arrays that its signature does not name."""

@@ -1,41 +1,11 @@
-"""Sums and products together with what rounding took from them (Knuth; Dekker), and what is built of these.
+"""Differences, sums of products and determinants of doubles that lose nothing on the way to the result.
 
 A number, or a vector, here often comes in two parts: the rounded one, and the rest that is too small to show in it.
 """
 
-from typing import Any
-
-from numba import types
-from numba.extending import intrinsic
-
 from robot_side.overlap.compile import inlined
+from robot_side.overlap.double_double import two_product, two_sum
 from robot_side.overlap.vectors import Vector, cross, dot
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def fused_multiply_add(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """a·b + c, rounded once: an instruction where the processor has one, else the C library's function."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
-
-    del a, b, c
-    return types.float64(types.float64, types.float64, types.float64), generate
-
-
-@inlined
-def two_sum(a: float, b: float) -> tuple[float, float]:
-    """(rounded a + b, error), which together are a + b exactly."""
-    total = a + b
-    of_b = total - a
-    return total, (a - (total - of_b)) + (b - of_b)
-
-
-@inlined
-def two_product(a: float, b: float) -> tuple[float, float]:
-    """(rounded a·b, error), which together are a·b exactly unless that underflows."""
-    product = a * b
-    return product, fused_multiply_add(a, b, -product)
 
 
 @inlined

@@ -4,24 +4,47 @@ Nothing is validated here: the caller vouches for finite values, radii >= 0, rot
 1e-6, normals other than 0 and equal numbers of rows. Arrays are float64 and C-contiguous, lengths in m; any
 other type or layout raises TypeError. Each function returns (volumes (p,) in m³, gradients (p, 3) = dV/dcentre
 in m², areas (p,) = dV/dradius in m²) in new arrays. `robot_side.overlap` has the functions that check.
+
+Boxes and tetrahedra go three ways: bounds settle most pairs that do not cut, vector lanes work out the others, and
+the few for which doubles do not suffice (see `lane_result`) are worked out once more by the precise forms.
 """
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from common.clock import MonotonicClock
 from robot_side.overlap.ball import sphere_overlap
-from robot_side.overlap.box import box_overlap
-from robot_side.overlap.compile import compiled, imported_kernels, inlined, input_array, output_array
+from robot_side.overlap.box_batch import overlap_boxes
+from robot_side.overlap.compile import Compiled, compiled, imported_kernels, inlined, input_array, output_array
 from robot_side.overlap.half_space import half_space_overlap
+from robot_side.overlap.precise_kernels import precise_boxes, precise_tetrahedra
 from robot_side.overlap.solid import Overlap
-from robot_side.overlap.tetrahedron import tetrahedron_overlap
-from robot_side.overlap.vectors import load, scale
+from robot_side.overlap.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.vectors import load
 
 Overlaps = tuple[FloatArray, FloatArray, FloatArray]
 """(volumes (p,), gradients (p, 3), areas (p,))."""
 
+PAIRS_PER_THREAD = 8192
+"""A thread is worth starting for so many boxes or tetrahedra, nearly a millisecond of work."""
+
 _RESULTS = output_array(1), output_array(2), output_array(1)
+
+
+@dataclass
+class PairCounts:
+    """How many pairs of spheres with boxes or tetrahedra went which way; calls add to it."""
+
+    pairs: int = 0
+    early: int = 0
+    """settled by bounds alone"""
+    precise: int = 0
+    """worked out by the precise forms"""
 
 
 def sphere_pairs(
@@ -46,35 +69,89 @@ def box_pairs(
     box_centers: FloatArray,
     box_rotations: FloatArray,
     box_half_sizes: FloatArray,
+    *,
+    counts: PairCounts | None = None,
+    threads: int | None = None,
 ) -> Overlaps:
-    """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3)."""
-    results = _empty(len(radii))
-    _box_loop(centers, radii, box_centers, box_rotations, box_half_sizes, *results)
-    return results
+    """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
+
+    `threads` None takes as many as pay.
+    """
+    arguments = centers, radii, box_centers, box_rotations, box_half_sizes
+    return _many(overlap_boxes, precise_boxes, arguments, counts, threads)
 
 
-def tetrahedron_pairs(centers: FloatArray, radii: FloatArray, vertices: FloatArray) -> Overlaps:
-    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), in any order."""
-    results = _empty(len(radii))
-    _tetrahedron_loop(centers, radii, vertices, *results)
-    return results
+def tetrahedron_pairs(
+    centers: FloatArray,
+    radii: FloatArray,
+    vertices: FloatArray,
+    *,
+    counts: PairCounts | None = None,
+    threads: int | None = None,
+) -> Overlaps:
+    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), in any order.
+
+    `threads` None takes as many as pay.
+    """
+    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), counts, threads)
 
 
 def warm_up() -> float:
     """Compile every kernel of the imported modules, or load it from the cache on disk; how long that took (s).
 
-    These run once, too. Without it the first call of each kernel does so, which takes up to seconds.
+    Without it the first call of each kernel does so, which takes up to seconds.
     """
     clock = MonotonicClock()
     start_s = clock.now()
     for kernel in imported_kernels():
         kernel.prepare()
-    center, radius = np.zeros((1, 3)), np.ones(1)
-    sphere_pairs(center, radius, center, radius)
-    half_space_pairs(center, radius, np.array([[0.0, 0.0, 1.0]]), np.zeros(1))
-    box_pairs(center, radius, center, np.eye(3)[None], np.ones((1, 3)))
-    tetrahedron_pairs(center, radius, np.array([[[0.0, 0.0, 0.0], *np.eye(3)]]))
     return clock.now() - start_s
+
+
+def _many(
+    overlap: Compiled,
+    precise: Compiled,
+    arguments: tuple[FloatArray, ...],
+    counts: PairCounts | None,
+    threads: int | None,
+) -> Overlaps:
+    total = len(arguments[1])
+    # The kernels leave pairs without contact alone.
+    results = np.zeros(total), np.zeros((total, 3)), np.zeros(total)
+    if threads is None:
+        threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
+    if threads <= 1:
+        parts = [_part(overlap, precise, arguments, results)]
+    else:
+        ends = np.linspace(0, total, threads + 1).astype(int).tolist()
+
+        def part_of(first: int, last: int) -> tuple[int, int]:
+            rows = slice(first, last)
+            own = results[0][rows], results[1][rows], results[2][rows]
+            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own)
+
+        parts = list(_pool().map(part_of, ends[:-1], ends[1:]))
+    if counts is not None:
+        counts.pairs += total
+        counts.early += total - sum(partial for partial, _ in parts)
+        counts.precise += sum(unsettled for _, unsettled in parts)
+    return results
+
+
+def _part(
+    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps
+) -> tuple[int, int]:
+    """Fill in `results`; how many pairs bounds did not settle, and how many took the precise forms."""
+    rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
+    unsettled = overlap(*arguments, *results, rows)
+    if unsettled:
+        precise(*arguments, rows[:unsettled], *results)
+    return int(rows[-1]), unsettled
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="overlap")
 
 
 def _empty(count: int) -> Overlaps:
@@ -117,46 +194,4 @@ def _half_space_loop(
 ) -> None:
     for pair in range(radii.size):
         overlap = half_space_overlap(load(centers, pair), radii[pair], load(normals, pair), offsets[pair])
-        _store(pair, overlap, volumes, gradients, areas)
-
-
-@compiled(input_array(2), input_array(1), input_array(2), input_array(3), input_array(2), *_RESULTS)
-def _box_loop(
-    centers: FloatArray,
-    radii: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    areas: FloatArray,
-) -> None:
-    for pair in range(radii.size):
-        to_world = box_rotations[pair].T
-        half_edges = (
-            scale(box_half_sizes[pair, 0], load(to_world, 0)),
-            scale(box_half_sizes[pair, 1], load(to_world, 1)),
-            scale(box_half_sizes[pair, 2], load(to_world, 2)),
-        )
-        overlap = box_overlap(load(centers, pair), radii[pair], load(box_centers, pair), half_edges)
-        _store(pair, overlap, volumes, gradients, areas)
-
-
-@compiled(input_array(2), input_array(1), input_array(3), *_RESULTS)
-def _tetrahedron_loop(
-    centers: FloatArray,
-    radii: FloatArray,
-    vertices: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    areas: FloatArray,
-) -> None:
-    for pair in range(radii.size):
-        corners = (
-            load(vertices[pair], 0),
-            load(vertices[pair], 1),
-            load(vertices[pair], 2),
-            load(vertices[pair], 3),
-        )
-        overlap = tetrahedron_overlap(load(centers, pair), radii[pair], corners)
         _store(pair, overlap, volumes, gradients, areas)

@@ -43,7 +43,7 @@ def settle(
     engulfed = (lowest > 0.0) & (solid_volume > 0.0)
     uncut_volume, uncut_area = whole if engulfed else 0.0, whole_area if engulfed else 0.0
     apart = (nearest_2 > CLEAR * (radius * radius)) | (solid_volume == 0.0)
-    bounded_volume = min(min(max(volume, 0.0), whole), solid_volume)
+    bounded_volume = min(max(volume, 0.0), whole, solid_volume)
     bounded_area = min(max(area, 0.0), whole_area)
     # The error of a solid smaller than the sphere is smaller, too.
     tiny = TINY * whole * min(extent, radius)

@@ -4,11 +4,7 @@ A block's columns lie one after another in a single array at distances that are 
 can tell them apart and turn a loop over lanes into vector instructions.
 """
 
-from typing import Any
-
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from common.arrays import FloatArray
 from robot_side.overlap.compile import inlined
@@ -31,7 +27,8 @@ NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
 @inlined
 def column(lanes: FloatArray, index: int, lane: int) -> float:
     """Column `index` of `lane`."""
-    return lanes[np.uint64(index * LANES + lane)]
+    value: float = lanes[np.uint64(index * LANES + lane)]
+    return value
 
 
 @inlined
@@ -79,16 +76,3 @@ def scatter(
 def lane_groups(count: int) -> int:
     """How many groups of `WIDTH` lanes hold `count` pairs."""
     return (count + (WIDTH - 1)) // WIDTH
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def power_of_two_below(_typing_context: Any, length: Any) -> Any:
-    """The largest power of two that is at most `length` (positive, normal): dividing by it loses nothing."""
-
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        integer, double = context.get_value_type(types.int64), context.get_value_type(types.float64)
-        bits = builder.bitcast(arguments[0], integer)
-        return builder.bitcast(builder.and_(bits, integer(0x7FF0000000000000)), double)
-
-    del length
-    return types.float64(types.float64), generate

@@ -1,7 +1,5 @@
 """Many spheres with as many tetrahedra: pairs that do not cut are settled by bounds, the others go through lanes."""
 
-import math
-
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
@@ -13,19 +11,19 @@ from robot_side.overlap.compile import (
     input_array,
     output_array,
     output_indices,
+    power_of_two_below,
 )
 from robot_side.overlap.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
-    WIDTH,
     WHOLE_SOLID,
     WHOLE_SPHERE,
+    WIDTH,
     column,
     copy_lane,
     lane_groups,
-    power_of_two_below,
     scatter,
     store_result,
     vector_column,
@@ -142,7 +140,7 @@ def _bound_by_corners(block: FloatArray, groups: int) -> None:
         beyond_2 = (
             _beyond_2(a[0], b[0], c[0], d[0]) + _beyond_2(a[1], b[1], c[1], d[1]) + _beyond_2(a[2], b[2], c[2], d[2])
         )
-        farthest_2 = max(max(dot(a, a), dot(b, b)), max(dot(c, c), dot(d, d)))
+        farthest_2 = max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
         away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
         verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
         volume_6 = dot(subtract(second, first), cross(subtract(third, first), subtract(fourth, first)))
@@ -159,7 +157,7 @@ def _bound_by_planes(block: FloatArray, groups: int) -> None:
         a, b = subtract(first, center), subtract(second, center)
         ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
         # What the distances of planes round to is in proportion to the size of the whole.
-        size_2 = max(max(dot(a, a), dot(ab, ab)), max(dot(ac, ac), dot(ad, ad)))
+        size_2 = max(dot(a, a), dot(ab, ab), dot(ac, ac), dot(ad, ad))
         enough_2 = radius * radius * _SURE + 1e-12 * size_2
         across_d = cross(ac, ab)
         sense = 1.0 if dot(ad, across_d) < 0.0 else -1.0
@@ -186,7 +184,7 @@ def _any_partial(block: FloatArray, count: int) -> bool:
 @inlined
 def _beyond_2(a: float, b: float, c: float, d: float) -> float:
     """The squared distance (m²) of 0 from the interval that a to d span."""
-    gap = max(max(min(min(a, b), min(c, d)), -max(max(a, b), max(c, d))), 0.0)
+    gap = max(min(a, b, c, d), -max(a, b, c, d), 0.0)
     return gap * gap
 
 

@@ -9,7 +9,8 @@ large the tetrahedron is.
 import math
 
 from robot_side.overlap.compile import inlined
-from robot_side.overlap.error_free import determinant, difference, sum_of_products, two_sum
+from robot_side.overlap.double_double import two_sum
+from robot_side.overlap.error_free import determinant, difference, sum_of_products
 from robot_side.overlap.face_angles import FaceSum, add_edge, edge_terms, face_areas, first_edge
 from robot_side.overlap.lane_result import LaneResult, settle
 from robot_side.overlap.solid import from_faces
@@ -82,13 +83,21 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     face_d = _face((edge_ac, edge_bc, edge_ab), (1.0, -1.0, -1.0), normal_d, height_d)
 
     sense = 1.0 if volume_6 > 0.0 else -1.0
-    lowest = min(min(sense * height_a, sense * height_b), min(sense * height_c, sense * height_d))
+    lowest = min(sense * height_a, sense * height_b, sense * height_c, sense * height_d)
     nearest_2 = min(
-        min(min(edge_ab[3], edge_ac[3]), min(edge_ad[3], edge_bc[3])),
-        min(min(edge_bd[3], edge_cd[3]), min(min(face_a[1], face_b[1]), min(face_c[1], face_d[1]))),
+        edge_ab[3],
+        edge_ac[3],
+        edge_ad[3],
+        edge_bc[3],
+        edge_bd[3],
+        edge_cd[3],
+        face_a[1],
+        face_b[1],
+        face_c[1],
+        face_d[1],
     )
-    farthest = max(max(norm_a, norm_b), max(norm_c, norm_d))
-    extent = max(max(max(edge_ab[4], edge_ac[4]), max(edge_ad[4], edge_bc[4])), max(edge_bd[4], edge_cd[4]))
+    farthest = max(norm_a, norm_b, norm_c, norm_d)
+    extent = max(edge_ab[4], edge_ac[4], edge_ad[4], edge_bc[4], edge_bd[4], edge_cd[4])
     disc_a, covered_a = face_areas(height_a, face_a[0], radius)
     disc_b, covered_b = face_areas(height_b, face_b[0], radius)
     disc_c, covered_c = face_areas(height_c, face_c[0], radius)
@@ -151,7 +160,7 @@ def _edge(
     end_norm: float,
     radius: float,
 ) -> PlacedEdge:
-    """The edge from start to end, with `shares` of (start, end, third, fourth) corner; the others are start - corner."""
+    """The edge from start to end; `shares` are those of (start, end, third, fourth), `from_third` is start - third."""
     inverse_length = _inverse_norm(edge)
     direction = scale(inverse_length, edge)
     length = dot(edge, direction)
@@ -180,5 +189,5 @@ def _face(
     total = first_edge(edge_terms(first[2], distance_1, depth))
     total = add_edge(total, edge_terms(second[2], distance_2, depth))
     total = add_edge(total, edge_terms(third[2], distance_3, depth))
-    within = min(distance_1, min(distance_2, distance_3)) > 0.0
+    within = min(distance_1, distance_2, distance_3) > 0.0
     return total, depth * depth if within else math.inf
