@@ -1,7 +1,6 @@
 """Tetrahedra and boxes against the 50-digit reference, class by class, with the worst errors asserted.
 
-Errors are fractions of the sphere's volume, great circle and surface. With `reach` = (distance to the solid's
-farthest corner) / radius, the bound is constant up to a reach of a few and grows with the reach beyond.
+Errors are fractions of the sphere's volume, great circle and surface.
 """
 
 import zlib
@@ -13,31 +12,18 @@ from mpmath import mpf
 
 from common.arrays import FloatArray
 from robot_side.overlap import sphere_box, sphere_tetrahedron
-from robot_side.overlap.box import box_sum
-from robot_side.overlap.compile import compiled, input_array, output_array
-from robot_side.overlap.tetrahedron import tetrahedron_sum
-from robot_side.overlap.vectors import load, scale
 from tests.overlap_classes import BOXES, TETRAHEDRA
 from tests.overlap_reference import Overlap, Polyhedron
 
-WORST = {"volume": 5e-16, "gradient": 1.5e-15, "area": 5e-16}
-WORST_PER_REACH = {"volume": 1.5e-16, "gradient": 2.5e-16, "area": 1.5e-16}
+WORST = {"volume": 1e-15, "gradient": 2e-15, "area": 1e-15}
 
 
 def assert_accurate(
     results: tuple[FloatArray, FloatArray, FloatArray],
-    centers: FloatArray,
     radii: FloatArray,
-    solids: Sequence[Polyhedron],
     truth: Sequence[Overlap],
 ) -> None:
     """Hold every volume, gradient and area to its bound."""
-    reach = np.array(
-        [
-            np.linalg.norm(np.array(solid.vertices, dtype=float) - center, axis=1).max()
-            for solid, center in zip(solids, centers, strict=True)
-        ]
-    )
     volumes, gradients, areas = results
     wholes = {"volume": 4 / 3 * np.pi * radii**3, "gradient": np.pi * radii**2, "area": 4 * np.pi * radii**2}
     errors = {
@@ -50,8 +36,7 @@ def assert_accurate(
     }
     for name, error in errors.items():
         relative = np.array([float(e) for e in error]) / wholes[name]
-        excess = relative / np.maximum(WORST[name], WORST_PER_REACH[name] * reach / radii)
-        assert excess.max() <= 1.0, (name, int(excess.argmax()), relative.max())
+        assert relative.max() <= WORST[name], (name, int(relative.argmax()), relative.max())
 
 
 def _rng(name: str) -> np.random.Generator:
@@ -64,12 +49,8 @@ def test_tetrahedra_match_the_reference(name: str) -> None:
     results = sphere_tetrahedron(centers, radii, vertices, gradient=True)
     solids = [Polyhedron.tetrahedron(v) for v in vertices]
     truth = [solid.overlap(*sphere) for solid, *sphere in zip(solids, centers, radii, strict=True)]
-    assert_accurate(results, centers, radii, solids, truth)
+    assert_accurate(results, radii, truth)
     assert any(true.volume > 0 for true in truth)
-
-    bare = np.empty((len(radii), 2))
-    _bare_tetrahedra(centers, radii, vertices, bare)
-    assert_accurate((bare[:, 0], results[1], bare[:, 1]), centers, radii, solids, truth)
 
 
 @pytest.mark.parametrize("name", BOXES)
@@ -78,12 +59,8 @@ def test_boxes_match_the_reference(name: str) -> None:
     results = sphere_box(centers, radii, boxes, rotations, half_sizes, gradient=True)
     solids = [Polyhedron.box(*box) for box in zip(boxes, rotations, half_sizes, strict=True)]
     truth = [solid.overlap(*sphere) for solid, *sphere in zip(solids, centers, radii, strict=True)]
-    assert_accurate(results, centers, radii, solids, truth)
+    assert_accurate(results, radii, truth)
     assert any(true.volume > 0 for true in truth) or name.endswith("outside")
-
-    bare = np.empty((len(radii), 2))
-    _bare_boxes(centers, radii, boxes, rotations, half_sizes, bare)
-    assert_accurate((bare[:, 0], results[1], bare[:, 1]), centers, radii, solids, truth)
 
 
 @pytest.mark.parametrize(
@@ -119,32 +96,3 @@ def test_spheres_clear_of_the_solid_give_exactly_nothing() -> None:
     assert (np.einsum("ni,ni->n", centers, directions) - radii > extent).all()
     for result in sphere_tetrahedron(centers, radii, vertices, gradient=True):
         assert not result.any()
-
-
-@compiled(input_array(2), input_array(1), input_array(3), output_array(2))
-def _bare_tetrahedra(centers: FloatArray, radii: FloatArray, vertices: FloatArray, bare: FloatArray) -> None:
-    for pair in range(radii.size):
-        v = vertices[pair]
-        corners = load(v, 0), load(v, 1), load(v, 2), load(v, 3)
-        overlap, _ = tetrahedron_sum(load(centers, pair), radii[pair], corners)
-        bare[pair, 0], bare[pair, 1] = overlap[0], overlap[2]
-
-
-@compiled(input_array(2), input_array(1), input_array(2), input_array(3), input_array(2), output_array(2))
-def _bare_boxes(
-    centers: FloatArray,
-    radii: FloatArray,
-    boxes: FloatArray,
-    rotations: FloatArray,
-    half_sizes: FloatArray,
-    bare: FloatArray,
-) -> None:
-    for pair in range(radii.size):
-        columns = rotations[pair].T
-        half_edges = (
-            scale(half_sizes[pair, 0], load(columns, 0)),
-            scale(half_sizes[pair, 1], load(columns, 1)),
-            scale(half_sizes[pair, 2], load(columns, 2)),
-        )
-        overlap, _ = box_sum(load(centers, pair), radii[pair], load(boxes, pair), half_edges)
-        bare[pair, 0], bare[pair, 1] = overlap[0], overlap[2]
