@@ -51,6 +51,7 @@ from robot_side.overlap.polyhedron_features import (
 from robot_side.overlap.precise_sum import sum_over_faces
 from robot_side.overlap.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
 from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+from robot_side.overlap.vectors import scale
 
 NOISE = 1e-29
 """What rounding may leave of a sum over faces, in R³, or in R² times the size of the solid if that is larger."""
@@ -65,7 +66,7 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
     reached, number = screened(features, solid, radius)
-    final, most = False, solid_volume
+    final, most, summed = False, 0.0, nothing()
     sharpest = SHARP_CORNER if reached == CORNER else SHARP_EDGE
     if reached == ANYTHING:
         measure_all(features, solid, radius)
@@ -73,8 +74,10 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
         _measure_lone(features, solid, radius, reached, number)
     while True:
         overlap, sharpness = _local_form(features, solid, radius, reached, number)
-        if final or sharpness < sharpest:
-            return bounded(overlap, radius, most)
+        if final:
+            return _below_noise(overlap, summed, most, radius)
+        if sharpness < sharpest:
+            return bounded(overlap, radius, solid_volume)
         if reached != ANYTHING:
             measure_all(features, solid, radius)
         farthest, inside = 0.0, 0
@@ -83,12 +86,26 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
             inside += 1 if features[POWERS + corner, 0, 0] >= 0.0 else 0
         if inside == CORNERS[solid]:
             return whole_solid(solid_volume)
-        overlap = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
-        most = min(most, NOISE * radius * radius * max(radius, farthest))
-        if overlap[0] > most:
-            return overlap
+        summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
+        most = NOISE * radius * radius * max(radius, farthest)
+        if summed[0] > most:
+            return summed
+        most = min(most, solid_volume)
         reached, number = _deepest(features, solid)
         final = True
+
+
+@inlined
+def _below_noise(local: Overlap, summed: Overlap, most: float, radius: float) -> Overlap:
+    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not."""
+    volume, gradient, area = local
+    if volume == 0.0:
+        return nothing()
+    most_area = NOISE * radius * radius
+    if summed[2] > most_area:
+        return min(volume, most), summed[1], summed[2]
+    share = most_area / area if area > most_area else 1.0
+    return min(volume, most), scale(share, gradient), share * area
 
 
 @inlined
