@@ -13,8 +13,9 @@ def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_ra
     """The lens that the sphere (`center`, `radius`) has in common with another; all in m.
 
     The volume of the lens is a product and a sum of terms that are positive throughout, formed from three
-    gaps that are differences of lengths, taken in double-double: `overlap` between the surfaces facing each other and the distances
-    by which the smaller sphere still sticks out. Spheres that touch, inside or outside, give the limit
+    gaps that are differences of lengths, taken in double-double: `overlap` between the surfaces facing each
+    other and the distances by which the smaller sphere still sticks out. It is relatively accurate at every
+    depth. Spheres that touch, inside or outside, give the limit
     exactly. Two equal spheres at the same place count as the first within the second.
     """
     x = two_sum(other_center[0], -center[0])

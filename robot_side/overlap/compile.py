@@ -56,14 +56,14 @@ COUNT: Any = numba.types.int64
 """The Numba type of an int."""
 
 
-@cast(Any, register_pass)(mutates_CFG=False, analysis_only=True)
+@register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
 class _ForCallers(LoweringPass):
     """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
 
     _name = "for_callers"
 
     def __init__(self) -> None:
-        cast(Any, super()).__init__()
+        super().__init__()  # type: ignore[no-untyped-call]
 
     def run_pass(self, state: Any) -> bool:
         """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
@@ -85,7 +85,7 @@ class _WithoutMachineCode(CompilerBase):
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
-        passes = cast(Any, DefaultPassBuilder).define_nopython_pipeline(self.state)
+        passes: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
         passes.add_pass_after(_ForCallers, NativeLowering)
         passes.finalize()
         return [passes]
@@ -111,7 +111,7 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
     return NUMBER(NUMBER, NUMBER, NUMBER), generate
 
 
-fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic(_fused_multiply_add))
+fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
 """The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
 
 
@@ -124,7 +124,7 @@ def _power_of_two_below(_typing: Any, _length: Any) -> Any:
     return NUMBER(NUMBER), generate
 
 
-power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic(_power_of_two_below))
+power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
 """The largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only."""
 
 _kernels: list["Compiled"] = []

@@ -22,9 +22,9 @@ from robot_side.overlap.double_double_vectors import (
 from robot_side.overlap.solid import Overlap
 from robot_side.overlap.vectors import Vector, add, norm, scale
 
-SHARP_CORNER = 3e-4
+SHARP_CORNER = 4e-4
 """The largest (length of an edge in the ball) / (distance of the centre from the corner along that edge)."""
-SHARP_EDGE = 0.02
+SHARP_EDGE = 0.05
 """The largest (half the length of the edge in the ball) / (distance of the centre from the edge along a face)."""
 
 
@@ -91,7 +91,7 @@ def corner_overlap(
         patch *= 3.0 * weight * factor * factor
         area += patch * radius
         push = add(push, scale(patch, away))
-    return (volume, push, area), sharpness
+    return _within_cap((volume, push, area), power, radius), sharpness
 
 
 @building_block
@@ -129,7 +129,19 @@ def edge_overlap(
             patch *= 2.0 * weight * factor
             area += patch * radius
             push = add(push, scale(patch, away))
-    return (volume, push, area), sharpness
+    return _within_cap((volume, push, area), power, radius), sharpness
+
+
+@inlined
+def _within_cap(overlap: Overlap, power: float, radius: float) -> Overlap:
+    """No more than the cap beyond the plane across the direction to the nearest point.
+
+    A cone or wedge that is not sharp may reach deeper into the ball elsewhere than at its corner or edge.
+    """
+    volume, push, area = overlap
+    most = 2.0 * math.pi * power
+    share = most / area if area > most else 1.0
+    return min(volume, math.pi * power * power / radius), scale(share, push), share * area
 
 
 @inlined

@@ -13,10 +13,16 @@ from robot_side.overlap.double_double import (
     is_less,
     minus,
     negated,
+    plus,
+    rounded,
     square_root,
+    times,
     two_product,
 )
 from robot_side.overlap.double_double_vectors import (
+    PreciseVector,
+    highs,
+    load_number,
     load_vector,
     precise_cross,
     precise_dot,
@@ -27,9 +33,10 @@ from robot_side.overlap.double_double_vectors import (
     store_vector,
 )
 from robot_side.overlap.expansion import exact_power
+from robot_side.overlap.vectors import dot
 
 UNCERTAIN = 1e-28
-"""Powers of corners below this, for R = 1, are taken again without rounding."""
+"""Powers of corners and edges below this, for R = 1, are taken again with less rounding or none."""
 
 
 TETRAHEDRON, BOX = np.int64(0), np.int64(1)
@@ -109,7 +116,9 @@ HEIGHTS = 114
 """The faces' signed distances from the centre (m)."""
 MOMENTS = 120
 """The height times twice the area of a triangle of three of the face's corners (m³)."""
-ROWS = 126
+SQUARED_AREAS = 126
+"""Twice the area of that triangle, squared (m⁴)."""
+ROWS = 132
 
 
 @building_block
@@ -146,7 +155,14 @@ def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float
     else:
         foot = precise_subtract(end, precise_scale(end_along, direction))
     base_2 = precise_dot(foot, foot)
-    half_chord = square_root(minus(two_product(radius, radius), base_2))
+    half_chord_2 = minus(two_product(radius, radius), base_2)
+    if abs(half_chord_2[0]) < UNCERTAIN * radius * radius:
+        # Without the rounding of the direction: exact where the coordinates have few digits.
+        side = precise_subtract(end, start)
+        moment, length_2 = precise_cross(start, side), precise_dot(side, side)
+        above = minus(times(two_product(radius, radius), length_2), precise_dot(moment, moment))
+        half_chord_2 = divided(above, length_2)
+    half_chord = square_root(half_chord_2)
     store_vector(features, FEET + edge, foot)
     store_number(features, STARTS + edge, start_along)
     store_number(features, ENDS + edge, end_along)
@@ -167,16 +183,16 @@ def measure_face(features: FloatArray, solid: np.int64, face: int) -> None:
     a, b = load_vector(features, POINTS + corners[0]), load_vector(features, POINTS + corners[1])
     c = load_vector(features, POINTS + corners[2])
     ab, bc = precise_subtract(b, a), precise_subtract(c, b)
-    nearest, nearest_2 = a, precise_dot(a, a)[0]
+    nearest, nearest_2 = a, _square(a)
     for other in range(1, SIDES[solid]):
         point = load_vector(features, POINTS + corners[other])
-        distance_2 = precise_dot(point, point)[0]
+        distance_2 = _square(point)
         if distance_2 < nearest_2:
             nearest, nearest_2 = point, distance_2
     first, second = ab, bc
     if solid == TETRAHEDRON:
         ca = precise_subtract(a, c)
-        ab_2, bc_2, ca_2 = precise_dot(ab, ab)[0], precise_dot(bc, bc)[0], precise_dot(ca, ca)[0]
+        ab_2, bc_2, ca_2 = _square(ab), _square(bc), _square(ca)
         if ab_2 >= bc_2 and ab_2 >= ca_2:
             first, second = bc, ca
         elif bc_2 >= ca_2:
@@ -186,7 +202,13 @@ def measure_face(features: FloatArray, solid: np.int64, face: int) -> None:
     moment = precise_dot(across, nearest)
     store_vector(features, NORMALS + face, normal)
     store_number(features, MOMENTS + face, moment)
+    store_number(features, SQUARED_AREAS + face, precise_dot(across, across))
     store_number(features, HEIGHTS + face, divided(moment, area_2) if area_2[0] > 0.0 else ZERO)
+
+
+@inlined
+def _square(vector: PreciseVector) -> float:
+    return dot(highs(vector), highs(vector))
 
 
 @inlined
@@ -212,3 +234,16 @@ def measure_all(features: FloatArray, solid: np.int64, radius: float) -> None:
         measure_edge(features, solid, edge, radius)
     for face in range(FACES[solid]):
         measure_face(features, solid, face)
+
+
+@inlined
+def depth_and_rest(features: FloatArray, face: int, radius: float) -> tuple[float, float]:
+    """(R + h, R - h) in m: the height of the ball's part inside of the plane of `face`, and of the other one."""
+    height = load_number(features, HEIGHTS + face)
+    depth, rest = plus((radius, 0.0), height), minus((radius, 0.0), height)
+    if depth[0] < UNCERTAIN * radius:
+        # R² - h² without the rounding of the normal: exact where the coordinates have few digits.
+        area_2, moment = load_number(features, SQUARED_AREAS + face), load_number(features, MOMENTS + face)
+        above = minus(times(two_product(radius, radius), area_2), times(moment, moment))
+        depth = divided(above, times(area_2, rest))
+    return rounded(depth), rounded(rest)

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.overlap.compile import building_block, inlined
-from robot_side.overlap.double_double import minus, plus, rounded, two_product
+from robot_side.overlap.double_double import rounded, times
 from robot_side.overlap.double_double_vectors import (
     PreciseVector,
     highs,
@@ -23,13 +23,13 @@ from robot_side.overlap.double_double_vectors import (
 from robot_side.overlap.half_space import cap
 from robot_side.overlap.local_forms import SHARP_CORNER, SHARP_EDGE, corner_overlap, edge_overlap
 from robot_side.overlap.polyhedron_features import (
-    BASES,
     CORNER_EDGES,
     CORNERS,
     DIRECTIONS,
     EDGE_ENDS,
     EDGE_FACES,
     EDGES,
+    ENDS,
     FACES,
     FEET,
     HALF_CHORDS,
@@ -38,8 +38,9 @@ from robot_side.overlap.polyhedron_features import (
     NORMALS,
     POINTS,
     POWERS,
-    REACHED,
     SIDES,
+    STARTS,
+    depth_and_rest,
     distance_in_face,
     measure_all,
     measure_corner,
@@ -50,9 +51,10 @@ from robot_side.overlap.polyhedron_features import (
 from robot_side.overlap.precise_sum import sum_over_faces
 from robot_side.overlap.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
 from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+from robot_side.overlap.vectors import scale
 
-NOISE = 1e-30
-"""What rounding may leave of a sum over faces, as a fraction of R³; times (size of the solid) / R if that is above 1."""
+NOISE = 1e-29
+"""What rounding may leave of a sum over faces, in R³, or in R² times the size of the solid if that is larger."""
 
 
 @building_block
@@ -64,27 +66,18 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
     reached, number = screened(features, solid, radius)
-    most, sharpest = solid_volume, SHARP_CORNER if reached == CORNER else SHARP_EDGE
+    final, most, summed = False, 0.0, nothing()
+    sharpest = SHARP_CORNER if reached == CORNER else SHARP_EDGE
     if reached == ANYTHING:
         measure_all(features, solid, radius)
     else:
         _measure_lone(features, solid, radius, reached, number)
     while True:
-        if reached == NOTHING:
-            return nothing()
-        if reached == WHOLE_SPHERE:
-            return whole_sphere(radius)
-        overlap, sharpness = nothing(), math.inf
-        if reached == FACE:
-            height = load_number(features, HEIGHTS + number)
-            depth, rest = rounded(plus((radius, 0.0), height)), rounded(minus((radius, 0.0), height))
-            overlap, sharpness = cap(depth, rest, radius, highs(load_vector(features, NORMALS + number))), 0.0
-        elif reached == EDGE and features[HALF_CHORDS + number, 0, 0] > 0.0:
-            overlap, sharpness = _edge_wedge(features, solid, number, radius)
-        elif reached == CORNER and features[POWERS + number, 0, 0] > 0.0:
-            overlap, sharpness = _corner_cone(features, solid, number, radius)
+        overlap, sharpness = _local_form(features, solid, radius, reached, number)
+        if final:
+            return _below_noise(overlap, summed, most, radius)
         if sharpness < sharpest:
-            return bounded(overlap, radius, most)
+            return bounded(overlap, radius, solid_volume)
         if reached != ANYTHING:
             measure_all(features, solid, radius)
         farthest, inside = 0.0, 0
@@ -93,12 +86,46 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
             inside += 1 if features[POWERS + corner, 0, 0] >= 0.0 else 0
         if inside == CORNERS[solid]:
             return whole_solid(solid_volume)
-        overlap = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
-        most = min(most, NOISE * radius * radius * max(radius, farthest))
-        if overlap[0] > most:
-            return overlap
+        summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
+        most = NOISE * radius * radius * max(radius, farthest)
+        if summed[0] > most:
+            return summed
+        most = min(most, solid_volume)
         reached, number = _deepest(features, solid)
-        sharpest = math.inf
+        final = True
+
+
+@inlined
+def _below_noise(local: Overlap, summed: Overlap, most: float, radius: float) -> Overlap:
+    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not."""
+    volume, gradient, area = local
+    if volume == 0.0:
+        return nothing()
+    most_area = NOISE * radius * radius
+    if summed[2] > most_area:
+        return min(volume, most), summed[1], summed[2]
+    share = most_area / area if area > most_area else 1.0
+    return min(volume, most), scale(share, gradient), share * area
+
+
+@inlined
+def _local_form(
+    features: FloatArray, solid: np.int64, radius: float, reached: int, number: int
+) -> tuple[Overlap, float]:
+    """The overlap with the reached feature alone, and its sharpness: 0 where that is the whole truth."""
+    overlap, sharpness = nothing(), math.inf
+    if reached == NOTHING:
+        sharpness = 0.0
+    elif reached == WHOLE_SPHERE:
+        overlap, sharpness = whole_sphere(radius), 0.0
+    elif reached == FACE:
+        depth, rest = depth_and_rest(features, number, radius)
+        overlap, sharpness = cap(depth, rest, radius, highs(load_vector(features, NORMALS + number))), 0.0
+    elif reached == EDGE and features[HALF_CHORDS + number, 0, 0] > 0.0:
+        overlap, sharpness = _edge_wedge(features, solid, number, radius)
+    elif reached == CORNER and features[POWERS + number, 0, 0] > 0.0:
+        overlap, sharpness = _corner_cone(features, solid, number, radius)
+    return overlap, sharpness
 
 
 @building_block
@@ -126,7 +153,9 @@ def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
             deepest, reached, number = features[POWERS + corner, 0, 0], CORNER, corner
     if reached == NOTHING:
         for edge in range(EDGES[solid]):
-            if features[REACHED + edge, 0, 0] > 0.0 and features[HALF_CHORDS + edge, 0, 0] > deepest:
+            # An edge that does not pass its line's nearest point is no deeper than its corners.
+            passes = features[STARTS + edge, 0, 0] < 0.0 < features[ENDS + edge, 0, 0]
+            if passes and features[HALF_CHORDS + edge, 0, 0] > deepest:
                 deepest, reached, number = features[HALF_CHORDS + edge, 0, 0], EDGE, edge
     if reached == NOTHING:
         for face in range(FACES[solid]):
@@ -145,7 +174,8 @@ def _edge_wedge(features: FloatArray, solid: np.int64, edge: int, radius: float)
         precise_cross(load_vector(features, NORMALS + EDGE_FACES[solid, edge, 0]), direction),
         precise_cross(direction, load_vector(features, NORMALS + EDGE_FACES[solid, edge, 1])),
     )
-    power = rounded(minus(two_product(radius, radius), load_number(features, BASES + edge)))
+    half_chord = load_number(features, HALF_CHORDS + edge)
+    power = rounded(times(half_chord, half_chord))
     return edge_overlap(load_vector(features, FEET + edge), power, sides, radius)
 
 

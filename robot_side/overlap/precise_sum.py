@@ -11,7 +11,7 @@ of the ball are left as lengths. The result is continuous, like the orthoschemes
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import building_block
+from robot_side.overlap.compile import building_block, inlined
 from robot_side.overlap.double_double import (
     PI,
     ZERO,
@@ -70,13 +70,8 @@ def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Over
         below = height[0] < 0.0 or (height[0] == 0.0 and height[1] < 0.0)
         depth = negated(height) if below else height
         sides = SIDES[solid]
-        foot_inside, side_reached = True, False
-        in_reach = is_less(depth, ball)
-        if in_reach:
-            for side in range(sides):
-                side_reached = side_reached or features[REACHED + FACE_EDGES[solid, face, side], 0, 0] > 0.0
-                foot_inside = foot_inside and distance_in_face(features, solid, face, side)[0] > 0.0
-        if not in_reach or not (foot_inside or side_reached):
+        face_reached, side_reached = _is_reached(features, solid, face, is_less(depth, ball))
+        if not face_reached:
             solid_angle = _whole_face(features, solid, face, solid_angle)
             continue
         plane_angle, triangle = NO_TURN, ZERO
@@ -122,6 +117,17 @@ def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Over
     surface = minus(multiple(2.0, times(radius_2, whole_angle(solid_angle))), times(ball, arcs))
     volume = divided(plus(moment, times(ball, surface)), (3.0, 0.0))
     return rounded(volume), negative(highs(push)), rounded(surface)
+
+
+@inlined
+def _is_reached(features: FloatArray, solid: np.int64, face: int, plane_reached: bool) -> tuple[bool, bool]:
+    """Whether the ball reaches the face, and whether it reaches one of its sides."""
+    foot_inside, side_reached = plane_reached, False
+    if plane_reached:
+        for side in range(SIDES[solid]):
+            side_reached = side_reached or features[REACHED + FACE_EDGES[solid, face, side], 0, 0] > 0.0
+            foot_inside = foot_inside and distance_in_face(features, solid, face, side)[0] > 0.0
+    return foot_inside or side_reached, side_reached
 
 
 Frame = tuple[DoubleDouble, DoubleDouble, DoubleDouble, DoubleDouble, bool]

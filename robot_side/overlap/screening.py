@@ -19,10 +19,12 @@ from robot_side.overlap.polyhedron_features import (
     POINTS,
     SIDES,
 )
-from robot_side.overlap.vectors import Vector, add, cross, dot, norm, scale
+from robot_side.overlap.vectors import Vector, cross, dot
 
 NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER, ANYTHING = 0, 1, 2, 3, 4, 5
 """What `screened` can say."""
+_APART, _PIERCED, _UNCERTAIN = 0, 1, 2
+"""Of a face whose sides the ball does not reach: the ball does not reach it; the ball's disc lies within it."""
 _MARGIN = 1e-14
 
 
@@ -36,53 +38,52 @@ def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int,
     - CORNER: no other corner and only edges and faces that meet in this one have a point inside the ball;
     - ANYTHING: what rounding may decide, and everything else.
     """
-    edges, corners, farthest = EDGES[solid], CORNERS[solid], 0.0
-    for corner in range(corners):
-        farthest = max(farthest, norm(_point(features, corner)))
-    margin = _MARGIN * farthest
+    farthest_2 = 0.0
+    for candidate in range(CORNERS[solid]):
+        point = _point(features, candidate)
+        farthest_2 = max(farthest_2, dot(point, point))
+    within_2 = radius * radius + _MARGIN * farthest_2
     inside_corners, corner = 0, 0
-    for candidate in range(corners):
-        if norm(_point(features, candidate)) < radius + margin:
+    for candidate in range(CORNERS[solid]):
+        point = _point(features, candidate)
+        if dot(point, point) < within_2:
             inside_corners += 1
             corner = candidate
-    reached_edges, edge = 0, 0
-    for candidate in range(edges):
-        if _edge_distance(features, solid, candidate) < radius + margin:
+    reached_edges, edge, foreign_edges = 0, 0, 0
+    for candidate in range(EDGES[solid]):
+        if _is_near(features, solid, candidate, within_2):
             reached_edges += 1
             edge = candidate
-    if inside_corners > 1 or reached_edges > 3:
-        return ANYTHING, 0
-
-    reached_faces, face, foreign_faces, all_above = 0, 0, 0, True
-    certain = True
-    for candidate in range(FACES[solid]):
-        height, inside, face_margin = _face(features, solid, candidate, margin)
-        certain = certain and face_margin < 0.25 * radius
-        all_above = all_above and height > radius - face_margin
-        if abs(height) > radius + face_margin or inside < -face_margin:
-            continue
-        reached_faces += 1
-        face = candidate
-        certain = certain and inside > face_margin
-        if inside_corners == 1:
-            foreign_faces += 0 if _is_one_of(candidate, CORNER_FACES[solid, corner]) else 1
-        elif not _is_one_of(candidate, EDGE_FACES[solid, edge]):
-            foreign_faces += 1
-    what, feature = ANYTHING, 0
+            foreign_edges += 0 if _is_one_of(candidate, CORNER_EDGES[solid, corner], 3) else 1
     if reached_edges == 0:
-        if certain and reached_faces == 0:
-            what = WHOLE_SPHERE if all_above else NOTHING
-        elif certain and reached_faces == 1:
-            what, feature = FACE, face
-    elif inside_corners == 0 and reached_edges == 1 and foreign_faces == 0:
-        what, feature = EDGE, edge
-    elif inside_corners == 1 and foreign_faces == 0:
-        own_edges = 0
-        for own in CORNER_EDGES[solid, corner]:
-            own_edges += 1 if _edge_distance(features, solid, own) < radius + margin else 0
-        if own_edges == reached_edges:
-            what, feature = CORNER, corner
+        return _screened_faces(features, solid, radius, math.sqrt(farthest_2))
+    what, feature, count, own = ANYTHING, 0, 0, CORNER_FACES[solid, corner]
+    if inside_corners == 0 and reached_edges == 1:
+        what, feature, count, own = EDGE, edge, 2, EDGE_FACES[solid, edge]
+    elif inside_corners == 1 and foreign_edges == 0:
+        what, feature, count = CORNER, corner, 3
+    for face in range(FACES[solid]):
+        if what != ANYTHING and not _is_one_of(face, own, count):
+            state, _ = _pierced(features, solid, face, radius, math.sqrt(farthest_2))
+            what = what if state == _APART else ANYTHING
     return what, feature
+
+
+@building_block
+def _screened_faces(features: FloatArray, solid: np.int64, radius: float, farthest: float) -> tuple[int, int]:
+    """`screened` where the ball reaches no edge."""
+    pierced, pierced_face, all_above = 0, 0, True
+    for face in range(FACES[solid]):
+        state, above = _pierced(features, solid, face, radius, farthest)
+        if state == _UNCERTAIN:
+            return ANYTHING, 0
+        all_above = all_above and above
+        if state == _PIERCED:
+            pierced += 1
+            pierced_face = face
+    if pierced == 0:
+        return WHOLE_SPHERE if all_above else NOTHING, 0
+    return FACE if pierced == 1 else ANYTHING, pierced_face
 
 
 @inlined
@@ -101,45 +102,52 @@ def _side(features: FloatArray, start: int, end: int) -> Vector:
     )
 
 
-@building_block
-def _edge_distance(features: FloatArray, solid: np.int64, edge: int) -> float:
-    """The distance (m) from the centre to the edge, its ends included."""
+@inlined
+def _is_near(features: FloatArray, solid: np.int64, edge: int, within_2: float) -> bool:
+    """Whether a point of the edge lies nearer to the centre than the square root of `within_2` (m²)."""
     start_corner, end_corner = EDGE_ENDS[solid, edge]
     start, end = _point(features, start_corner), _point(features, end_corner)
     side = _side(features, start_corner, end_corner)
-    length_2 = dot(side, side)
-    start_2, end_2 = dot(start, start), dot(end, end)
-    nearer, sign = (start, 1.0) if start_2 <= end_2 else (end, -1.0)
-    share = -sign * dot(nearer, side) / length_2
-    if not 0.0 < share < 1.0:
-        return math.sqrt(min(start_2, end_2))
-    return norm(add(nearer, scale(sign * share, side)))
+    start_2, end_2, length_2 = dot(start, start), dot(end, end), dot(side, side)
+    # From the nearer end, as it rounds less.
+    along = -dot(start, side) if start_2 <= end_2 else dot(end, side)
+    nearest_2 = min(start_2, end_2)
+    if 0.0 < along < length_2:
+        return nearest_2 * length_2 - along * along < within_2 * length_2
+    return nearest_2 < within_2
 
 
 @building_block
-def _face(features: FloatArray, solid: np.int64, face: int, margin: float) -> tuple[float, float, float]:
-    """(signed height h, least signed distance d of a side, how far rounding may put them off), all in m."""
-    corners = FACE_CORNERS[solid, face]
+def _pierced(features: FloatArray, solid: np.int64, face: int, radius: float, farthest: float) -> tuple[int, bool]:
+    """(how the ball stands to a face none of whose sides it reaches, whether the centre is over R below its plane)."""
+    corners, sides = FACE_CORNERS[solid, face], SIDES[solid]
     first, second = _side(features, corners[0], corners[1]), _side(features, corners[1], corners[2])
-    across = cross(first, second)
-    area_2 = norm(across)
-    if area_2 == 0.0:
-        return 0.0, 0.0, math.inf
-    normal = scale(1.0 / area_2, across)
-    face_margin = margin * (1.0 + norm(first) * norm(second) / area_2)
+    normal = cross(first, second)
+    area_2 = math.sqrt(dot(normal, normal))
+    # All of what follows is times `area_2`, the length of the normal.
+    margin = _MARGIN * farthest * (area_2 + math.sqrt(dot(first, first) * dot(second, second)))
     height = dot(_point(features, corners[1]), normal)
-    inside, sides = math.inf, SIDES[solid]
+    if not margin < 0.25 * radius * area_2:
+        return _UNCERTAIN, False
+    above = height > radius * area_2 - margin
+    if abs(height) > radius * area_2 + margin:
+        return _APART, above
+    state = _PIERCED
     for side in range(sides):
         end = corners[side + 1] if side + 1 < sides else corners[0]
         along = _side(features, corners[side], end)
-        start = _point(features, corners[side])
-        inside = min(inside, dot(start, cross(along, normal)) / norm(along))
-    return height, inside, face_margin
+        inside = dot(_point(features, corners[side]), cross(along, normal))
+        if inside * inside <= margin * margin * dot(along, along):
+            state = _UNCERTAIN
+        elif inside < 0.0:
+            return _APART, above
+    return state, above
 
 
 @inlined
-def _is_one_of(number: int, numbers: IntArray) -> bool:
+def _is_one_of(number: int, numbers: IntArray, count: int) -> bool:
+    """Whether `number` is among the first `count` numbers."""
     found = False
-    for other in numbers:
-        found = found or other == number
+    for index in range(count):
+        found = found or numbers[index] == number
     return found
