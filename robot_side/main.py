@@ -21,7 +21,6 @@ from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
-_NOTEWORTHY_WARM_UP_S = 1.0
 
 
 def main() -> None:
@@ -40,9 +39,7 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
-        compile_s = warm_up()
-        if compile_s > _NOTEWORTHY_WARM_UP_S:
-            status.note(f"compiled the overlap kernels in {compile_s:.1f} s; the next start finds them ready")
+        warm_up(lambda: status.note("compiling the overlap kernels, which takes up to a minute; the next start is quick"))
         status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
         status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
         raise_priority()
