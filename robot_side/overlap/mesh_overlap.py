@@ -1,0 +1,133 @@
+"""One sphere and one closed mesh (eq. 11); `triangle_lanes` has the idea."""
+
+import math
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap.compile import building_block, inlined
+from robot_side.overlap.mesh_tables import MeshTables
+from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+from robot_side.overlap.tree_queries import gather_near, nearest_triangle, winding_number
+from robot_side.overlap.triangle_lanes import (
+    CORNERS,
+    IMAGINARY,
+    LANES,
+    MOMENT,
+    PUSH,
+    REAL,
+    TURN,
+    Complex,
+    reduce_lanes,
+    times,
+    triangle_geometry,
+    triangle_terms,
+)
+from robot_side.overlap.vectors import Vector, add, dot, scale
+
+_WHOLE = 4.0 * math.pi
+_UNDECIDED_AREA = 1e-11
+"""Solid angles (sr) this near to 0 or 4π may be either."""
+_UNDECIDED_VOLUME = 1e-8
+"""Volumes of the part inside (the ball's radius being 1) that tell nothing about which."""
+
+
+@building_block
+def mesh_overlap(
+    center: Vector,
+    center_rest: Vector,
+    radius: float,
+    tables: MeshTables,
+    mesh: int,
+    near: IntArray,
+    scratch: FloatArray,
+) -> tuple[Overlap, int]:
+    """(the overlap of the sphere with a mesh, how many triangles were evaluated for it).
+
+    The centre is `center` + `center_rest` (m, in the mesh's frame); `near` has room for one triangle more than the
+    mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
+    """
+    least_2, most_2 = _box_distances_2(tables, mesh, center)
+    if least_2 >= radius * radius or radius == 0.0:
+        return nothing(), 0
+    if most_2 <= radius * radius * (1.0 - 1e-12):
+        return whole_solid(tables.volumes[mesh]), 0
+    count = gather_near(tables, mesh, center, radius, near)
+    if count == 0:
+        if winding_number(tables, mesh, center) > 0:
+            return whole_sphere(radius), 0
+        return nothing(), 0
+    product, turn, moment, push = _sum_triangles(center, center_rest, radius, tables, near, count, scratch)
+    covered = -2.0 * (math.atan2(product[1], product[0]) + turn)
+    covered -= _WHOLE * math.floor(covered / _WHOLE)
+    if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
+        covered -= _WHOLE if covered > 0.5 * _WHOLE else 0.0
+        part = (moment + covered) / 3.0
+        if part < -_UNDECIDED_VOLUME or (part < _UNDECIDED_VOLUME and _mostly_inside(tables, mesh, center, radius)):
+            covered += _WHOLE
+    # In radii up to here.
+    area = radius * radius
+    overlap = (moment + covered) / 3.0 * area * radius, scale(-area, push), covered * area
+    return bounded(overlap, radius, tables.volumes[mesh]), count
+
+
+@inlined
+def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, float]:
+    """The squared distances (m²) from `point` to the nearest and the farthest point of a mesh's box."""
+    least, most = 0.0, 0.0
+    root = tables.roots[mesh]
+    for axis in range(3):
+        below, above = tables.boxes[root, axis] - point[axis], point[axis] - tables.boxes[root, 3 + axis]
+        gap, reach = max(below, max(above, 0.0)), max(-below, -above)
+        least += gap * gap
+        most += reach * reach
+    return least, most
+
+
+@building_block
+def _sum_triangles(
+    center: Vector,
+    center_rest: Vector,
+    radius: float,
+    tables: MeshTables,
+    near: IntArray,
+    count: int,
+    scratch: FloatArray,
+) -> tuple[Complex, float, float, Vector]:
+    """The product of the numbers and the sums of `TURN`, `MOMENT` and `PUSH` over the triangles in `near`."""
+    product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
+    for first in range(0, count, LANES):
+        size = min(count - first, LANES)
+        for lane in range(size):
+            triangle = near[first + lane]
+            for field in range(15):
+                scratch[CORNERS + field * LANES + lane] = tables.triangles[triangle, field]
+        triangle_geometry(scratch, size, center, center_rest, radius)
+        triangle_terms(scratch, size)
+        reduce_lanes(scratch, size)
+        product = times(product, (scratch[REAL], scratch[IMAGINARY]))
+        rescale = 1.0 / (abs(product[0]) + abs(product[1]))
+        product = product[0] * rescale, product[1] * rescale
+        turn += scratch[TURN]
+        moment += scratch[MOMENT]
+        push = add(push, (scratch[PUSH], scratch[PUSH + LANES], scratch[PUSH + 2 * LANES]))
+    return product, turn, moment, push
+
+
+@building_block
+def _mostly_inside(tables: MeshTables, mesh: int, center: Vector, radius: float) -> bool:
+    """Whether the ball lies inside the mesh, which is known of all but a tiny part of it to be so or not to be so.
+
+    The centre itself may be in that part, in a needle or a narrow slit: of some points the one farthest from the
+    surface decides.
+    """
+    best, best_2 = center, -1.0
+    for number in range(8):
+        turn, level = 2.4 * number, (number - 3.5) / 4.5
+        flat = math.sqrt(1.0 - level * level)
+        point = add(center, scale(0.6 * radius, (flat * math.cos(turn), flat * math.sin(turn), level)))
+        foot = nearest_triangle(tables, mesh, point)[1]
+        distance_2 = dot(foot, foot)
+        if distance_2 > best_2:
+            best, best_2 = point, distance_2
+        if best_2 > 0.01 * radius * radius:
+            break
+    return winding_number(tables, mesh, best) > 0
