@@ -117,7 +117,7 @@ def _winding_around(corners: FloatArray, own: BoolArray) -> int | None:
     winding = np.array([_winding(corners[~own], point) for point in points])
     off = np.abs(winding - np.round(winding))
     best = int(off.argmin())
-    return int(round(float(winding[best]))) if off[best] < _CERTAIN else None
+    return round(float(winding[best])) if off[best] < _CERTAIN else None
 
 
 def _winding(corners: FloatArray, point: FloatArray) -> float:

@@ -76,7 +76,7 @@ def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
     root = tables.roots[mesh]
     for axis in range(3):
         below, above = tables.boxes[root, axis] - point[axis], point[axis] - tables.boxes[root, 3 + axis]
-        gap, reach = max(below, max(above, 0.0)), max(-below, -above)
+        gap, reach = max(below, above, 0.0), max(-below, -above)
         least += gap * gap
         most += reach * reach
     return least, most

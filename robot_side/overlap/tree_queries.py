@@ -17,7 +17,7 @@ def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
     total = 0.0
     for axis in range(3):
         low, high = tables.boxes[node, axis], tables.boxes[node, 3 + axis]
-        gap = max(low - point[axis], max(point[axis] - high, 0.0))
+        gap = max(low - point[axis], point[axis] - high, 0.0)
         total += gap * gap
     return total
 
@@ -148,4 +148,4 @@ def winding_number(tables: MeshTables, mesh: int, point: Vector) -> int:
         total /= 4.0 * math.pi
         if abs(total - math.floor(total + 0.5)) < _CERTAIN:
             break
-    return int(math.floor(total + 0.5))
+    return math.floor(total + 0.5)

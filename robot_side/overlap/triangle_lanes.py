@@ -24,6 +24,7 @@ does not depend on where an edge runs inside the ball, stays right.
 import math
 
 from common.arrays import FloatArray
+from robot_side.overlap.arctangent import arctangent
 from robot_side.overlap.compile import building_block, inlined
 from robot_side.overlap.vectors import Vector, cross, dot, scale, subtract
 
@@ -31,8 +32,8 @@ LANES = 64
 """Triangles handled at once."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
-# rows do not overlap.
-CORNERS, NORMAL, INVERSE_LENGTHS = 0, 9 * LANES, 12 * LANES
+# rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
+CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * LANES, 6 * LANES, 9 * LANES, 12 * LANES
 HEIGHTS, DISTANCES, BASES = 15 * LANES, 18 * LANES, 21 * LANES
 STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * LANES, 27 * LANES, 30 * LANES, 33 * LANES
 REAL, IMAGINARY, TURN, MOMENT, PUSH = 34 * LANES, 35 * LANES, 36 * LANES, 37 * LANES, 38 * LANES
@@ -61,7 +62,7 @@ def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
 def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: float) -> Vector:
     """`corner` from the centre, in radii; never so near 0 that products of such lengths vanish."""
     x, y, z = scale(scaling, subtract(subtract(corner, center), center_rest))
-    largest = max(abs(x), max(abs(y), abs(z)))
+    largest = max(abs(x), abs(y), abs(z))
     at_center = largest < _TINY
     return (
         _TINY * _GENERIC[0] if at_center else x,
@@ -82,8 +83,8 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
     raw = subtract(near, scale(dot(near, along), along))
     # Where the edge passes through the centre only the rounding error is left, along the edge as likely as across it.
     x, y, z = subtract(raw, scale(dot(raw, along), along))
-    size = max(abs(raw[0]), max(abs(raw[1]), abs(raw[2])))
-    vanished = max(abs(x), max(abs(y), abs(z))) <= 1e-3 * size
+    size = max(abs(raw[0]), abs(raw[1]), abs(raw[2]))
+    vanished = max(abs(x), abs(y), abs(z)) <= 1e-3 * size
     # A direction across the edge that is the same for the edge reversed.
     flat_x, flat_y = abs(along[0]) < 0.6, abs(along[1]) < 0.6
     axis = 1.0 if flat_x else 0.0, 1.0 if flat_y and not flat_x else 0.0, 0.0 if flat_x or flat_y else 1.0
@@ -100,8 +101,8 @@ def triangle_geometry(scratch: FloatArray, count: int, center: Vector, center_re
     scaling = 1.0 / radius
     for lane in range(count):
         raw_a = _load3(scratch, CORNERS, lane)
-        raw_b = _load3(scratch, CORNERS + 3 * LANES, lane)
-        raw_c = _load3(scratch, CORNERS + 6 * LANES, lane)
+        raw_b = _load3(scratch, SECOND_CORNERS, lane)
+        raw_c = _load3(scratch, THIRD_CORNERS, lane)
         normal = _load3(scratch, NORMAL, lane)
         inverse = _load3(scratch, INVERSE_LENGTHS, lane)
         along_ab = scale(inverse[0], subtract(raw_b, raw_a))
@@ -124,9 +125,6 @@ def triangle_geometry(scratch: FloatArray, count: int, center: Vector, center_re
         nearer = bases[1] < nearest_base
         nearest_base, height = (bases[1] if nearer else nearest_base), (heights[1] if nearer else height)
         height = heights[2] if bases[2] < nearest_base else height
-        _store3(scratch, CORNERS, lane, a)
-        _store3(scratch, CORNERS + 3 * LANES, lane, b)
-        _store3(scratch, CORNERS + 6 * LANES, lane, c)
         _store3(scratch, HEIGHTS, lane, heights)
         distances = (
             dot(cross(along_ab, normal), foot_ab),
@@ -193,35 +191,6 @@ def _wraps(a: Complex, b: Complex, product: Complex) -> float:
     return (1.0 if upper else 0.0) - (1.0 if lower else 0.0)
 
 
-@inlined
-def _angle(number: Complex) -> float:
-    """arg of a complex number other than 0, to 4e-16."""
-    x, y = abs(number[0]), abs(number[1])
-    small, large = min(x, y), max(x, y)
-    # Beyond 22.5 degrees the angle to the diagonal is taken.
-    turned = small > 0.4142135623730950488 * large
-    quotient = (small - large if turned else small) / (small + large if turned else large)
-    square = quotient * quotient
-    # The rational approximation of Moshier's Cephes library (atan.c).
-    upper = (
-        ((-8.750608600031904122785e-1 * square - 1.615753718733365076637e1) * square - 7.500855792314704667340e1)
-        * square
-        - 1.228866684490136173410e2
-    ) * square - 6.485021904942025371773e1
-    lower = (
-        (
-            ((square + 2.485846490142306297962e1) * square + 1.650270098316988542046e2) * square
-            + 4.328810604912902668951e2
-        )
-        * square
-        + 4.853903996359136964868e2
-    ) * square + 1.945506571482613964425e2
-    angle = quotient + quotient * (square * (upper / lower)) + (0.25 * math.pi if turned else 0.0)
-    angle = 0.5 * math.pi - angle if y > x else angle
-    angle = math.pi - angle if number[0] < 0.0 else angle
-    return -angle if number[1] < 0.0 else angle
-
-
 @building_block
 def triangle_terms(scratch: FloatArray, count: int) -> None:
     """Fill `REAL` to `PUSH` of `count` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
@@ -246,7 +215,7 @@ def triangle_terms(scratch: FloatArray, count: int) -> None:
         turn_01 = times(turn_0, turn_1)
         turn = times(turn_01, turn_2)
         whole = _wraps(turn_0, turn_1, turn_01) + _wraps(turn_01, turn_2, turn)
-        angle = _angle(turn) + 2.0 * math.pi * whole
+        angle = arctangent(turn[1], turn[0]) + 2.0 * math.pi * whole
         gap = max(1.0 - abs(height), 0.0)
         area = 0.5 * (twice_0 + twice_1 + twice_2) + 0.5 * gap * (1.0 + abs(height)) * angle
         half = times(times(half_0, half_1), half_2)

@@ -29,7 +29,7 @@ class TriangleTree:
     links: IntArray
     """(3 n,): for each node its escape index, its first triangle and how many it has, 0 for one with children."""
     moments: FloatArray
-    """(n, 7): the centroid by area (m), the sum of area times outward normal (m²), the radius about the centroid (m)."""
+    """(n, 7): centroid by area (m), sum of area times outward normal (m²), radius about the centroid (m)."""
 
 
 def build_tree(corners: FloatArray) -> TriangleTree:
