@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numba.extending
 from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -60,6 +61,16 @@ def building_block(function: _Function) -> _Function:
     """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
     return cast(_Function, numba.njit(**_OPTIONS)(function))
 
+
+def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return NUMBER(NUMBER, NUMBER, NUMBER), generate
+
+
+fused_multiply_add: Callable[[float, float, float], float] = numba.extending.intrinsic(_fused_multiply_add)
+"""The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
 
 _kernels: list["Compiled"] = []
 

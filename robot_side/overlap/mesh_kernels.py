@@ -16,11 +16,14 @@ from robot_side.overlap.compile import (
     output_array,
     output_indices,
 )
+from robot_side.overlap.double_double import two_sum
+from robot_side.overlap.double_double_vectors import PreciseVector, highs
 from robot_side.overlap.mesh_overlap import mesh_overlap
 from robot_side.overlap.mesh_tables import MeshTables
+from robot_side.overlap.precise_triangles import precise_product
 from robot_side.overlap.tree_queries import nearest_triangle, winding_number
 from robot_side.overlap.triangle_lanes import SCRATCH
-from robot_side.overlap.vectors import Vector, dot, load, negative, norm, scale, subtract
+from robot_side.overlap.vectors import Vector, dot, load, negative, norm, scale
 
 MESH_ARGUMENTS = (
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
@@ -32,9 +35,19 @@ _ON_SURFACE = 1e-12
 
 
 @inlined
-def _to_mesh(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
+def _to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
+    """A centre in the mesh's frame; a float would be too coarse for a ball on the far end of a large mesh."""
+    away = (
+        two_sum(center[0], -positions[pair, 0]),
+        two_sum(center[1], -positions[pair, 1]),
+        two_sum(center[2], -positions[pair, 2]),
+    )
     turned = rotations[pair].T
-    return dot(load(turned, 0), vector), dot(load(turned, 1), vector), dot(load(turned, 2), vector)
+    return (
+        precise_product(load(turned, 0), away),
+        precise_product(load(turned, 1), away),
+        precise_product(load(turned, 2), away),
+    )
 
 
 @inlined
@@ -70,8 +83,8 @@ def overlap_loop(
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     near, scratch = np.empty(len(triangles) + 1, np.int64), np.empty(SCRATCH)
     for pair in range(radii.size):
-        center = _to_mesh(rotations, pair, subtract(load(centers, pair), load(positions, pair)))
-        overlap, count = mesh_overlap(center, (0.0, 0.0, 0.0), radii[pair], tables, mesh_index[pair], near, scratch)
+        center = _to_mesh(load(centers, pair), positions, rotations, pair)
+        overlap, count = mesh_overlap(center, radii[pair], tables, mesh_index[pair], near, scratch)
         gradient = _to_world(rotations, pair, overlap[1])
         volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
         gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient
@@ -118,7 +131,7 @@ def nearest_loop(
     """Fill signed distances (m) and directions (in the world's frame)."""
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     for pair in range(mesh_index.size):
-        point = _to_mesh(rotations, pair, subtract(load(centers, pair), load(positions, pair)))
-        distance, direction = _signed_distance(tables, mesh_index[pair], point)
+        point = _to_mesh(load(centers, pair), positions, rotations, pair)
+        distance, direction = _signed_distance(tables, mesh_index[pair], highs(point))
         distances[pair] = distance
         directions[pair, 0], directions[pair, 1], directions[pair, 2] = _to_world(rotations, pair, direction)

@@ -4,7 +4,9 @@ import math
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import building_block, inlined
+from robot_side.overlap.double_double_vectors import PreciseVector, highs
 from robot_side.overlap.mesh_tables import MeshTables
+from robot_side.overlap.precise_triangles import FAR, refine_lane, small_overlap
 from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.tree_queries import gather_near, nearest_triangle, winding_number
 from robot_side.overlap.triangle_lanes import (
@@ -28,12 +30,13 @@ _UNDECIDED_AREA = 1e-11
 """Solid angles (sr) this near to 0 or 4π may be either."""
 _UNDECIDED_VOLUME = 1e-8
 """Volumes of the part inside (the ball's radius being 1) that tell nothing about which."""
+_SMALL_VOLUME = 1e-5
+"""A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
 
 
 @building_block
 def mesh_overlap(
-    center: Vector,
-    center_rest: Vector,
+    precise_center: PreciseVector,
     radius: float,
     tables: MeshTables,
     mesh: int,
@@ -42,9 +45,10 @@ def mesh_overlap(
 ) -> tuple[Overlap, int]:
     """(the overlap of the sphere with a mesh, how many triangles were evaluated for it).
 
-    The centre is `center` + `center_rest` (m, in the mesh's frame); `near` has room for one triangle more than the
+    The centre (m) is in the mesh's frame; `near` has room for one triangle more than the
     mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
     """
+    center = highs(precise_center)
     least_2, most_2 = _box_distances_2(tables, mesh, center)
     if least_2 >= radius * radius or radius == 0.0:
         return nothing(), 0
@@ -55,7 +59,7 @@ def mesh_overlap(
         if winding_number(tables, mesh, center) > 0:
             return whole_sphere(radius), 0
         return nothing(), 0
-    product, turn, moment, push = _sum_triangles(center, center_rest, radius, tables, near, count, scratch)
+    product, turn, moment, push = _sum_triangles(precise_center, radius, tables, near, count, scratch)
     covered = -2.0 * (math.atan2(product[1], product[0]) + turn)
     covered -= _WHOLE * math.floor(covered / _WHOLE)
     if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
@@ -63,9 +67,14 @@ def mesh_overlap(
         part = (moment + covered) / 3.0
         if part < -_UNDECIDED_VOLUME or (part < _UNDECIDED_VOLUME and _mostly_inside(tables, mesh, center, radius)):
             covered += _WHOLE
+    volume = (moment + covered) / 3.0
+    if volume < _SMALL_VOLUME:
+        applies, small, small_covered = _small_overlap(precise_center, radius, tables, near, count, scratch)
+        if applies:
+            volume, covered = small, small_covered
     # In radii up to here.
     area = radius * radius
-    overlap = (moment + covered) / 3.0 * area * radius, scale(-area, push), covered * area
+    overlap = volume * area * radius, scale(-area, push), covered * area
     return bounded(overlap, radius, tables.volumes[mesh]), count
 
 
@@ -84,8 +93,7 @@ def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
 
 @building_block
 def _sum_triangles(
-    center: Vector,
-    center_rest: Vector,
+    precise_center: PreciseVector,
     radius: float,
     tables: MeshTables,
     near: IntArray,
@@ -96,11 +104,12 @@ def _sum_triangles(
     product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
     for first in range(0, count, LANES):
         size = min(count - first, LANES)
+        _load_lanes(tables, near, first, size, scratch)
+        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
         for lane in range(size):
             triangle = near[first + lane]
-            for field in range(15):
-                scratch[CORNERS + field * LANES + lane] = tables.triangles[triangle, field]
-        triangle_geometry(scratch, size, center, center_rest, radius)
+            if tables.triangles[triangle, 15] > FAR * radius:
+                refine_lane(scratch, lane, tables, triangle, precise_center, radius, False)
         triangle_terms(scratch, size)
         reduce_lanes(scratch, size)
         product = times(product, (scratch[REAL], scratch[IMAGINARY]))
@@ -110,6 +119,39 @@ def _sum_triangles(
         moment += scratch[MOMENT]
         push = add(push, (scratch[PUSH], scratch[PUSH + LANES], scratch[PUSH + 2 * LANES]))
     return product, turn, moment, push
+
+
+@building_block
+def _small_overlap(
+    precise_center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int, scratch: FloatArray
+) -> tuple[bool, float, float]:
+    """`small_overlap` of the triangles in `near`."""
+    volume, covered = 0.0, 0.0
+    for first in range(0, count, LANES):
+        size = min(count - first, LANES)
+        _load_lanes(tables, near, first, size, scratch)
+        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
+        for lane in range(size):
+            refine_lane(scratch, lane, tables, near[first + lane], precise_center, radius, True)
+        applies, part, part_covered = small_overlap(scratch, size)
+        if not applies:
+            return False, 0.0, 0.0
+        volume += part
+        covered += part_covered
+    return True, volume, covered
+
+
+@inlined
+def _lows(vector: PreciseVector) -> Vector:
+    return vector[0][1], vector[1][1], vector[2][1]
+
+
+@inlined
+def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
+    for lane in range(size):
+        triangle = near[first + lane]
+        for field in range(15):
+            scratch[CORNERS + field * LANES + lane] = tables.triangles[triangle, field]
 
 
 @building_block

@@ -37,7 +37,8 @@ CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * LANES, 
 HEIGHTS, DISTANCES, BASES = 15 * LANES, 18 * LANES, 21 * LANES
 STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * LANES, 27 * LANES, 30 * LANES, 33 * LANES
 REAL, IMAGINARY, TURN, MOMENT, PUSH = 34 * LANES, 35 * LANES, 36 * LANES, 37 * LANES, 38 * LANES
-SCRATCH = 41 * LANES
+GAP, CHORDS = 41 * LANES, 42 * LANES
+SCRATCH = 45 * LANES
 """The length of the scratch array."""
 
 _TINY = 1e-30
@@ -72,6 +73,14 @@ def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: floa
 
 
 @inlined
+def across(along: Vector) -> Vector:
+    """A vector of length 0.6 to 1 across the unit vector `along` of an edge, the same for the edge reversed."""
+    flat_x, flat_y = abs(along[0]) < 0.6, abs(along[1]) < 0.6
+    axis = 1.0 if flat_x else 0.0, 1.0 if flat_y and not flat_x else 0.0, 0.0 if flat_x or flat_y else 1.0
+    return subtract(axis, scale(dot(axis, along), along))
+
+
+@inlined
 def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along: Vector) -> Vector:
     """The foot point on an edge's line, worked out from the end of lower rank: alike for the edge reversed."""
     from_start = start_rank < end_rank
@@ -85,11 +94,8 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
     x, y, z = subtract(raw, scale(dot(raw, along), along))
     size = max(abs(raw[0]), abs(raw[1]), abs(raw[2]))
     vanished = max(abs(x), abs(y), abs(z)) <= 1e-3 * size
-    # A direction across the edge that is the same for the edge reversed.
-    flat_x, flat_y = abs(along[0]) < 0.6, abs(along[1]) < 0.6
-    axis = 1.0 if flat_x else 0.0, 1.0 if flat_y and not flat_x else 0.0, 0.0 if flat_x or flat_y else 1.0
-    across = scale(max(size, _TINY_FOOT), subtract(axis, scale(dot(axis, along), along)))
-    return across[0] if vanished else x, across[1] if vanished else y, across[2] if vanished else z
+    aside = scale(max(size, _TINY_FOOT), across(along))
+    return aside[0] if vanished else x, aside[1] if vanished else y, aside[2] if vanished else z
 
 
 @building_block
