@@ -13,6 +13,9 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.extending
 from numba.core.caching import FunctionCache
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.typed_passes import NativeLowering
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -52,14 +55,52 @@ COUNT: Any = numba.types.int64
 """The Numba type of an int."""
 
 
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _ForCallers(LoweringPass):  # type: ignore[misc]
+    """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
+
+    _name = "for_callers"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
+        entry_point = object().__reduce_ex__
+        state["cr"] = state["cr"]._replace(cfunc=entry_point)
+        state.targetctx.insert_user_function(entry_point, state["cr"].fndesc, [state.library])
+        return True
+
+
+class _WithoutMachineCode(CompilerBase):  # type: ignore[misc]
+    """Compile to what a kernel needs to link the function in.
+
+    By default Numba also makes machine code of it, and wrappers by which Python and C may call it: more than half
+    of the time in all, as nothing but kernels calls these functions.
+    """
+
+    def define_pipelines(self) -> list[Any]:
+        """The ordinary passes and `_ForCallers`."""
+        self.state.flags.no_cpython_wrapper = True
+        self.state.flags.no_cfunc_wrapper = True
+        self.state.flags.no_compile = True
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_ForCallers, NativeLowering)
+        passes.finalize()
+        return [passes]
+
+
+_FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": _WithoutMachineCode}
+
+
 def inlined(function: _Function) -> _Function:
     """Compile `function` into whichever kernel calls it."""
-    return cast(_Function, numba.njit(forceinline=True, **_OPTIONS)(function))
+    return cast(_Function, numba.njit(forceinline=True, **_FOR_CALLERS)(function))
 
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
-    return cast(_Function, numba.njit(**_OPTIONS)(function))
+    return cast(_Function, numba.njit(**_FOR_CALLERS)(function))
 
 
 def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:

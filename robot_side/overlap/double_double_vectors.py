@@ -18,30 +18,34 @@ PreciseVector = tuple[DoubleDouble, DoubleDouble, DoubleDouble]
 
 
 @inlined
-def load_number(array: FloatArray, row: int, column: int) -> DoubleDouble:
-    """The number at `row`, `column` of an (n, m, 2) array."""
-    return array[row, column, 0], array[row, column, 1]
+def load_number(array: FloatArray, row: int) -> DoubleDouble:
+    """The number that `store_number` put into row `row` of an (n, 3, 2) array."""
+    return array[row, 0, 0], array[row, 0, 1]
 
 
 @inlined
-def store_number(array: FloatArray, row: int, column: int, value: DoubleDouble) -> None:
-    """Put a number at `row`, `column` of an (n, m, 2) array."""
-    array[row, column, 0] = value[0]
-    array[row, column, 1] = value[1]
+def store_number(array: FloatArray, row: int, value: DoubleDouble) -> None:
+    """Put a number into row `row` of an (n, 3, 2) array."""
+    array[row, 0, 0] = value[0]
+    array[row, 0, 1] = value[1]
 
 
 @inlined
 def load_vector(array: FloatArray, row: int) -> PreciseVector:
     """Row `row` of an (n, 3, 2) array."""
-    return load_number(array, row, 0), load_number(array, row, 1), load_number(array, row, 2)
+    return (
+        (array[row, 0, 0], array[row, 0, 1]),
+        (array[row, 1, 0], array[row, 1, 1]),
+        (array[row, 2, 0], array[row, 2, 1]),
+    )
 
 
 @inlined
 def store_vector(array: FloatArray, row: int, value: PreciseVector) -> None:
     """Put a vector into row `row` of an (n, 3, 2) array."""
-    store_number(array, row, 0, value[0])
-    store_number(array, row, 1, value[1])
-    store_number(array, row, 2, value[2])
+    for axis in range(3):
+        array[row, axis, 0] = value[axis][0]
+        array[row, axis, 1] = value[axis][1]
 
 
 @inlined

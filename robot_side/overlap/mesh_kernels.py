@@ -16,11 +16,10 @@ from robot_side.overlap.compile import (
     output_array,
     output_indices,
 )
-from robot_side.overlap.double_double import two_sum
+from robot_side.overlap.double_double import DoubleDouble, multiple, plus, two_sum
 from robot_side.overlap.double_double_vectors import PreciseVector, highs
 from robot_side.overlap.mesh_overlap import mesh_overlap
 from robot_side.overlap.mesh_tables import MeshTables
-from robot_side.overlap.precise_triangles import precise_product
 from robot_side.overlap.tree_queries import nearest_triangle, winding_number
 from robot_side.overlap.triangle_lanes import SCRATCH
 from robot_side.overlap.vectors import Vector, dot, load, negative, norm, scale
@@ -44,10 +43,15 @@ def _to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair:
     )
     turned = rotations[pair].T
     return (
-        precise_product(load(turned, 0), away),
-        precise_product(load(turned, 1), away),
-        precise_product(load(turned, 2), away),
+        _product(load(turned, 0), away),
+        _product(load(turned, 1), away),
+        _product(load(turned, 2), away),
     )
+
+
+@inlined
+def _product(a: Vector, b: PreciseVector) -> DoubleDouble:
+    return plus(plus(multiple(a[0], b[0]), multiple(a[1], b[1])), multiple(a[2], b[2]))
 
 
 @inlined

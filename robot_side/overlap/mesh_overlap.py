@@ -4,11 +4,13 @@ import math
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import building_block, inlined
-from robot_side.overlap.double_double_vectors import PreciseVector, highs
+from robot_side.overlap.double_double import ZERO, divided, plus
+from robot_side.overlap.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
+from robot_side.overlap.large_triangles import FAR, corners_about, refine_lane
 from robot_side.overlap.mesh_tables import MeshTables
-from robot_side.overlap.precise_triangles import FAR, refine_lane, small_overlap
+from robot_side.overlap.small_mesh_overlap import beyond_face
 from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
-from robot_side.overlap.tree_queries import gather_near, nearest_triangle, winding_number
+from robot_side.overlap.tree_queries import gather_near, nearest_triangle, squared_distance, winding_number
 from robot_side.overlap.triangle_lanes import (
     CORNERS,
     IMAGINARY,
@@ -32,6 +34,8 @@ _UNDECIDED_VOLUME = 1e-8
 """Volumes of the part inside (the ball's radius being 1) that tell nothing about which."""
 _SMALL_VOLUME = 1e-5
 """A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
+_CLOSE = 0.02
+"""A centre farther than this from the surface (in radii) cannot be inside where the volume is small."""
 
 
 @building_block
@@ -69,9 +73,9 @@ def mesh_overlap(
             covered += _WHOLE
     volume = (moment + covered) / 3.0
     if volume < _SMALL_VOLUME:
-        applies, small, small_covered = _small_overlap(precise_center, radius, tables, near, count, scratch)
+        applies, small, small_covered, small_push = _small_overlap(precise_center, radius, tables, near, count)
         if applies:
-            volume, covered = small, small_covered
+            volume, covered, push = small, small_covered, small_push
     # In radii up to here.
     area = radius * radius
     overlap = volume * area * radius, scale(-area, push), covered * area
@@ -109,7 +113,7 @@ def _sum_triangles(
         for lane in range(size):
             triangle = near[first + lane]
             if tables.triangles[triangle, 15] > FAR * radius:
-                refine_lane(scratch, lane, tables, triangle, precise_center, radius, False)
+                refine_lane(scratch, lane, tables, triangle, precise_center, radius)
         triangle_terms(scratch, size)
         reduce_lanes(scratch, size)
         product = times(product, (scratch[REAL], scratch[IMAGINARY]))
@@ -123,22 +127,26 @@ def _sum_triangles(
 
 @building_block
 def _small_overlap(
-    precise_center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int, scratch: FloatArray
-) -> tuple[bool, float, float]:
-    """`small_overlap` of the triangles in `near`."""
-    volume, covered = 0.0, 0.0
-    for first in range(0, count, LANES):
-        size = min(count - first, LANES)
-        _load_lanes(tables, near, first, size, scratch)
-        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
-        for lane in range(size):
-            refine_lane(scratch, lane, tables, near[first + lane], precise_center, radius, True)
-        applies, part, part_covered = small_overlap(scratch, size)
-        if not applies:
-            return False, 0.0, 0.0
-        volume += part
-        covered += part_covered
-    return True, volume, covered
+    center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int
+) -> tuple[bool, float, float, Vector]:
+    """(whether it applies, volume, covered solid angle, Σ A n) of the triangles in `near`, the radius being 1."""
+    volume, covered, push = ZERO, ZERO, (ZERO, ZERO, ZERO)
+    to_radii = divided((1.0, 0.0), (radius, 0.0))
+    for index in range(count):
+        triangle = near[index]
+        apart_2 = squared_distance(tables, triangle, highs(center)) / (radius * radius)
+        if apart_2 < _CLOSE * _CLOSE:
+            return False, 0.0, 0.0, (0.0, 0.0, 0.0)
+        if apart_2 < 1.000001:
+            corners = corners_about(tables, triangle, center)
+            scaled = (
+                precise_scale(to_radii, corners[0]),
+                precise_scale(to_radii, corners[1]),
+                precise_scale(to_radii, corners[2]),
+            )
+            part, angle, area = beyond_face(scaled)
+            volume, covered, push = plus(volume, part), plus(covered, angle), precise_add(push, area)
+    return True, volume[0], covered[0], highs(push)
 
 
 @inlined

@@ -79,6 +79,13 @@ def _to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
 
 
 @building_block
+def squared_distance(tables: MeshTables, triangle: int, point: Vector) -> float:
+    """The squared distance (m²) from `point` to a triangle."""
+    foot = _to_triangle(tables, triangle, point)
+    return dot(foot, foot)
+
+
+@building_block
 def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int, Vector]:
     """(the triangle nearest to `point`, the vector in m from there to its nearest point)."""
     first, end = tables.roots[mesh], tables.roots[mesh + 1]

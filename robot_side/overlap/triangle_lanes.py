@@ -37,8 +37,7 @@ CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * LANES, 
 HEIGHTS, DISTANCES, BASES = 15 * LANES, 18 * LANES, 21 * LANES
 STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * LANES, 27 * LANES, 30 * LANES, 33 * LANES
 REAL, IMAGINARY, TURN, MOMENT, PUSH = 34 * LANES, 35 * LANES, 36 * LANES, 37 * LANES, 38 * LANES
-GAP, CHORDS = 41 * LANES, 42 * LANES
-SCRATCH = 45 * LANES
+SCRATCH = 41 * LANES
 """The length of the scratch array."""
 
 _TINY = 1e-30
@@ -167,7 +166,9 @@ def _end(
     clipped = min(max(along, -half_chord), half_chord)
     near_away = min(away, max(1.0, base))
     shrunk, reach = distance * shrink, min(max(along * shrink, -_FAR), _FAR)
-    turn = shrunk * shrunk + reach * clipped + 1e-300, shrunk * (reach - clipped)
+    cosine = shrunk * shrunk + reach * clipped
+    # An end at the face's foot point turns nothing.
+    turn = (cosine if cosine > 0.0 else 1.0), shrunk * (reach - clipped)
     missed = base >= 1.0
     half = (1.0 if missed else (base + height) * (base + near_away)), (0.0 if missed else distance * clipped)
     return turn, half, clipped
