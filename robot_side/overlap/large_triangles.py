@@ -17,7 +17,7 @@ from robot_side.overlap.double_double_vectors import (
     precise_subtract,
 )
 from robot_side.overlap.mesh_tables import MeshTables
-from robot_side.overlap.triangle_lanes import BASES, DISTANCES, HEIGHT, HEIGHTS, LANES, across
+from robot_side.overlap.triangle_lanes import BASES, DISTANCES, HEIGHT, HEIGHTS, LANES, aside
 from robot_side.overlap.vectors import Vector, cross, dot, norm, scale
 
 FAR = 3.0
@@ -56,8 +56,7 @@ def refine_lane(
             factor = divided(precise_dot(along, near), precise_dot(along, along))
             foot = highs(precise_subtract(near, precise_scale(factor, along)))
             direction, least = scale(row[12 + edge], highs(along)), _VANISHED * norm(highs(near))
-            # An edge through the centre gets some foot point beside it, the same as in the other triangle.
-            place = scale(1.0 / radius, foot if norm(foot) > least else scale(least, across(direction)))
+            place = scale(1.0 / radius, foot) if norm(foot) > least else aside(direction)
             scratch[HEIGHTS + edge * LANES + lane] = dot(normal, place)
             scratch[DISTANCES + edge * LANES + lane] = dot(cross(direction, normal), place)
             scratch[BASES + edge * LANES + lane] = norm(place)

@@ -40,9 +40,10 @@ REAL, IMAGINARY, TURN, MOMENT, PUSH = 34 * LANES, 35 * LANES, 36 * LANES, 37 * L
 SCRATCH = 41 * LANES
 """The length of the scratch array."""
 
-_TINY = 1e-30
-_TINY_FOOT = 1e-45
-_GENERIC = 0.62, -0.51, 0.47
+ASIDE = 0.62e-30, -0.51e-30, 0.47e-30
+"""By how much all triangles are moved out of positions in which a corner, edge or face passes through the centre."""
+_ROUNDING = 4e-16
+"""A foot point this near to the centre, as a share of the end's distance that it comes from, is a rounding error."""
 _FAR = 1e18
 
 
@@ -60,23 +61,15 @@ def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
 
 @inlined
 def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: float) -> Vector:
-    """`corner` from the centre, in radii; never so near 0 that products of such lengths vanish."""
+    """`corner` from the centre, in radii, moved by what only coordinates of 0 take notice of."""
     x, y, z = scale(scaling, subtract(subtract(corner, center), center_rest))
-    largest = max(abs(x), abs(y), abs(z))
-    at_center = largest < _TINY
-    return (
-        _TINY * _GENERIC[0] if at_center else x,
-        _TINY * _GENERIC[1] if at_center else y,
-        _TINY * _GENERIC[2] if at_center else z,
-    )
+    return x + ASIDE[0], y + ASIDE[1], z + ASIDE[2]
 
 
 @inlined
-def across(along: Vector) -> Vector:
-    """A vector of length 0.6 to 1 across the unit vector `along` of an edge, the same for the edge reversed."""
-    flat_x, flat_y = abs(along[0]) < 0.6, abs(along[1]) < 0.6
-    axis = 1.0 if flat_x else 0.0, 1.0 if flat_y and not flat_x else 0.0, 0.0 if flat_x or flat_y else 1.0
-    return subtract(axis, scale(dot(axis, along), along))
+def aside(along: Vector) -> Vector:
+    """The foot point on an edge through the centre, moved like everything else: across `along`, its unit vector."""
+    return subtract(ASIDE, scale(dot(ASIDE, along), along))
 
 
 @inlined
@@ -89,12 +82,11 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
         start[2] if from_start else end[2],
     )
     raw = subtract(near, scale(dot(near, along), along))
-    # Where the edge passes through the centre only the rounding error is left, along the edge as likely as across it.
+    # Where the edge passes close to the centre its rounding error lies along the edge as likely as across it.
     x, y, z = subtract(raw, scale(dot(raw, along), along))
-    size = max(abs(raw[0]), abs(raw[1]), abs(raw[2]))
-    vanished = max(abs(x), abs(y), abs(z)) <= 1e-3 * size
-    aside = scale(max(size, _TINY_FOOT), across(along))
-    return aside[0] if vanished else x, aside[1] if vanished else y, aside[2] if vanished else z
+    vanished = max(abs(x), abs(y), abs(z)) <= _ROUNDING * max(abs(near[0]), abs(near[1]), abs(near[2]))
+    instead = aside(along)
+    return instead[0] if vanished else x, instead[1] if vanished else y, instead[2] if vanished else z
 
 
 @building_block
