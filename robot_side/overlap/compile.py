@@ -55,14 +55,14 @@ COUNT: Any = numba.types.int64
 """The Numba type of an int."""
 
 
-@register_pass(mutates_CFG=False, analysis_only=True)
-class _ForCallers(LoweringPass):  # type: ignore[misc]
+@register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
+class _ForCallers(LoweringPass):
     """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
 
     _name = "for_callers"
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__()  # type: ignore[no-untyped-call]
 
     def run_pass(self, state: Any) -> bool:
         """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
@@ -72,7 +72,7 @@ class _ForCallers(LoweringPass):  # type: ignore[misc]
         return True
 
 
-class _WithoutMachineCode(CompilerBase):  # type: ignore[misc]
+class _WithoutMachineCode(CompilerBase):
     """Compile to what a kernel needs to link the function in.
 
     By default Numba also makes machine code of it, and wrappers by which Python and C may call it: more than half
@@ -84,7 +84,7 @@ class _WithoutMachineCode(CompilerBase):  # type: ignore[misc]
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
         passes.add_pass_after(_ForCallers, NativeLowering)
         passes.finalize()
         return [passes]
@@ -110,7 +110,7 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
     return NUMBER(NUMBER, NUMBER, NUMBER), generate
 
 
-fused_multiply_add: Callable[[float, float, float], float] = numba.extending.intrinsic(_fused_multiply_add)
+fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
 """The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
 
 _kernels: list["Compiled"] = []

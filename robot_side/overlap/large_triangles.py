@@ -17,7 +17,7 @@ from robot_side.overlap.double_double_vectors import (
     precise_subtract,
 )
 from robot_side.overlap.mesh_tables import MeshTables
-from robot_side.overlap.triangle_lanes import BASES, DISTANCES, HEIGHT, HEIGHTS, LANES, aside
+from robot_side.overlap.triangle_lanes import BASES, CORNER_DISTANCES, DISTANCES, HEIGHT, HEIGHTS, ROW, aside
 from robot_side.overlap.vectors import Vector, cross, dot, norm, scale
 
 FAR = 3.0
@@ -39,6 +39,15 @@ def corners_about(tables: MeshTables, triangle: int, center: PreciseVector) -> P
     )
 
 
+@inlined
+def is_far(scratch: FloatArray, lane: int) -> bool:
+    """Whether a triangle has an edge that is far at both ends."""
+    far = 0
+    for corner in range(3):
+        far += 1 if scratch[CORNER_DISTANCES + corner * ROW + lane] > FAR else 0
+    return far > 1
+
+
 @building_block
 def refine_lane(
     scratch: FloatArray, lane: int, tables: MeshTables, triangle: int, center: PreciseVector, radius: float
@@ -57,12 +66,12 @@ def refine_lane(
             foot = highs(precise_subtract(near, precise_scale(factor, along)))
             direction, least = scale(row[12 + edge], highs(along)), _VANISHED * norm(highs(near))
             place = scale(1.0 / radius, foot) if norm(foot) > least else aside(direction)
-            scratch[HEIGHTS + edge * LANES + lane] = dot(normal, place)
-            scratch[DISTANCES + edge * LANES + lane] = dot(cross(direction, normal), place)
-            scratch[BASES + edge * LANES + lane] = norm(place)
-        if scratch[BASES + edge * LANES + lane] < closest:
-            closest = scratch[BASES + edge * LANES + lane]
-            scratch[HEIGHT + lane] = scratch[HEIGHTS + edge * LANES + lane]
+            scratch[HEIGHTS + edge * ROW + lane] = dot(normal, place)
+            scratch[DISTANCES + edge * ROW + lane] = dot(cross(direction, normal), place)
+            scratch[BASES + edge * ROW + lane] = norm(place)
+        if scratch[BASES + edge * ROW + lane] < closest:
+            closest = scratch[BASES + edge * ROW + lane]
+            scratch[HEIGHT + lane] = scratch[HEIGHTS + edge * ROW + lane]
     if closest >= 1.0:
         crossed = precise_cross(precise_subtract(corners[1], corners[0]), precise_subtract(corners[2], corners[0]))
         size = norm(highs(crossed))

@@ -20,9 +20,9 @@ from robot_side.overlap.double_double import DoubleDouble, multiple, plus, two_s
 from robot_side.overlap.double_double_vectors import PreciseVector, highs
 from robot_side.overlap.mesh_overlap import mesh_overlap
 from robot_side.overlap.mesh_tables import MeshTables
-from robot_side.overlap.tree_queries import nearest_triangle, winding_number
+from robot_side.overlap.tree_queries import is_clear_of, nearest_triangle, winding_number
 from robot_side.overlap.triangle_lanes import SCRATCH
-from robot_side.overlap.vectors import Vector, dot, load, negative, norm, scale
+from robot_side.overlap.vectors import Vector, dot, load, negative, norm, scale, subtract
 
 MESH_ARGUMENTS = (
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
@@ -87,8 +87,16 @@ def overlap_loop(
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     near, scratch = np.empty(len(triangles) + 1, np.int64), np.empty(SCRATCH)
     for pair in range(radii.size):
+        mesh, radius = mesh_index[pair], radii[pair]
+        away = subtract(load(centers, pair), load(positions, pair))
+        turned = rotations[pair].T
+        rounded = dot(load(turned, 0), away), dot(load(turned, 1), away), dot(load(turned, 2), away)
+        if is_clear_of(tables, mesh, rounded, radius):
+            volumes[pair], areas[pair], touched[pair] = 0.0, 0.0, 0
+            gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = 0.0, 0.0, 0.0
+            continue
         center = _to_mesh(load(centers, pair), positions, rotations, pair)
-        overlap, count = mesh_overlap(center, radii[pair], tables, mesh_index[pair], near, scratch)
+        overlap, count = mesh_overlap(center, radius, tables, mesh, near, scratch)
         gradient = _to_world(rotations, pair, overlap[1])
         volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
         gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient

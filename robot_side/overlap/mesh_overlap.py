@@ -6,7 +6,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import building_block, inlined
 from robot_side.overlap.double_double import ZERO, divided, plus
 from robot_side.overlap.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
-from robot_side.overlap.large_triangles import FAR, corners_about, refine_lane
+from robot_side.overlap.large_triangles import FAR, corners_about, is_far, refine_lane
 from robot_side.overlap.mesh_tables import MeshTables
 from robot_side.overlap.small_mesh_overlap import beyond_face
 from robot_side.overlap.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
@@ -17,7 +17,10 @@ from robot_side.overlap.triangle_lanes import (
     LANES,
     MOMENT,
     PUSH,
+    PUSH_Y,
+    PUSH_Z,
     REAL,
+    ROW,
     TURN,
     Complex,
     reduce_lanes,
@@ -112,7 +115,7 @@ def _sum_triangles(
         triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
         for lane in range(size):
             triangle = near[first + lane]
-            if tables.triangles[triangle, 15] > FAR * radius:
+            if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
                 refine_lane(scratch, lane, tables, triangle, precise_center, radius)
         triangle_terms(scratch, size)
         reduce_lanes(scratch, size)
@@ -121,7 +124,7 @@ def _sum_triangles(
         product = product[0] * rescale, product[1] * rescale
         turn += scratch[TURN]
         moment += scratch[MOMENT]
-        push = add(push, (scratch[PUSH], scratch[PUSH + LANES], scratch[PUSH + 2 * LANES]))
+        push = add(push, (scratch[PUSH], scratch[PUSH_Y], scratch[PUSH_Z]))
     return product, turn, moment, push
 
 
@@ -159,7 +162,7 @@ def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scrat
     for lane in range(size):
         triangle = near[first + lane]
         for field in range(15):
-            scratch[CORNERS + field * LANES + lane] = tables.triangles[triangle, field]
+            scratch[CORNERS + field * ROW + lane] = tables.triangles[triangle, field]
 
 
 @building_block

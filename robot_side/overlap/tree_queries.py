@@ -22,6 +22,13 @@ def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
     return total
 
 
+@inlined
+def is_clear_of(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
+    """Whether a ball lies outside a mesh's box, whatever `point` has lost in rounding."""
+    apart_2 = _box_distance_2(tables, tables.roots[mesh], point)
+    return apart_2 > 1.000001 * radius * radius + 1e-24 * dot(point, point)
+
+
 @building_block
 def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, near: IntArray) -> int:
     """Write the triangles that the ball (`point`, `radius`) may reach into `near`; how many.

@@ -30,14 +30,17 @@ from robot_side.overlap.vectors import Vector, cross, dot, scale, subtract
 
 LANES = 64
 """Triangles handled at once."""
+ROW = LANES + 8
+"""The distance between two rows of the scratch array: rows 4096 bytes apart would get in each other's way."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
-CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * LANES, 6 * LANES, 9 * LANES, 12 * LANES
-HEIGHTS, DISTANCES, BASES = 15 * LANES, 18 * LANES, 21 * LANES
-STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * LANES, 27 * LANES, 30 * LANES, 33 * LANES
-REAL, IMAGINARY, TURN, MOMENT, PUSH = 34 * LANES, 35 * LANES, 36 * LANES, 37 * LANES, 38 * LANES
-SCRATCH = 41 * LANES
+CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * ROW, 6 * ROW, 9 * ROW, 12 * ROW
+HEIGHTS, DISTANCES, BASES = 15 * ROW, 18 * ROW, 21 * ROW
+STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * ROW, 27 * ROW, 30 * ROW, 33 * ROW
+REAL, IMAGINARY, TURN, MOMENT = 34 * ROW, 35 * ROW, 36 * ROW, 37 * ROW
+PUSH, PUSH_Y, PUSH_Z = 38 * ROW, 39 * ROW, 40 * ROW
+SCRATCH = 41 * ROW
 """The length of the scratch array."""
 
 ASIDE = 0.62e-30, -0.51e-30, 0.47e-30
@@ -49,14 +52,14 @@ _FAR = 1e18
 
 @inlined
 def _load3(scratch: FloatArray, row: int, lane: int) -> Vector:
-    return scratch[row + lane], scratch[row + LANES + lane], scratch[row + 2 * LANES + lane]
+    return scratch[row + lane], scratch[row + ROW + lane], scratch[row + 2 * ROW + lane]
 
 
 @inlined
 def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
     scratch[row + lane] = values[0]
-    scratch[row + LANES + lane] = values[1]
-    scratch[row + 2 * LANES + lane] = values[2]
+    scratch[row + ROW + lane] = values[1]
+    scratch[row + 2 * ROW + lane] = values[2]
 
 
 @inlined
@@ -226,20 +229,37 @@ def triangle_terms(scratch: FloatArray, count: int) -> None:
         _store3(scratch, PUSH, lane, scale(area, normal))
 
 
+@inlined
+def _fold(scratch: FloatArray, lane: int, other: int) -> None:
+    """Take lane `other` into `lane`."""
+    real, imaginary = scratch[REAL + lane], scratch[IMAGINARY + lane]
+    other_real, other_imaginary = scratch[REAL + other], scratch[IMAGINARY + other]
+    scratch[REAL + lane] = real * other_real - imaginary * other_imaginary
+    scratch[IMAGINARY + lane] = real * other_imaginary + imaginary * other_real
+    scratch[TURN + lane] += scratch[TURN + other]
+    scratch[MOMENT + lane] += scratch[MOMENT + other]
+    scratch[PUSH + lane] += scratch[PUSH + other]
+    scratch[PUSH_Y + lane] += scratch[PUSH_Y + other]
+    scratch[PUSH_Z + lane] += scratch[PUSH_Z + other]
+
+
 @building_block
 def reduce_lanes(scratch: FloatArray, count: int) -> None:
     """Gather the product of the complex numbers and the sums of the rest in lane 0."""
-    remaining = count
-    while remaining > 1:
-        half = (remaining + 1) // 2
-        for lane in range(remaining - half):
-            real, imaginary = scratch[REAL + lane], scratch[IMAGINARY + lane]
-            other_real, other_imaginary = scratch[REAL + half + lane], scratch[IMAGINARY + half + lane]
-            scratch[REAL + lane] = real * other_real - imaginary * other_imaginary
-            scratch[IMAGINARY + lane] = real * other_imaginary + imaginary * other_real
-            scratch[TURN + lane] += scratch[TURN + half + lane]
-            scratch[MOMENT + lane] += scratch[MOMENT + half + lane]
-            scratch[PUSH + lane] += scratch[PUSH + half + lane]
-            scratch[PUSH + LANES + lane] += scratch[PUSH + LANES + half + lane]
-            scratch[PUSH + 2 * LANES + lane] += scratch[PUSH + 2 * LANES + half + lane]
-        remaining = half
+    # Constant counts make vector code without remainders; the lanes that this needs are filled with what adds nothing.
+    filled = 64 if count > 32 else 32 if count > 16 else 16 if count > 8 else 8
+    for lane in range(count, filled):
+        scratch[REAL + lane] = 1.0
+        for row in range(1, 7):
+            scratch[REAL + row * ROW + lane] = 0.0
+    if count > 32:
+        for lane in range(32):
+            _fold(scratch, lane, lane + 32)
+    if count > 16:
+        for lane in range(16):
+            _fold(scratch, lane, lane + 16)
+    if count > 8:
+        for lane in range(8):
+            _fold(scratch, lane, lane + 8)
+    for lane in range(1, min(count, 8)):
+        _fold(scratch, 0, lane)

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 
-LEAF_TRIANGLES = 6
+LEAF_TRIANGLES = 10
 """The most triangles of a leaf."""
 
 LINKS = 3
