@@ -1,0 +1,89 @@
+"""The meshes about round solids: closed, never smaller, and larger by no more than they say."""
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.overlap import Mesh
+from robot_side.overlap.mesh_shapes import ShapeMesh, capsule_mesh, convex_hull_mesh, cylinder_mesh, ellipsoid_mesh
+
+AXES = np.array([0.3, 1.0, 2.0])
+
+
+def _cylinder(points: FloatArray) -> FloatArray:
+    return np.asarray(
+        points / np.maximum(np.hypot(points[:, 0], points[:, 1]) / 0.5, np.abs(points[:, 2]) / 2.0)[:, None]
+    )
+
+
+def _capsule(points: FloatArray) -> FloatArray:
+    on_axis = np.zeros_like(points)
+    on_axis[:, 2] = np.clip(3.0 * points[:, 2], -2.0, 2.0)
+    return np.asarray(on_axis + 0.5 * points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
+def _ellipsoid(points: FloatArray) -> FloatArray:
+    return np.asarray(AXES * points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
+SHAPES: dict[str, tuple[Callable[[int], ShapeMesh], float, Callable[[FloatArray], FloatArray]]] = {
+    "cylinder": (lambda fineness: cylinder_mesh(0.5, 2.0, 4 * fineness), np.pi * 0.25 * 4.0, _cylinder),
+    "capsule": (lambda fineness: capsule_mesh(0.5, 2.0, fineness), np.pi * (0.25 * 4.0 + 0.125 * 4.0 / 3.0), _capsule),
+    "ellipsoid": (lambda fineness: ellipsoid_mesh(AXES, fineness), 4.0 / 3.0 * np.pi * float(AXES.prod()), _ellipsoid),
+}
+
+
+@pytest.mark.parametrize("fineness", [1, 2, 5, 12])
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_solid_lies_within_and_the_excess_is_as_stated(name: str, fineness: int) -> None:
+    make, volume, surface_points = SHAPES[name]
+    vertices, triangles, excess = make(fineness)
+    mesh = Mesh(vertices, triangles)
+    assert volume < mesh.volume_m3 <= volume * (1.0 + excess) * (1.0 + 1e-12)
+    assert mesh.volume_m3 == pytest.approx(volume * (1.0 + excess), rel=1e-12)
+    points = surface_points(np.random.default_rng(1).normal(size=(3000, 3)))
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offsets = np.sum(normals * corners[:, 0], axis=1)
+    assert (points @ normals.T - offsets).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_excess_falls_with_the_square_of_the_fineness(name: str) -> None:
+    make = SHAPES[name][0]
+    coarse, fine = make(6)[2], make(12)[2]
+    assert fine < 0.35 * coarse
+    assert make(12)[2] < 0.06
+
+
+def test_a_convex_hull_keeps_what_it_needs() -> None:
+    rng = np.random.default_rng(2)
+    points = np.concatenate([rng.uniform(-0.9, 0.9, (200, 3)), np.array([*np.ndindex(2, 2, 2)]) * 2.0 - 1.0])
+    vertices, triangles, excess = convex_hull_mesh(points)
+    assert len(vertices) == 8
+    assert excess == 0.0
+    assert Mesh(vertices, triangles).volume_m3 == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: cylinder_mesh(0.0, 1.0), "radius = 0.0"),
+        (lambda: cylinder_mesh(1.0, np.nan), "half_length"),
+        (lambda: cylinder_mesh(1.0, 1.0, 2), "segments = 2"),
+        (lambda: capsule_mesh(1.0, -1.0), "half_length"),
+        (lambda: capsule_mesh(1.0, 1.0, 0), "subdivisions = 0"),
+        (lambda: ellipsoid_mesh([1.0, 2.0]), "semi_axes"),
+        (lambda: ellipsoid_mesh([1.0, 2.0, 0.0]), "semi_axes"),
+        (lambda: convex_hull_mesh(np.eye(3)), "points (3, 3)"),
+        (lambda: convex_hull_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), "points (4, 3)"),
+        (lambda: convex_hull_mesh([[0.0, np.inf, 0.0]]), "points"),
+    ],
+)
+def test_bad_sizes_are_named(call: Callable[[], ShapeMesh], text: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(text)):
+        call()
