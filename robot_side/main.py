@@ -39,7 +39,7 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
-        warm_up(lambda: status.note("compiling the overlap kernels, which takes up to a minute; the next start is quick"))
+        warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
         status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
         raise_priority()

@@ -1,13 +1,17 @@
-"""Exact overlap volumes of spheres with simple solids, their gradients, and `warm_up` to compile beforehand.
+"""Exact overlap volumes of spheres with solids, their gradients, and `warm_up` to compile beforehand.
 
-Read `volumes` and `mesh` for the functions, `orthoscheme` and `triangle_lanes` for the ideas, `kernels` for what a
-1 kHz tick calls.
+Read `volumes` and `mesh` for the functions, `face_angles` for the idea, `tetrahedron_lane` and `box_lane` for how it is
+used, `precise_polyhedron` for what tiny overlaps need, and `kernels` for what a 1 kHz tick calls.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from robot_side.overlap.kernels import warm_up
-from robot_side.overlap.mesh import Mesh, sphere_mesh
-from robot_side.overlap.mesh_library import MeshLibrary
 from robot_side.overlap.volumes import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+
+if TYPE_CHECKING:
+    from robot_side.overlap.mesh import Mesh, sphere_mesh
+    from robot_side.overlap.mesh_library import MeshLibrary
 
 __all__ = [
     "Mesh",
@@ -19,3 +23,16 @@ __all__ = [
     "sphere_tetrahedron",
     "warm_up",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import meshes when they are first asked for: who has none does not wait for their kernels to compile."""
+    if name in ("Mesh", "sphere_mesh"):
+        from robot_side.overlap import mesh  # noqa: PLC0415 - the point of this function
+
+        return getattr(mesh, name)
+    if name == "MeshLibrary":
+        from robot_side.overlap.mesh_library import MeshLibrary  # noqa: PLC0415
+
+        return MeshLibrary
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

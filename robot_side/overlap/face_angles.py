@@ -1,15 +1,20 @@
 """A face's area in the ball and the part of the sphere's surface that it covers, from its split edges.
 
-With h the face's signed distance from the sphere's centre along its outward normal, and d an edge's from the
-face's foot point,
+Put the origin at the sphere's centre. By the divergence theorem the overlap with a solid of flat faces is
+Σ (h A + R S) / 3 over the faces, with h a face's signed distance along its outward normal, A its area inside the ball
+and S the part of the sphere's surface that lies within the solid as far as this face bounds it. Each face is a sum
+over its edges, of the triangles that they make with the face's foot point, d being an edge's signed distance from it:
 
     A = Σ d·inside/2 + (R² - h²) φ/2,     S = R sign(h) (R Ω - (R - |h|) φ)
 
 where φ is the angle under which the face's foot sees the parts of its edges outside the ball, and Ω the solid angle
-under which the centre sees the triangles of the foot with these parts. Each part adds to φ the angle of the complex
-number (d² + t·t', d |t' - t|), and to Ω/2 that of van Oosterom and Strackee (1983) for such a triangle. Angles are
-summed by multiplying the complex numbers: one arctangent for each of φ and Ω. This is the sum over orthoschemes of
-`orthoscheme`, arranged so that nothing branches.
+under which the centre sees the triangles of the foot with these parts. No topological decision is taken (whether an
+edge is cut, where the foot lies), so that rounding cannot flip one: the sum is continuous in all its inputs, on
+tangents and on corners too, and holds for every closed oriented surface.
+
+Each part adds to φ the angle of the complex number (d² + t·t', d |t' - t|), t and t' being where it begins and ends
+along the edge, and to Ω/2 that of van Oosterom and Strackee (1983) for such a triangle. Angles are summed by
+multiplying the complex numbers: one arctangent for each of φ and Ω, and nothing branches.
 """
 
 import math

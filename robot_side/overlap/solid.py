@@ -70,8 +70,7 @@ def bounded(overlap: Overlap, radius: float, solid_volume: float) -> Overlap:
 
     The terms of a sum over faces are of the order of the sphere's volume and each rounds at some 1e-16 of
     it, so a sum that ought to be 0, or the whole of the smaller volume, can pass that by as much; a closed
-    form can by its last digit. The bounds take off just that: the tests hold the bare sums to the same error
-    as the bounded ones.
+    form can by its last digit. The bounds take off just that.
     """
     volume, gradient, area = overlap
     most = min(sphere_volume(radius), solid_volume)
