@@ -84,11 +84,12 @@ def precise_boxes(
         volume_8th = determinant(u, v, w)
         if volume_8th < 0.0:
             u = precise_negative(u)
-        for corner in range(8):
-            point = precise_add(middle, u) if corner & 1 else precise_subtract(middle, u)
-            point = precise_add(point, v) if corner & 2 else precise_subtract(point, v)
-            point = precise_add(point, w) if corner & 4 else precise_subtract(point, w)
-            store_vector(features, POINTS + corner, point)
+        for upper_u in range(2):
+            on_u = precise_add(middle, u) if upper_u else precise_subtract(middle, u)
+            for upper_v in range(2):
+                on_v = precise_add(on_u, v) if upper_v else precise_subtract(on_u, v)
+                store_vector(features, POINTS + upper_u + 2 * upper_v, precise_subtract(on_v, w))
+                store_vector(features, POINTS + upper_u + 2 * upper_v + 4, precise_add(on_v, w))
         overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 
