@@ -133,9 +133,10 @@ def test_determinants_and_powers_are_0_only_where_they_are() -> None:
             rows = np.round(rows, 1) if case % 3 == 1 else np.ldexp(np.round(rows * 256), -8)
             rows[2] = rows[0] * 0.7 - rows[1] if case % 3 == 1 else rows[0] * 3.0 - rows[1]
         a, b, c = ([_exact(number) for number in row] for row in rows)
-        determinant_ = sum(a[i] * (b[(i + 1) % 3] * c[(i + 2) % 3] - b[(i + 2) % 3] * c[(i + 1) % 3]) for i in range(3))
+        minors = [b[(i + 1) % 3] * c[(i + 2) % 3] - b[(i + 2) % 3] * c[(i + 1) % 3] for i in range(3)]
+        determinant_ = sum((x * minor for x, minor in zip(a, minors, strict=True)), Fraction(0))
         radius = float(np.linalg.norm(rows[0, :, 0]))
-        power = Fraction(radius) ** 2 - sum(x * x for x in a)
+        power = sum((-x * x for x in a), Fraction(radius) ** 2)
         results = np.empty(2)
         _exact_sums(rows, np.array([radius]), results)
         for result, truth in zip(results.tolist(), (determinant_, power), strict=True):

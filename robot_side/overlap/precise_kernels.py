@@ -19,7 +19,7 @@ from robot_side.overlap.double_double_vectors import (
     store_vector,
 )
 from robot_side.overlap.expansion import determinant
-from robot_side.overlap.polyhedron_features import BOX, POINTS, ROWS, TETRAHEDRON
+from robot_side.overlap.polyhedron_features import BOX, DIRECTIONS, POINTS, ROWS, TETRAHEDRON
 from robot_side.overlap.precise_polyhedron import polyhedron_overlap
 from robot_side.overlap.solid import Overlap
 
@@ -45,9 +45,9 @@ def precise_tetrahedra(
             for axis in range(3):
                 difference = two_sum(scale * vertices[pair, corner, axis], -scale * centers[pair, axis])
                 features[POINTS + corner, axis, 0], features[POINTS + corner, axis, 1] = difference
-        volume_6 = determinant(
-            _side(vertices, pair, 1, scale), _side(vertices, pair, 2, scale), _side(vertices, pair, 3, scale)
-        )
+            store_vector(features, DIRECTIONS + corner, _side(vertices, pair, corner, scale))
+        a, b = load_vector(features, DIRECTIONS + 1), load_vector(features, DIRECTIONS + 2)
+        volume_6 = determinant(a, b, load_vector(features, DIRECTIONS + 3))
         if volume_6 < 0.0:
             third = load_vector(features, POINTS + 2)
             store_vector(features, POINTS + 2, load_vector(features, POINTS + 3))
@@ -78,17 +78,19 @@ def precise_boxes(
             two_sum(scale * box_centers[pair, 1], -scale * centers[pair, 1]),
             two_sum(scale * box_centers[pair, 2], -scale * centers[pair, 2]),
         )
-        u = _half_edge(box_rotations, box_half_sizes, pair, 0, scale)
-        v = _half_edge(box_rotations, box_half_sizes, pair, 1, scale)
-        w = _half_edge(box_rotations, box_half_sizes, pair, 2, scale)
+        for axis in range(3):
+            store_vector(features, DIRECTIONS + axis, _half_edge(box_rotations, box_half_sizes, pair, axis, scale))
+        u, v = load_vector(features, DIRECTIONS), load_vector(features, DIRECTIONS + 1)
+        w = load_vector(features, DIRECTIONS + 2)
         volume_8th = determinant(u, v, w)
         if volume_8th < 0.0:
             u = precise_negative(u)
-        for corner in range(8):
-            point = precise_add(middle, u) if corner & 1 else precise_subtract(middle, u)
-            point = precise_add(point, v) if corner & 2 else precise_subtract(point, v)
-            point = precise_add(point, w) if corner & 4 else precise_subtract(point, w)
-            store_vector(features, POINTS + corner, point)
+        for upper_u in range(2):
+            on_u = precise_add(middle, u) if upper_u else precise_subtract(middle, u)
+            for upper_v in range(2):
+                on_v = precise_add(on_u, v) if upper_v else precise_subtract(on_u, v)
+                store_vector(features, POINTS + upper_u + 2 * upper_v, precise_subtract(on_v, w))
+                store_vector(features, POINTS + upper_u + 2 * upper_v + 4, precise_add(on_v, w))
         overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 
