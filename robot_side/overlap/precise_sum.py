@@ -1,11 +1,11 @@
 """The overlap of a sphere with a polyhedron in double-double, as a sum over the faces.
 
-The sum is the one of `orthoscheme`, put together otherwise so that few functions are needed. Of every face the ball
+The sum is the one of `face_angles`, put together otherwise so that few functions are needed. Of every face the ball
 reaches, the sides' parts outside of the ball are triangles with the face's foot point: their solid angles, which all
 have the weight R²/3 in the volume, are multiplied up as complex numbers over the whole solid, and their angles about
 the foot point over the face. A face that the ball does not reach adds its own solid angle. All solid angles are van
 Oosterom's and Strackee's (1983); the angle of each complex number is half of the solid angle. Only the parts inside
-of the ball are left as lengths. The result is continuous, like the orthoschemes', wherever rounding puts a crossing.
+of the ball are left as lengths. The result is continuous, like that one, wherever rounding puts a crossing.
 """
 
 import numpy as np

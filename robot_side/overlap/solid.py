@@ -28,18 +28,6 @@ def whole_sphere(radius: float) -> Overlap:
 
 
 @inlined
-def untouched(lowest: float, radius: float) -> Overlap:
-    """No face of a convex solid reaches into the sphere, which is wholly inside or wholly outside.
-
-    `lowest` is the least signed distance of the centre from the face planes (m). It is at least the radius
-    inside and at most 0 outside, so that rounding cannot take one for the other.
-    """
-    if lowest > 0.5 * radius:
-        return whole_sphere(radius)
-    return nothing()
-
-
-@inlined
 def sphere_volume(radius: float) -> float:
     """The volume of a sphere (m³)."""
     return 4.0 / 3.0 * math.pi * radius * radius * radius
