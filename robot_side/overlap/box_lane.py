@@ -36,6 +36,9 @@ EdgeInFaces = tuple[SplitEdge, float, float]
 
 FourEdges = tuple[EdgeInFaces, EdgeInFaces, EdgeInFaces, EdgeInFaces]
 
+LARGEST_REACH = 1e4
+"""Boxes are cut off so many radii from their point next to the sphere's centre."""
+
 NO_REST = (0.0, 0.0, 0.0)
 
 
@@ -63,9 +66,11 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
         sum_of_products(middle[1], rest[1], place, (q_0[1], q_1[1], q_2[1]), NO_REST),
         sum_of_products(middle[2], rest[2], place, (q_0[2], q_1[2], q_2[2]), NO_REST),
     )
-    axis_0 = _axis(q_0, normal_0, rise_0, place[0], half[0])
-    axis_1 = _axis(q_1, normal_1, rise_1, place[1], half[1])
-    axis_2 = _axis(q_2, normal_2, rise_2, place[2], half[2])
+    # What lies farther away cannot be reached, and is cut off, lest products of distances overflow.
+    most = LARGEST_REACH * radius
+    axis_0 = _axis(q_0, normal_0, rise_0, place[0], half[0], most)
+    axis_1 = _axis(q_1, normal_1, rise_1, place[1], half[1], most)
+    axis_2 = _axis(q_2, normal_2, rise_2, place[2], half[2], most)
     heights_0, heights_1 = _heights(reference, axis_0), _heights(reference, axis_1)
     heights_2 = _heights(reference, axis_2)
 
@@ -91,7 +96,7 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
     lowest = min(heights_0[0], heights_0[1], heights_1[0], heights_1[1], heights_2[0], heights_2[1])
     depth = max(lowest, 0.0)
     nearest_2 = max(dot(reference, reference), depth * depth)
-    farthest = max(luu, uuu, lul, uul, llu, ulu, lll, ull)
+    farthest = max(abs(middle[0]), abs(middle[1]), abs(middle[2]))
     extent = 2.0 * max(half[0], half[1], half[2])
     return settle(overlap, radius, volume, nearest_2, lowest, 0.0, farthest, extent)
 
@@ -109,9 +114,9 @@ def _clamp(value: float, most: float) -> float:
 
 
 @inlined
-def _axis(q: Vector, normal: Vector, rise: float, place: float, half: float) -> Axis:
+def _axis(q: Vector, normal: Vector, rise: float, place: float, half: float, most: float) -> Axis:
     length = norm(q)
-    return scale(1.0 / length, q), length, normal, rise, (half - place, -half - place)
+    return scale(1.0 / length, q), length, normal, rise, (min(half - place, most), max(-half - place, -most))
 
 
 @inlined

@@ -12,16 +12,19 @@ from robot_side.overlap.compile import compiled, inlined, input_array, input_ind
 from robot_side.overlap.double_double import two_product, two_sum
 from robot_side.overlap.double_double_vectors import (
     PreciseVector,
+    highs,
     load_vector,
     precise_add,
-    precise_negative,
-    precise_subtract,
     store_vector,
 )
 from robot_side.overlap.expansion import determinant
-from robot_side.overlap.polyhedron_features import BOX, DIRECTIONS, POINTS, ROWS, TETRAHEDRON
+from robot_side.overlap.polyhedron_features import BOX, DIRECTIONS, ENDS, POINTS, ROWS, STARTS, TETRAHEDRON
 from robot_side.overlap.precise_polyhedron import polyhedron_overlap
 from robot_side.overlap.solid import Overlap
+from robot_side.overlap.vectors import Vector, dot
+
+LARGEST_REACH = 1e3
+"""Boxes are cut off so many radii from the sphere's centre."""
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
@@ -78,33 +81,53 @@ def precise_boxes(
             two_sum(scale * box_centers[pair, 1], -scale * centers[pair, 1]),
             two_sum(scale * box_centers[pair, 2], -scale * centers[pair, 2]),
         )
+        middle_high = highs(middle)
         for axis in range(3):
-            store_vector(features, DIRECTIONS + axis, _half_edge(box_rotations, box_half_sizes, pair, axis, scale))
-        u, v = load_vector(features, DIRECTIONS), load_vector(features, DIRECTIONS + 1)
-        w = load_vector(features, DIRECTIONS + 2)
-        volume_8th = determinant(u, v, w)
-        if volume_8th < 0.0:
-            u = precise_negative(u)
+            half_size = scale * box_half_sizes[pair, axis]
+            column = (
+                box_rotations[pair, 0, axis],
+                box_rotations[pair, 1, axis],
+                box_rotations[pair, 2, axis],
+            )
+            lower, upper = _reachable(middle_high, radius, column, half_size)
+            store_vector(features, DIRECTIONS + axis, _multiple(half_size, column))
+            store_vector(features, STARTS + axis, _multiple(lower, column))
+            store_vector(features, ENDS + axis, _multiple(upper, column))
+        volume_8th = determinant(
+            load_vector(features, DIRECTIONS),
+            load_vector(features, DIRECTIONS + 1),
+            load_vector(features, DIRECTIONS + 2),
+        )
+        # Going up where the columns are left-handed is what going down is where they are right-handed.
+        low_u, high_u = (ENDS, STARTS) if volume_8th < 0.0 else (STARTS, ENDS)
         for upper_u in range(2):
-            on_u = precise_add(middle, u) if upper_u else precise_subtract(middle, u)
+            on_u = precise_add(middle, load_vector(features, high_u if upper_u else low_u))
             for upper_v in range(2):
-                on_v = precise_add(on_u, v) if upper_v else precise_subtract(on_u, v)
-                store_vector(features, POINTS + upper_u + 2 * upper_v, precise_subtract(on_v, w))
-                store_vector(features, POINTS + upper_u + 2 * upper_v + 4, precise_add(on_v, w))
+                on_v = precise_add(on_u, load_vector(features, (ENDS if upper_v else STARTS) + 1))
+                for upper_w in range(2):
+                    corner = precise_add(on_v, load_vector(features, (ENDS if upper_w else STARTS) + 2))
+                    store_vector(features, POINTS + upper_u + 2 * upper_v + 4 * upper_w, corner)
         overlap = polyhedron_overlap(features, BOX, radius, 8.0 * abs(volume_8th))
         _store(pair, overlap, 1.0 / scale, volumes, gradients, areas)
 
 
 @inlined
-def _half_edge(
-    box_rotations: FloatArray, box_half_sizes: FloatArray, pair: int, axis: int, scale: float
-) -> PreciseVector:
-    half_size = scale * box_half_sizes[pair, axis]
-    return (
-        two_product(box_rotations[pair, 0, axis], half_size),
-        two_product(box_rotations[pair, 1, axis], half_size),
-        two_product(box_rotations[pair, 2, axis], half_size),
-    )
+def _reachable(middle: Vector, radius: float, column: Vector, half_size: float) -> tuple[float, float]:
+    """The range (m) of a box along `column` that the sphere may reach: what lies farther away is cut off.
+
+    A box much larger than the sphere so costs no digits.
+    """
+    place = -dot(middle, column)
+    reach = LARGEST_REACH * radius + 1e-5 * (abs(middle[0]) + abs(middle[1]) + abs(middle[2]))
+    lower, upper = max(-half_size, place - reach), min(half_size, place + reach)
+    if lower < upper:
+        return lower, upper
+    return -half_size, half_size
+
+
+@inlined
+def _multiple(factor: float, column: Vector) -> PreciseVector:
+    return two_product(factor, column[0]), two_product(factor, column[1]), two_product(factor, column[2])
 
 
 @inlined
