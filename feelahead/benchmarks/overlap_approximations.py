@@ -45,9 +45,7 @@ def satellite_points() -> FloatArray:
     axes = [sign * row for row in np.eye(3) for sign in (1.0, -1.0)]
     diagonals = [np.array(signs) / math.sqrt(3.0) for signs in product((1.0, -1.0), repeat=3)]
     inner, middle = (1.0 / SATELLITES) ** (1.0 / 3.0), (15.0 / SATELLITES) ** (1.0 / 3.0)
-    shells = [
-        0.75 * (outer**4 - start**4) / (outer**3 - start**3) for start, outer in ((inner, middle), (middle, 1.0))
-    ]
+    shells = [0.75 * (outer**4 - start**4) / (outer**3 - start**3) for start, outer in ((inner, middle), (middle, 1.0))]
     return np.array([np.zeros(3), *(radius * point for radius in shells for point in (*axes, *diagonals))])
 
 

@@ -35,6 +35,29 @@ FAR = 2.0**20
 """Offset of the whole pair from the origin, about 1e6 m."""
 
 
+_FAMILIES = {
+    "depth": "tiny overlap",
+    "offset": "offset 1e6",
+    "without volume": "without volume",
+    "flat": "flat or needle",
+    "needle": "flat or needle",
+    "R/L 1e-": "R/L below 1",
+    "ratio 1e-": "R/L below 1",
+    "R/L": "R/L above 1",
+    "ratio": "R/L above 1",
+    "tangent": "tangent",
+    "centre on": "centre on, or corners on",
+    "corners on": "centre on, or corners on",
+    "far": "trivial",
+    "swallowed": "trivial",
+}
+
+
+def family(name: str) -> str:
+    """The group of classes that a class, by its name in `frozen_classes`, is shown with."""
+    return next((shown for part, shown in _FAMILIES.items() if part in name), "random")
+
+
 def frozen_classes(count: int, seed: int = 0) -> dict[str, Pairs]:
     """`count` pairs of each class, by the name `solid, class, general or grid`."""
     return {
@@ -51,7 +74,7 @@ def _tetrahedron(centers: FloatArray, sizes: FloatArray, vertices: FloatArray) -
     return Pairs("tetrahedron", centers, sizes, (vertices,))
 
 
-def _touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Maker:
+def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Maker:
     """Spheres that reach `depth` radii into a face, edge or vertex; `swell` scales their radii.
 
     A depth of 1 puts the centre on the feature, 2 the whole sphere on its inner side.
@@ -75,15 +98,13 @@ def _large_or_small(solid: str, ratio: float) -> Maker:
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         feature = str(rng.choice(list(FEATURES)))
         depth = min(1.0, 1.0 / ratio) * (0.5 if grid else float(rng.uniform(0.1, 1.0)))
-        return _touching(solid, feature, depth, swell=ratio)(rng, count, grid)
+        return touching(solid, feature, depth, swell=ratio)(rng, count, grid)
 
     return make
 
 
 def _random_tetrahedra(rng: Rng, count: int, grid: bool) -> Pairs:
-    return _tetrahedron(
-        points(rng, count, grid=grid), radii(rng, count, grid=grid), points(rng, count, 4, grid=grid)
-    )
+    return _tetrahedron(points(rng, count, grid=grid), radii(rng, count, grid=grid), points(rng, count, 4, grid=grid))
 
 
 def _inverted(rng: Rng, count: int, grid: bool) -> Pairs:
@@ -207,19 +228,19 @@ def _spheres(depth: float | None, ratio: float = 1.0) -> Maker:
 def _features(solid: str) -> dict[str, Maker]:
     """What tetrahedra and boxes have in common."""
     return {
-        **{f"centre on {feature}": _touching(solid, feature, 1.0) for feature in FEATURES},
-        **{f"tangent {feature}": _touching(solid, feature, 0.0) for feature in FEATURES},
-        "tangent inside": _touching(solid, "face", 2.0, swell=0.25),
+        **{f"centre on {feature}": touching(solid, feature, 1.0) for feature in FEATURES},
+        **{f"tangent {feature}": touching(solid, feature, 0.0) for feature in FEATURES},
+        "tangent inside": touching(solid, "face", 2.0, swell=0.25),
         **{
-            f"{feature} depth {name}": _touching(solid, feature, depth)
+            f"{feature} depth {name}": touching(solid, feature, depth)
             for feature in FEATURES
             for name, depth in DEPTHS.items()
         },
         **{f"R/L {name}": _large_or_small(solid, ratio) for name, ratio in RATIOS.items()},
-        "offset 1e6, tangent": _shifted(_touching(solid, "edge", 0.0)),
-        "far away": _touching(solid, "face", -4.0),
-        "solid swallowed": _touching(solid, "vertex", 1.0, swell=16.0),
-        "sphere swallowed": _touching(solid, "face", 4.0, swell=2.0**-6),
+        "offset 1e6, tangent": _shifted(touching(solid, "edge", 0.0)),
+        "far away": touching(solid, "face", -4.0),
+        "solid swallowed": touching(solid, "vertex", 1.0, swell=16.0),
+        "sphere swallowed": touching(solid, "face", 4.0, swell=2.0**-6),
     }
 
 

@@ -41,9 +41,7 @@ def exact_contact(pairs: Pairs, row: int) -> bool:
         return beyond < 0 or beyond**2 < radius**2 * sum(n * n for n in normal)
     if pairs.solid == "sphere":
         other = Fraction(float(pairs.parameters[1][row]))
-        apart_2 = sum(
-            (Fraction(float(a)) - b) ** 2 for a, b in zip(pairs.parameters[0][row], center, strict=True)
-        )
+        apart_2 = sum((Fraction(float(a)) - b) ** 2 for a, b in zip(pairs.parameters[0][row], center, strict=True))
         return other > 0 and apart_2 < (radius + other) ** 2
     corners = exact_corners(pairs, row)
     denominator = lcm(radius.denominator, *(x.denominator for point in (center, *corners) for x in point))
@@ -56,14 +54,9 @@ def exact_corners(pairs: Pairs, row: int) -> list[list[Fraction]]:
     """The corners of a tetrahedron, right-handed or not, or those of a box, without rounding."""
     if pairs.solid == "tetrahedron":
         return [[Fraction(float(x)) for x in vertex] for vertex in pairs.parameters[0][row]]
-    place, turn, half_sizes = (
-        [Fraction(float(x)) for x in values[row].ravel()] for values in pairs.parameters
-    )
+    place, turn, half_sizes = ([Fraction(float(x)) for x in values[row].ravel()] for values in pairs.parameters)
     return [
-        [
-            place[axis] + sum(turn[3 * axis + k] * half_sizes[k] * int(signs[k]) for k in range(3))
-            for axis in range(3)
-        ]
+        [place[axis] + sum(turn[3 * axis + k] * half_sizes[k] * int(signs[k]) for k in range(3)) for axis in range(3)]
         for signs in BOX_SIGNS
     ]
 
@@ -138,7 +131,7 @@ def _decided_by_doubles(pairs: Pairs) -> tuple[BoolArray, BoolArray]:
     sizes = np.linalg.norm(corners - corners[:, :1], axis=2).max(axis=1)
     # A solid nearly without volume is left to whole numbers.
     solid = pairs.solid_volumes > 1e-6 * sizes**3
-    nearest = _nearest_points(corners, TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else _BOX_TRIANGLES)
+    nearest = nearest_points(corners, triangles_of(pairs))
     most = np.linalg.norm(nearest, axis=1)
     towards = nearest / np.where(most == 0.0, 1.0, most)[:, None]
     least = np.einsum("nvi,ni->nv", corners, towards).min(axis=1)
@@ -148,12 +141,14 @@ def _decided_by_doubles(pairs: Pairs) -> tuple[BoolArray, BoolArray]:
     return touching | apart, touching
 
 
-_BOX_TRIANGLES = tuple(
-    (face[0], face[k], face[k + 1]) for face in BOX_QUADRILATERALS for k in (1, 2)
-)
+def triangles_of(pairs: Pairs) -> tuple[tuple[int, ...], ...]:
+    """The triangles, as corner numbers, that make the surface of the tetrahedra or boxes."""
+    if pairs.solid == "tetrahedron":
+        return TETRAHEDRON_TRIANGLES
+    return tuple((face[0], face[k], face[k + 1]) for face in BOX_QUADRILATERALS for k in (1, 2))
 
 
-def _nearest_points(corners: FloatArray, triangles: tuple[tuple[int, ...], ...]) -> FloatArray:
+def nearest_points(corners: FloatArray, triangles: tuple[tuple[int, ...], ...]) -> FloatArray:
     """(p, 3): the points of the triangles nearest to the origin, to rounding."""
     best = corners[:, 0].copy()
     for triangle in triangles:

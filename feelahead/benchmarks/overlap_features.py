@@ -131,7 +131,7 @@ def boxes(rng: Rng, count: int, feature: str, *, grid: bool) -> tuple[tuple[Floa
     place[:, fixed] = (sides * half_sizes)[:, fixed]
     to_world = np.einsum("nij,nj->ni", turn, place)
     feature_points = Feature(centers + to_world, np.einsum("nij,nj->ni", turn, sides * steps), lengths)
-    return (centers, turn, half_sizes), feature_points
+    return (centers, turn, np.asarray(half_sizes, float)), feature_points
 
 
 def _whole_steps(rng: Rng, count: int, feature: str) -> tuple[FloatArray, FloatArray]:

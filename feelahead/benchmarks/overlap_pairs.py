@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 
 Solid = Literal["tetrahedron", "box", "half-space", "sphere"]
 
@@ -34,12 +34,28 @@ class Pairs:
     radii: FloatArray
     parameters: tuple[FloatArray, ...]
 
+    def __post_init__(self) -> None:
+        # The kernels take contiguous arrays of float64 only.
+        object.__setattr__(self, "centers", np.ascontiguousarray(self.centers, float))
+        object.__setattr__(self, "radii", np.ascontiguousarray(self.radii, float))
+        object.__setattr__(self, "parameters", tuple(np.ascontiguousarray(p, float) for p in self.parameters))
+
     def __len__(self) -> int:
         return len(self.radii)
 
-    def __getitem__(self, rows: slice | list[int] | FloatArray) -> "Pairs":
+    def __getitem__(self, rows: slice | IntArray) -> "Pairs":
         """The pairs of these rows."""
         return Pairs(self.solid, self.centers[rows], self.radii[rows], tuple(p[rows] for p in self.parameters))
+
+    @classmethod
+    def joined(cls, parts: "list[Pairs]") -> "Pairs":
+        """The pairs of several `Pairs` of one kind of solid."""
+        return cls(
+            parts[0].solid,
+            np.concatenate([part.centers for part in parts]),
+            np.concatenate([part.radii for part in parts]),
+            tuple(np.concatenate(arrays) for arrays in zip(*(part.parameters for part in parts), strict=True)),
+        )
 
     @property
     def arguments(self) -> tuple[FloatArray, ...]:

@@ -1,0 +1,127 @@
+"""Run times on the same pairs for everything exact: ours, and the published package."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray
+from common.clock import Clock
+from feelahead.benchmarks import overlap_ours
+from feelahead.benchmarks.overlap_classes import MAKERS
+from feelahead.benchmarks.overlap_pairs import Pairs, Solid
+from feelahead.benchmarks.overlap_peers import HeaderPeer, PythonPeer
+from feelahead.benchmarks.overlap_report import Report, Table, short
+from feelahead.benchmarks.overlap_timing import available_cores, nanoseconds_each, one_core
+
+TIMED_SOLIDS: tuple[Solid, ...] = ("tetrahedron", "box")
+_CALLS = 500
+"""Pairs timed a call each."""
+
+TRIVIAL = {"apart": "far away", "solid within sphere": "solid swallowed", "sphere within solid": "sphere swallowed"}
+"""Trivial pairs, with the class that has many of them."""
+
+
+def partial_pairs(solid: Solid, count: int, seed: int = 1) -> Pairs:
+    """`count` random pairs whose overlap is neither nothing nor the whole sphere or solid."""
+
+    def overlapping(pairs: Pairs, volumes: FloatArray) -> BoolArray:
+        most = np.minimum(pairs.sphere_volumes, pairs.solid_volumes)
+        return np.asarray((volumes > 1e-6 * most) & (volumes < (1.0 - 1e-6) * most))
+
+    return _chosen(solid, "random", count, seed, overlapping)
+
+
+def trivial_pairs(solid: Solid, name: str, count: int, seed: int = 2) -> Pairs:
+    """`count` pairs of a kind of `TRIVIAL`."""
+
+    def trivial(pairs: Pairs, volumes: FloatArray) -> BoolArray:
+        if name == "apart":
+            return np.asarray(volumes == 0.0)
+        whole = pairs.solid_volumes if name == "solid within sphere" else pairs.sphere_volumes
+        return np.asarray((np.abs(volumes - whole) <= 1e-12 * whole) & (whole > 0.0))
+
+    return _chosen(solid, TRIVIAL[name], count, seed, trivial)
+
+
+def _chosen(solid: Solid, kind: str, count: int, seed: int, valid: Callable[[Pairs, FloatArray], BoolArray]) -> Pairs:
+    rng = np.random.default_rng(seed)
+    found: list[Pairs] = []
+    while sum(len(pairs) for pairs in found) < count:
+        pairs = MAKERS[solid][kind](rng, 2 * count, False)
+        found.append(pairs[np.flatnonzero(valid(pairs, overlap_ours.kernel_volumes(pairs)))])
+    return Pairs.joined(found)[slice(0, count)]
+
+
+def measure_speed(
+    report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, count: int, repeats: int, clock: Clock
+) -> None:
+    """Add ns a pair, for partial and trivial pairs, to the report."""
+    threads = available_cores()
+    for solid in TIMED_SOLIDS:
+        pairs = partial_pairs(solid, count)
+        with one_core():
+            for method, run, rows in _ours(pairs):
+                each_ns = nanoseconds_each(run, rows, repeats, clock)
+                report.add("speed", method, solid, "partial", {"time": (each_ns, "ns/pair")})
+            if not header_peer.missing:
+                timing = header_peer.timing(pairs, repeats)
+                report.add("speed", "overlap, C++", solid, "partial", {"time": (timing.overlap_ns, "ns/pair")})
+                built_ns = timing.overlap_ns + timing.building_ns
+                report.add("speed", "overlap, C++, with building", solid, "partial", {"time": (built_ns, "ns/pair")})
+            if not python_peer.missing:
+                timing = python_peer.timing(pairs, max(1, repeats // 4), clock)
+                report.add("speed", "overlap, Python", solid, "partial", {"time": (timing.overlap_ns, "ns/pair")})
+        with ThreadPoolExecutor(threads) as pool:
+            run = partial(overlap_ours.threaded_volumes, pairs, pool, threads)
+            each_ns = nanoseconds_each(run, len(pairs), repeats, clock)
+        report.add("speed", f"ours, {threads} threads", solid, "partial", {"time": (each_ns, "ns/pair")})
+        _measure_trivial(report, header_peer, solid, count, repeats, clock)
+    report.tables.append(_table(report, python_peer, header_peer, count))
+
+
+def _ours(pairs: Pairs) -> list[tuple[str, Callable[[], object], int]]:
+    few = pairs[slice(0, min(_CALLS, len(pairs)))]
+    return [
+        ("ours, a call each", partial(overlap_ours.call_by_call, few), len(few)),
+        ("ours, checked", partial(overlap_ours.checked_volumes, pairs), len(pairs)),
+        ("ours, checked, gradient", partial(overlap_ours.checked_overlaps, pairs), len(pairs)),
+        ("ours, kernel", partial(overlap_ours.kernel_volumes, pairs), len(pairs)),
+        ("ours, kernel, gradient", partial(overlap_ours.kernel_overlaps, pairs), len(pairs)),
+    ]
+
+
+def _measure_trivial(
+    report: Report, header_peer: HeaderPeer, solid: Solid, count: int, repeats: int, clock: Clock
+) -> None:
+    for name in TRIVIAL:
+        pairs = trivial_pairs(solid, name, count)
+        run = partial(overlap_ours.kernel_volumes, pairs)
+        with one_core():
+            each_ns = nanoseconds_each(run, len(pairs), repeats, clock)
+            report.add("speed", "ours, kernel", solid, name, {"time": (each_ns, "ns/pair")})
+            if not header_peer.missing:
+                timing = header_peer.timing(pairs, repeats)
+                report.add("speed", "overlap, C++", solid, name, {"time": (timing.overlap_ns, "ns/pair")})
+
+
+def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, count: int) -> Table:
+    timed = [figure for figure in report.figures if figure.section == "speed"]
+    columns = [(solid, case) for solid in TIMED_SOLIDS for case in ("partial", *TRIVIAL)]
+    rows = []
+    for method in dict.fromkeys(figure.method for figure in timed):
+        cells = [report.value("speed", method, solid, case, "time") for solid, case in columns]
+        rows.append((method, *("" if cell is None else short(cell) for cell in cells)))
+    for method, missing in (("overlap, Python", python_peer.missing), ("overlap, C++", header_peer.missing)):
+        if missing:
+            rows.append((f"{method}: {missing}", *("" for _ in columns)))
+    headings = ("method", *(f"{'tet' if solid == 'tetrahedron' else solid}, {case}" for solid, case in columns))
+    return Table(
+        "Run time, ns a pair",
+        headings,
+        rows,
+        f"Medians on one core, but for the threads, of {count} pairs that are the same for every method. Ours: the "
+        "kernels are what a tick calls, the checked functions validate and broadcast their arguments as well. "
+        "The package: prebuilt objects, building them apart.",
+    )
