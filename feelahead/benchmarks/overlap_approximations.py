@@ -20,18 +20,21 @@ _CHUNK = 1 << 16
 
 
 def face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:
-    """Outward normals (p, f, 3) and heights (p, f) of the face planes above the sphere's centre, in m."""
+    """Outward normals (p, f, 3) and heights (p, f) of the face planes above the sphere's centre, in m.
+
+    Nothing is below the planes of a solid without volume: their heights are -inf.
+    """
     faces = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
     corners = pairs.corners - pairs.centers[:, None]
     rings = corners[:, np.array([face[:3] for face in faces])]
     normals = np.cross(rings[:, :, 1] - rings[:, :, 0], rings[:, :, 2] - rings[:, :, 0])
     lengths = np.linalg.norm(normals, axis=2, keepdims=True)
     normals = normals / np.where(lengths == 0.0, 1.0, lengths)
+    edges = corners[:, 1:] - corners[:, :1] if pairs.solid == "tetrahedron" else pairs.parameters[1]
+    handedness = np.sign(np.linalg.det(edges))
+    normals = normals * handedness[:, None, None]
     heights = np.einsum("nfi,nfi->nf", normals, rings[:, :, 0])
-    # Whatever the handedness, the solid's middle is inside.
-    inward = np.einsum("nfi,ni->nf", normals, corners.mean(axis=1)) > heights
-    normals[inward] *= -1.0
-    heights[inward] *= -1.0
+    heights[(handedness == 0.0) | (pairs.solid_volumes == 0.0)] = -np.inf
     return normals, heights
 
 

@@ -38,6 +38,7 @@ FAR = 2.0**20
 _FAMILIES = {
     "depth": "tiny overlap",
     "offset": "offset 1e6",
+    "inverted": "inverted",
     "without volume": "without volume",
     "flat": "flat or needle",
     "needle": "flat or needle",
@@ -48,8 +49,8 @@ _FAMILIES = {
     "tangent": "tangent",
     "centre on": "centre on, or corners on",
     "corners on": "centre on, or corners on",
-    "far": "trivial",
-    "swallowed": "trivial",
+    "far": "far or swallowed",
+    "swallowed": "far or swallowed",
 }
 
 

@@ -10,8 +10,8 @@ TRADEOFF = "overlap_time_error.png"
 MESH = "overlap_mesh_cost.png"
 _SMALLEST = 1e-18
 """Errors below are drawn here: the axis is logarithmic."""
-_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
-_GROUPS = ("ours", "overlap, Python", "overlap, C++", "29", "Monte Carlo", "voxels", "SciPy")
+_COLOURS = ("tab:blue", "tab:cyan", "tab:green", "tab:orange", "tab:red", "tab:purple", "tab:brown", "tab:pink")
+_GROUPS = ("ours, batch", "ours, a call", "overlap, C++", "overlap, Python", "29", "Monte Carlo", "voxels", "SciPy")
 
 
 def draw(report: Report, folder: Path) -> list[Path]:
@@ -32,13 +32,15 @@ def _draw_tradeoff(report: Report, path: Path) -> None:
         if figure.section == "tradeoff" and figure.quantity == "time":
             error = report.value("tradeoff", figure.method, figure.solid, figure.case, "worst error")
             points.setdefault(figure.method, []).append((figure.value, max(error or 0.0, _SMALLEST), figure.solid))
-    shown, axes = plt.subplots(figsize=(7.5, 4.6), dpi=110)
-    for number, (group, colour) in enumerate(zip(_GROUPS, _COLOURS, strict=False)):
+    labelled: set[str] = set()
+    shown, axes = plt.subplots(figsize=(8.5, 4.6), dpi=110)
+    for number, (group, colour) in enumerate(zip(_GROUPS, _COLOURS, strict=True)):
         members = [point for name, found in points.items() if name.startswith(group) for point in found]
         for solid, marker in (("tetrahedron", "^"), ("box", "s")):
             chosen = [point for point in members if point[2] == solid]
             if chosen:
-                label = group.replace("29", "29 points") if marker == "^" else None
+                label = group.replace("29", "29 points") if group not in labelled else None
+                labelled.add(group)
                 times, errors, _ = zip(*chosen, strict=True)
                 axes.scatter(times, errors, 16, colour, marker=marker, label=label, zorder=3 + number)
     axes.set(xscale="log", yscale="log", xlabel="time, ns a pair", ylabel="worst error / sphere volume")
@@ -46,7 +48,7 @@ def _draw_tradeoff(report: Report, path: Path) -> None:
     axes.grid(alpha=0.3)
     axes.set_title("One point for each method and family of pairs (▲ tetrahedra, ■ boxes)", fontsize=9)
     if points:
-        axes.legend(fontsize=8, loc="center right")
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     shown.tight_layout()
     shown.savefig(path)
     plt.close(shown)

@@ -130,8 +130,10 @@ class HeaderPeer:
                 check=False,
             )
         except subprocess.TimeoutExpired:
+            self.close()
             return f"compiling took more than {_COMPILE_TIMEOUT_S:g} s"
         if done.returncode != 0:
+            self.close()
             first = next((line for line in done.stderr.splitlines() if "error" in line), "unknown error")
             return f"does not compile: {first[:200]}"
         return ""

@@ -87,6 +87,17 @@ class Report:
         return Table("Goals", ("shows", "measured", "goal", "verdict", ""), rows)
 
 
+def show_goals(console: Console, goals: Sequence[Goal]) -> None:
+    """Print a line for each goal."""
+    for goal in goals:
+        colour = {"met": "green", "missed": "red"}.get(goal.verdict, "yellow")
+        detail = f" ({goal.detail})" if goal.detail else ""
+        line = (
+            f"{goal.verdict:<13}{goal.claim}: {_or_dash(goal.value)}, {goal.compare} {short(goal.limit)} asked{detail}"
+        )
+        console.print(line, style=colour, highlight=False, markup=False)
+
+
 def short(value: float) -> str:
     """Three digits, as people read them: 0.00123 as 1.23e-03, 1234.5 as 1234."""
     if value == 0.0 or not math.isfinite(value):

@@ -1,5 +1,7 @@
 """Run times on the same pairs for everything exact: ours, and the published package."""
 
+import contextlib
+import statistics
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -16,6 +18,7 @@ from feelahead.benchmarks.overlap_report import Report, Table, short
 from feelahead.benchmarks.overlap_timing import available_cores, nanoseconds_each, one_core
 
 TIMED_SOLIDS: tuple[Solid, ...] = ("tetrahedron", "box")
+_ROUNDS = 3
 _CALLS = 500
 """Pairs timed a call each."""
 
@@ -57,28 +60,65 @@ def _chosen(solid: Solid, kind: str, count: int, seed: int, valid: Callable[[Pai
 def measure_speed(
     report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, count: int, repeats: int, clock: Clock
 ) -> None:
-    """Add ns a pair, for partial and trivial pairs, to the report."""
-    threads = available_cores()
+    """Add ns a pair, for partial and trivial pairs, to the report.
+
+    The methods take turns for a few rounds, so that whatever else the machine does meets all of them alike.
+    """
     for solid in TIMED_SOLIDS:
         pairs = partial_pairs(solid, count)
-        with one_core():
-            for method, run, rows in _ours(pairs):
-                each_ns = nanoseconds_each(run, rows, repeats, clock)
-                report.add("speed", method, solid, "partial", {"time": (each_ns, "ns/pair")})
+        _measure_in_turns(report, _timed(pairs, python_peer, header_peer, repeats, clock), solid, "partial")
+        for name in TRIVIAL:
+            pairs = trivial_pairs(solid, name, count)
+            run = partial(overlap_ours.kernel_volumes, pairs)
+            timed: dict[str, Callable[[], float]] = {
+                "ours, kernel": partial(nanoseconds_each, run, count, repeats, clock)
+            }
             if not header_peer.missing:
-                timing = header_peer.timing(pairs, repeats)
-                report.add("speed", "overlap, C++", solid, "partial", {"time": (timing.overlap_ns, "ns/pair")})
-                built_ns = timing.overlap_ns + timing.building_ns
-                report.add("speed", "overlap, C++, with building", solid, "partial", {"time": (built_ns, "ns/pair")})
-            if not python_peer.missing:
-                timing = python_peer.timing(pairs, max(1, repeats // 4), clock)
-                report.add("speed", "overlap, Python", solid, "partial", {"time": (timing.overlap_ns, "ns/pair")})
-        with ThreadPoolExecutor(threads) as pool:
-            run = partial(overlap_ours.threaded_volumes, pairs, pool, threads)
-            each_ns = nanoseconds_each(run, len(pairs), repeats, clock)
-        report.add("speed", f"ours, {threads} threads", solid, "partial", {"time": (each_ns, "ns/pair")})
-        _measure_trivial(report, header_peer, solid, count, repeats, clock)
+                timed["overlap, C++"] = partial(_overlap_ns, header_peer, pairs, repeats)
+            _measure_in_turns(report, timed, solid, name)
     report.tables.append(_table(report, python_peer, header_peer, count))
+
+
+def _measure_in_turns(report: Report, timed: dict[str, Callable[[], float]], solid: Solid, case: str) -> None:
+    times: dict[str, list[float]] = {method: [] for method in timed}
+    for _ in range(_ROUNDS):
+        for method, time_ns in timed.items():
+            with contextlib.nullcontext() if "threads" in method else one_core():
+                times[method].append(time_ns())
+    for method, each_ns in times.items():
+        report.add("speed", method, solid, case, {"time": (statistics.median(each_ns), "ns/pair")})
+
+
+def _timed(
+    pairs: Pairs, python_peer: PythonPeer, header_peer: HeaderPeer, repeats: int, clock: Clock
+) -> dict[str, Callable[[], float]]:
+    """Each method with the function that measures its ns a pair."""
+    timed: dict[str, Callable[[], float]] = {
+        method: partial(nanoseconds_each, run, rows, repeats, clock) for method, run, rows in _ours(pairs)
+    }
+    threads = available_cores()
+    timed[f"ours, kernel, {threads} threads"] = partial(_threaded_ns, pairs, threads, repeats, clock)
+    if not header_peer.missing:
+        timed["overlap, C++"] = partial(_overlap_ns, header_peer, pairs, repeats)
+        timed["overlap, C++, with building"] = partial(_building_ns, header_peer, pairs, repeats)
+    if not python_peer.missing:
+        timed["overlap, Python"] = lambda: python_peer.timing(pairs, max(1, repeats // 4), clock).overlap_ns
+    return timed
+
+
+def _threaded_ns(pairs: Pairs, threads: int, repeats: int, clock: Clock) -> float:
+    with ThreadPoolExecutor(threads) as pool:
+        run = partial(overlap_ours.threaded_volumes, pairs, pool, threads)
+        return nanoseconds_each(run, len(pairs), repeats, clock)
+
+
+def _overlap_ns(header_peer: HeaderPeer, pairs: Pairs, repeats: int) -> float:
+    return header_peer.timing(pairs, repeats).overlap_ns
+
+
+def _building_ns(header_peer: HeaderPeer, pairs: Pairs, repeats: int) -> float:
+    timing = header_peer.timing(pairs, repeats)
+    return timing.overlap_ns + timing.building_ns
 
 
 def _ours(pairs: Pairs) -> list[tuple[str, Callable[[], object], int]]:
@@ -92,20 +132,6 @@ def _ours(pairs: Pairs) -> list[tuple[str, Callable[[], object], int]]:
     ]
 
 
-def _measure_trivial(
-    report: Report, header_peer: HeaderPeer, solid: Solid, count: int, repeats: int, clock: Clock
-) -> None:
-    for name in TRIVIAL:
-        pairs = trivial_pairs(solid, name, count)
-        run = partial(overlap_ours.kernel_volumes, pairs)
-        with one_core():
-            each_ns = nanoseconds_each(run, len(pairs), repeats, clock)
-            report.add("speed", "ours, kernel", solid, name, {"time": (each_ns, "ns/pair")})
-            if not header_peer.missing:
-                timing = header_peer.timing(pairs, repeats)
-                report.add("speed", "overlap, C++", solid, name, {"time": (timing.overlap_ns, "ns/pair")})
-
-
 def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, count: int) -> Table:
     timed = [figure for figure in report.figures if figure.section == "speed"]
     columns = [(solid, case) for solid in TIMED_SOLIDS for case in ("partial", *TRIVIAL)]
@@ -113,9 +139,8 @@ def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, cou
     for method in dict.fromkeys(figure.method for figure in timed):
         cells = [report.value("speed", method, solid, case, "time") for solid, case in columns]
         rows.append((method, *("" if cell is None else short(cell) for cell in cells)))
-    for method, missing in (("overlap, Python", python_peer.missing), ("overlap, C++", header_peer.missing)):
-        if missing:
-            rows.append((f"{method}: {missing}", *("" for _ in columns)))
+    peers = (("overlap from Python", python_peer.missing), ("overlap in C++", header_peer.missing))
+    absent = "".join(f" Not measured: {peer}: {missing}." for peer, missing in peers if missing)
     headings = ("method", *(f"{'tet' if solid == 'tetrahedron' else solid}, {case}" for solid, case in columns))
     return Table(
         "Run time, ns a pair",
@@ -123,5 +148,5 @@ def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, cou
         rows,
         f"Medians on one core, but for the threads, of {count} pairs that are the same for every method. Ours: the "
         "kernels are what a tick calls, the checked functions validate and broadcast their arguments as well. "
-        "The package: prebuilt objects, building them apart.",
+        "The package: prebuilt objects, building them apart." + absent,
     )

@@ -90,6 +90,9 @@ def _direction_errors(pairs: Pairs) -> list[tuple[int, float]]:
     for row in range(len(pairs)):
         truth = true_overlap(pairs, row)
         share = float(truth.volume) / float(pairs.sphere_volumes[row])
-        if SMALLEST_SHARE <= share <= _LARGEST_SHARE:
+        # A solid that is swallowed whole has no direction; a sphere that just reaches in has |∇V| >> V/R.
+        slope = math.hypot(*(float(component) for component in truth.gradient))
+        reaching_in = slope * float(pairs.radii[row]) > float(truth.volume)
+        if SMALLEST_SHARE <= share <= _LARGEST_SHARE and reaching_in:
             found.append((math.floor(math.log10(share)), truth.direction_error(gradients[row])))
     return found
