@@ -1,6 +1,7 @@
 """`feelahead bench overlap`, run at a small size through the command, and what it compares with."""
 
 import csv
+import importlib.util
 import math
 import shutil
 import sys
@@ -8,17 +9,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
+from rich.progress import Progress
 
 import feelahead.main
 from common.errors import ConfigurationError
 from feelahead.benchmarks import overlap_peers
+from feelahead.benchmarks.overlap_accuracy import draw_samples, measure_accuracy
 from feelahead.benchmarks.overlap_approximations import monte_carlo, quadrature, satellite_points, satellites, voxels
 from feelahead.benchmarks.overlap_classes import MAKERS, frozen_classes
+from feelahead.benchmarks.overlap_goals import judge
 from feelahead.benchmarks.overlap_ours import kernel_volumes
 from feelahead.benchmarks.overlap_pairs import Pairs, Solid
-from feelahead.benchmarks.overlap_peers import HeaderPeer, package_corners
+from feelahead.benchmarks.overlap_peers import HeaderPeer, PythonPeer, package_corners
 from feelahead.benchmarks.overlap_report import COLUMNS, Goal, Report, short
 from feelahead.benchmarks.overlap_speed import TRIVIAL, partial_pairs, trivial_pairs
+from feelahead.benchmarks.overlap_stress import count_failures
+from feelahead.benchmarks.overlap_tiny import measure_tiny
 
 SMALL = ("--quick", "--adversarial", "196", "--truths", "2", "--timed", "100")
 
@@ -99,6 +106,24 @@ def test_a_missing_package_is_named_with_what_brings_it(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "mpmath", None)
     with pytest.raises(ConfigurationError, match=r"mpmath.*pip install 'feelahead\[robot,bench\]'"):
         feelahead.main.command(["bench", "overlap"])
+
+
+def test_everything_else_runs_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    peer, report, progress = PythonPeer(), Report(), Progress(console=Console(quiet=True))
+    assert peer.missing == "not installed: pip install 'feelahead[bench]'"
+    classes = {name: pairs for name, pairs in frozen_classes(2).items() if "depth" in name or "random" in name}
+    samples = draw_samples(classes, progress)
+    measure_accuracy(report, samples, peer)
+    measure_tiny(report, samples, peer)
+    ours, theirs = count_failures(report, classes, samples, peer, progress)
+    assert ours.pairs == 2 * len(classes)
+    assert theirs is None
+    judge(report)
+    assert {figure.method for figure in report.figures} == {"ours"}
+    verdicts = {goal.claim: goal.verdict for goal in report.goals}
+    assert verdicts["exceptions"] == "met"
+    assert verdicts["times faster than the C++ package, box, one core"] == "not measured"
 
 
 def test_help_lists_the_benchmarks_and_teaches(capsys: pytest.CaptureFixture[str]) -> None:

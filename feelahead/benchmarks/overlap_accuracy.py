@@ -79,17 +79,19 @@ def measure_accuracy(report: Report, samples: list[Sample], python_peer: PythonP
             "Accuracy, shares of the sphere's volume",
             _COLUMNS,
             table,
-            "Errors of the volume against the truth for the doubles as they are. Relative: the worst error over the "
-            "true volume, where that is at least 1e-12 of the sphere's. Over floor: the worst relative error over "
-            "2u·scale/depth, what inputs that are rounded to doubles (u = 2^-53) make a cap of this depth uncertain "
-            "by. One face, more: pairs whose sphere cuts one face, or more; precise: pairs that took the compensated "
-            "forms. Tetrahedra are turned right-handed for the package, except in the class `inverted`.",
+            "Errors of the volume against the truth for the doubles as they are; gradient, area: the worst errors"
+            " of dV/dcentre and dV/dradius, as shares of the great circle and the sphere's surface. Relative: the"
+            " worst error over the true volume, where that is at least 1e-12 of the sphere's. Over floor: the "
+            "worst relative error over 2u·scale/depth, what inputs that are rounded to doubles (u = 2^-53) make a"
+            " cap of this depth uncertain by. One face, more: pairs whose sphere cuts one face, or more; precise:"
+            " pairs that took the compensated forms. Tetrahedra are turned right-handed for the package, except "
+            "in the class `inverted`.",
         )
     )
 
 
 _COLUMNS = (
-    *("class", "pairs", "worst", "p99", "median", "relative", "over floor"),
+    *("class", "pairs", "worst", "p99", "median", "gradient", "area", "relative", "over floor"),
     *("trivial %", "one face %", "more %", "precise %", "overlap 0.2.0, worst"),
 )
 
@@ -97,6 +99,8 @@ _COLUMNS = (
 @dataclass(frozen=True)
 class _ClassErrors:
     errors: FloatArray
+    gradient_errors: FloatArray
+    area_errors: FloatArray
     relative: FloatArray
     over_floor: FloatArray
     trivial: BoolArray
@@ -111,6 +115,8 @@ class _ClassErrors:
             "worst error": (float(self.errors.max()), "of the sphere"),
             "p99 error": (float(np.quantile(self.errors, 0.99)), "of the sphere"),
             "median error": (float(np.median(self.errors)), "of the sphere"),
+            "worst gradient error": (float(self.gradient_errors.max()), "of the great circle"),
+            "worst area error": (float(self.area_errors.max()), "of the sphere's surface"),
             "worst relative error": (_most(self.relative), ""),
             "worst error over floor": (_most(self.over_floor), ""),
             "trivial": (float(self.trivial.mean()), "share"),
@@ -126,7 +132,8 @@ class _ClassErrors:
 
 def _class_errors(sample: Sample, python_peer: PythonPeer) -> _ClassErrors:
     pairs = sample.pairs
-    volumes = kernel_overlaps(pairs)[0]
+    volumes, gradients, areas = kernel_overlaps(pairs)
+    circles = np.pi * pairs.radii**2
     relative = sample.relative_errors(volumes)
     shares = sample.true_volumes / pairs.sphere_volumes
     peer = None
@@ -135,6 +142,9 @@ def _class_errors(sample: Sample, python_peer: PythonPeer) -> _ClassErrors:
     touched = shares > 0.0
     return _ClassErrors(
         sample.errors(volumes),
+        np.array([truth.gradient_error(g) for truth, g in zip(sample.truths, gradients, strict=True)]) / circles,
+        np.array([truth.area_error(a) for truth, a in zip(sample.truths, areas.tolist(), strict=True)])
+        / (4.0 * circles),
         relative[shares >= 1e-12],
         relative[touched] / _floors(pairs)[touched],
         _trivial(sample),
@@ -185,6 +195,8 @@ def _row(solid: str, shown: str, classes: list[_ClassErrors]) -> tuple[str, ...]
         short(float(errors.max())),
         short(float(np.quantile(errors, 0.99))),
         short(float(np.median(errors))),
+        _worst(classes, lambda one: one.gradient_errors),
+        _worst(classes, lambda one: one.area_errors),
         _worst(classes, lambda one: one.relative),
         _worst(classes, lambda one: one.over_floor),
         _percent(trivial.mean()),

@@ -42,8 +42,8 @@ class OverlapBenchSettings:
     in C++, 29 satellite points, Monte Carlo, voxels, SciPy quadrature, and a distance instead. Errors are taken
     against truths of 30 digits or more, and what must never happen is counted over adversarial pairs.
 
-    What is missing on this machine is named in its row: pip install 'feelahead[bench]' brings the package; the C++
-    row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
+    What is missing on this machine is named where it would stand: pip install 'feelahead[bench]' brings the package;
+    the C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
 
@@ -103,7 +103,7 @@ def bench_overlap(arguments: Sequence[str]) -> int:
         show(console, table)
     show_goals(console, report.goals)
     try:
-        _write(settings, report, tables, arguments)
+        _write(settings, report, tables)
     except OSError as error:
         raise ConfigurationError(f"cannot write {error.filename}: {error.strerror}") from error
     return 0
@@ -116,10 +116,10 @@ def measure(settings: OverlapBenchSettings, header_peer: HeaderPeer, progress: P
     report.add("start", "ours", "all", "kernels", {"warm-up": (warm_up(), "s")})
     repeats = 5 if settings.quick else 15
     timed = settings.timed or 20_000
-    measure_speed(report, python_peer, header_peer, timed, repeats, clock)
+    measure_speed(report, (python_peer, header_peer), progress, timed, repeats, clock)
     progress.advance(steps)
     measure_distances(report, partial_pairs("box", min(timed, 2000)), repeats, clock)
-    measure_meshes(report, min(timed, 500), repeats, 2 if settings.quick else 6, clock, small=timed < 1000)
+    measure_meshes(report, progress, min(timed, 500), repeats, 2 if settings.quick else 6, clock, small=timed < 1000)
     progress.advance(steps)
     truths = settings.truths or (6 if settings.quick else 40)
     samples = draw_samples(frozen_classes(truths, settings.seed), progress)
@@ -149,7 +149,7 @@ def _machine(settings: OverlapBenchSettings) -> Table:
     rows = [
         ("processor", _processor()),
         ("cores", str(available_cores())),
-        ("system", f"{platform.system()} {platform.release()} {platform.machine()}"),
+        ("system", f"{platform.system()} {platform.machine()}"),
         ("versions", ", ".join(f"{name} {version}" for name, version in versions)),
         ("run", "quick" if settings.quick else "full"),
     ]
@@ -167,7 +167,7 @@ def _processor() -> str:
     return f"{names[0] if names else platform.processor() or 'unknown'} ({vectors})"
 
 
-def _write(settings: OverlapBenchSettings, report: Report, tables: list[Table], arguments: Sequence[str]) -> None:
+def _write(settings: OverlapBenchSettings, report: Report, tables: list[Table]) -> None:
     if settings.csv is not None:
         write_csv(settings.csv, report.figures)
     if settings.figures is not None:
@@ -176,12 +176,35 @@ def _write(settings: OverlapBenchSettings, report: Report, tables: list[Table], 
         return
     folder = settings.write_docs.with_suffix("")
     pictures = [f"![{path.stem.replace('_', ' ')}]({folder.name}/{path.name})" for path in draw(report, folder)]
+    machine, *measured = tables
     text = [
         "# Benchmarks: exact overlaps",
         "",
-        f"Made by `{PROGRAM} {' '.join(arguments)}`; run it to make these figures anew.",
+        f"Every figure here comes from `{_command(settings)}` on the machine named below; run it on yours. Its "
+        "`--help` says how to get what it compares with. Goals that are missed are shown as such.",
+        "",
+        markdown(machine),
+        markdown(report.goal_table()),
+        "## Figures",
         "",
         *(f"{picture}\n" for picture in pictures),
-        *(markdown(table) for table in (tables[0], report.goal_table(), *tables[1:])),
+        *(markdown(table) for table in measured),
     ]
     settings.write_docs.write_text("\n".join(text), encoding="utf-8")
+
+
+def _command(settings: OverlapBenchSettings) -> str:
+    """The command that gives the same again, without the folders of this machine."""
+    words = [PROGRAM]
+    if settings.quick:
+        words.append("--quick")
+    for name in ("adversarial", "truths", "timed"):
+        if getattr(settings, name) is not None:
+            words += [f"--{name}", str(getattr(settings, name))]
+    if settings.seed:
+        words += ["--seed", str(settings.seed)]
+    for name in ("peer_header", "write_docs"):
+        path: Path | None = getattr(settings, name)
+        if path is not None:
+            words += [f"--{name.replace('_', '-')}", path.name if path.is_absolute() else str(path)]
+    return " ".join(words)

@@ -4,6 +4,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from rich.progress import Progress
 
 from common.arrays import FloatArray, IntArray
 from common.clock import Clock
@@ -17,7 +18,7 @@ TORUS = (1.0, 0.35)
 """Radii (m) of the ring and of its tube."""
 FEW_TRIANGLES = 50
 """Up to so many triangles a query is to cost less than 20 boxes."""
-_RADII = (0.004, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.25, 0.4, 0.6)
+_RADII = (0.004, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.12, 0.15, 0.25, 0.4, 0.6)
 
 
 def torus(around: int, across: int) -> tuple[FloatArray, IntArray]:
@@ -40,8 +41,13 @@ def torus(around: int, across: int) -> tuple[FloatArray, IntArray]:
     return vertices, triangles.astype(np.int64)
 
 
-def measure_meshes(report: Report, queries: int, repeats: int, truths: int, clock: Clock, *, small: bool) -> None:
-    """Add the time of a query for spheres of several radii, and the worst error of a few of them."""
+def measure_meshes(
+    report: Report, progress: Progress, queries: int, repeats: int, truths: int, clock: Clock, *, small: bool
+) -> None:
+    """Add the time of a query for spheres of several radii, and the worst error of `truths` of them.
+
+    `small` takes a torus of 400 triangles instead of 10 000.
+    """
     mesh_type = getattr(overlap, "Mesh", None)
     if mesh_type is None:
         report.tables.append(Table("Meshes", ("",), [("this build has no mesh kernel",)]))
@@ -53,6 +59,7 @@ def measure_meshes(report: Report, queries: int, repeats: int, truths: int, cloc
     rng = np.random.default_rng(5)
     box_ns = report.value("speed", "ours, kernel", "box", "partial", "time")
     rows = []
+    bar = progress.add_task("mesh queries", total=len(_RADII))
     for radius in _RADII:
         centers = _near_surface(rng, queries, radius)
         radii = np.full(queries, radius)
@@ -66,6 +73,7 @@ def measure_meshes(report: Report, queries: int, repeats: int, truths: int, cloc
         values = {"triangles": (touched, ""), "time": (times[0], "ns/query"), "time, gradient": (times[1], "ns/query")}
         report.add("mesh", "ours", "mesh", case, values)
         ratio = "" if box_ns is None else short(times[0] / box_ns)
+        progress.advance(bar)
         rows.append((f"{radius:g}", f"{touched:.0f}", short(times[0]), short(times[1]), ratio))
     report.tables.append(
         Table(

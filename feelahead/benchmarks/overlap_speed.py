@@ -1,12 +1,11 @@
 """Run times on the same pairs for everything exact: ours, and the published package."""
 
-import contextlib
-import statistics
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
+from rich.progress import Progress
 
 from common.arrays import BoolArray, FloatArray
 from common.clock import Clock
@@ -21,6 +20,9 @@ TIMED_SOLIDS: tuple[Solid, ...] = ("tetrahedron", "box")
 _ROUNDS = 3
 _CALLS = 500
 """Pairs timed a call each."""
+
+Timed = Callable[[], dict[str, float]]
+"""A measurement: ns a pair by the name of the method."""
 
 TRIVIAL = {"apart": "far away", "solid within sphere": "solid swallowed", "sphere within solid": "sphere swallowed"}
 """Trivial pairs, with the class that has many of them."""
@@ -58,67 +60,77 @@ def _chosen(solid: Solid, kind: str, count: int, seed: int, valid: Callable[[Pai
 
 
 def measure_speed(
-    report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, count: int, repeats: int, clock: Clock
+    report: Report,
+    peers: tuple[PythonPeer, HeaderPeer],
+    progress: Progress,
+    count: int,
+    repeats: int,
+    clock: Clock,
 ) -> None:
     """Add ns a pair, for partial and trivial pairs, to the report.
 
     The methods take turns for a few rounds, so that whatever else the machine does meets all of them alike.
     """
+    python_peer, header_peer = peers
+    bar = progress.add_task("run times", total=len(TIMED_SOLIDS) * (1 + len(TRIVIAL)))
     for solid in TIMED_SOLIDS:
         pairs = partial_pairs(solid, count)
         _measure_in_turns(report, _timed(pairs, python_peer, header_peer, repeats, clock), solid, "partial")
+        progress.advance(bar)
         for name in TRIVIAL:
             pairs = trivial_pairs(solid, name, count)
             run = partial(overlap_ours.kernel_volumes, pairs)
-            timed: dict[str, Callable[[], float]] = {
-                "ours, kernel": partial(nanoseconds_each, run, count, repeats, clock)
-            }
+            timed: list[Timed] = [partial(_run_ns, "ours, kernel", run, count, repeats, clock)]
             if not header_peer.missing:
-                timed["overlap, C++"] = partial(_overlap_ns, header_peer, pairs, repeats)
+                timed.append(partial(_header_ns, header_peer, pairs, repeats))
             _measure_in_turns(report, timed, solid, name)
+            progress.advance(bar)
     report.tables.append(_table(report, python_peer, header_peer, count))
 
 
-def _measure_in_turns(report: Report, timed: dict[str, Callable[[], float]], solid: Solid, case: str) -> None:
-    times: dict[str, list[float]] = {method: [] for method in timed}
+def _measure_in_turns(report: Report, timed: list[Timed], solid: Solid, case: str) -> None:
+    """Each method's best round."""
+    times: dict[str, float] = {}
     for _ in range(_ROUNDS):
-        for method, time_ns in timed.items():
-            with contextlib.nullcontext() if "threads" in method else one_core():
-                times[method].append(time_ns())
+        for measure in timed:
+            for method, each_ns in measure().items():
+                times[method] = min(each_ns, times.get(method, each_ns))
     for method, each_ns in times.items():
-        report.add("speed", method, solid, case, {"time": (statistics.median(each_ns), "ns/pair")})
+        report.add("speed", method, solid, case, {"time": (each_ns, "ns/pair")})
 
 
-def _timed(
-    pairs: Pairs, python_peer: PythonPeer, header_peer: HeaderPeer, repeats: int, clock: Clock
-) -> dict[str, Callable[[], float]]:
-    """Each method with the function that measures its ns a pair."""
-    timed: dict[str, Callable[[], float]] = {
-        method: partial(nanoseconds_each, run, rows, repeats, clock) for method, run, rows in _ours(pairs)
-    }
-    threads = available_cores()
-    timed[f"ours, kernel, {threads} threads"] = partial(_threaded_ns, pairs, threads, repeats, clock)
+def _timed(pairs: Pairs, python_peer: PythonPeer, header_peer: HeaderPeer, repeats: int, clock: Clock) -> list[Timed]:
+    timed: list[Timed] = [partial(_run_ns, method, run, rows, repeats, clock) for method, run, rows in _ours(pairs)]
+    timed.append(partial(_threaded_ns, pairs, repeats, clock))
     if not header_peer.missing:
-        timed["overlap, C++"] = partial(_overlap_ns, header_peer, pairs, repeats)
-        timed["overlap, C++, with building"] = partial(_building_ns, header_peer, pairs, repeats)
+        timed.append(partial(_header_ns, header_peer, pairs, repeats))
     if not python_peer.missing:
-        timed["overlap, Python"] = lambda: python_peer.timing(pairs, max(1, repeats // 4), clock).overlap_ns
+        timed.append(partial(_python_ns, python_peer, pairs, max(1, repeats // 4), clock))
     return timed
 
 
-def _threaded_ns(pairs: Pairs, threads: int, repeats: int, clock: Clock) -> float:
+def _run_ns(method: str, run: Callable[[], object], count: int, repeats: int, clock: Clock) -> dict[str, float]:
+    with one_core():
+        return {method: nanoseconds_each(run, count, repeats, clock)}
+
+
+def _threaded_ns(pairs: Pairs, repeats: int, clock: Clock) -> dict[str, float]:
+    threads = available_cores()
     with ThreadPoolExecutor(threads) as pool:
         run = partial(overlap_ours.threaded_volumes, pairs, pool, threads)
-        return nanoseconds_each(run, len(pairs), repeats, clock)
+        return {f"ours, kernel, {threads} threads": nanoseconds_each(run, len(pairs), repeats, clock)}
 
 
-def _overlap_ns(header_peer: HeaderPeer, pairs: Pairs, repeats: int) -> float:
-    return header_peer.timing(pairs, repeats).overlap_ns
+def _header_ns(header_peer: HeaderPeer, pairs: Pairs, repeats: int) -> dict[str, float]:
+    with one_core():
+        timing = header_peer.timing(pairs, repeats)
+    built_ns = timing.overlap_ns + timing.building_ns
+    return {"overlap, C++": timing.overlap_ns, "overlap, C++, with building": built_ns}
 
 
-def _building_ns(header_peer: HeaderPeer, pairs: Pairs, repeats: int) -> float:
-    timing = header_peer.timing(pairs, repeats)
-    return timing.overlap_ns + timing.building_ns
+def _python_ns(python_peer: PythonPeer, pairs: Pairs, repeats: int, clock: Clock) -> dict[str, float]:
+    with one_core():
+        return {"overlap, Python": python_peer.timing(pairs, repeats, clock).overlap_ns}
 
 
 def _ours(pairs: Pairs) -> list[tuple[str, Callable[[], object], int]]:
@@ -146,7 +158,7 @@ def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, cou
         "Run time, ns a pair",
         headings,
         rows,
-        f"Medians on one core, but for the threads, of {count} pairs that are the same for every method. Ours: the "
-        "kernels are what a tick calls, the checked functions validate and broadcast their arguments as well. "
-        "The package: prebuilt objects, building them apart." + absent,
+        f"On one core, but for the threads: the best of {_ROUNDS} rounds of medians, on {count} pairs that are the "
+        "same for every method. Ours: the kernels are what a tick calls, the checked functions validate and "
+        "broadcast their arguments as well. The package: prebuilt objects, building them apart." + absent,
     )

@@ -201,6 +201,7 @@ def _report_counts(
             (text, short(float(getattr(ours, name))), "" if peer is None else short(float(getattr(peer, name))))
             for name, text in _SHOWN.items()
         ),
+        *((text, short(float(getattr(ours, name))), "") for name, text in _SHOWN_OF_OURS.items()),
         (
             f"errors above 1e-6 of the sphere, of {sum(len(s.pairs) for s in samples)} pairs with a truth",
             *(str(large[method]) for method in large),
@@ -213,13 +214,13 @@ def _report_counts(
             ("count", "ours", "overlap 0.2.0"),
             [row if len(row) == 3 else (*row, "") for row in rows],
             "Whether a pair overlaps at all is decided exactly, in whole numbers. The package is given the tetrahedra "
-            "and boxes only; asymmetry and shrinking are measured for ours.",
+            "and boxes only. Of those returned as zero, the true volumes of a few hundred, spread over all, are worked "
+            "out.",
         )
     )
 
 
 _SHOWN = {
-    "precise": "took the compensated forms",
     "exceptions": "exceptions",
     "nan": "NaN",
     "negative": "negative volumes",
@@ -228,8 +229,11 @@ _SHOWN = {
     "false_positives": "above zero although they do not",
     "largest_false_positive": "largest of those, of the sphere",
     "excess": "largest excess over the smaller volume, of the sphere",
+}
+_SHOWN_OF_OURS = {
     "asymmetry": "largest change under relabelling, of the sphere",
     "shrinking": "largest loss as the radius grows, of the sphere",
+    "precise": "took the compensated forms",
 }
 
 

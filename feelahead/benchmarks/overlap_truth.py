@@ -52,6 +52,15 @@ class Truth:
         """|`volume` - truth| in m³, without rounding of the truth; infinite for NaN."""
         return float(abs(self.volume - volume)) if np.isfinite(volume) else float("inf")
 
+    def gradient_error(self, gradient: FloatArray) -> float:
+        """|`gradient` (3,) - truth| in m²; infinite for NaN."""
+        apart = [float(abs(g - t)) for g, t in zip(gradient.tolist(), self.gradient, strict=True)]
+        return float(np.linalg.norm(apart)) if np.isfinite(gradient).all() else float("inf")
+
+    def area_error(self, area: float) -> float:
+        """|`area` - truth| in m²; infinite for NaN."""
+        return float(abs(self.area - area)) if np.isfinite(area) else float("inf")
+
     def direction_error(self, gradient: FloatArray) -> float:
         """The sine of the angle between `gradient` (3,) and the true one, or 1 beyond a right angle."""
         lengths = [float(component) for component in self._unit_gradient()]
