@@ -1,5 +1,6 @@
 """Our own overlaps as the benchmark calls them."""
 
+import functools
 import inspect
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -29,22 +30,31 @@ _KERNELS: dict[Solid, Callable[..., Any]] = {
 
 
 def kernel_overlaps(pairs: Pairs) -> Overlaps:
-    """Volumes, gradients and areas from the kernels that a tick calls, which check nothing."""
-    result: Overlaps = _KERNELS[pairs.solid](*pairs.arguments)
+    """Volumes, gradients and areas from the kernels that a tick calls, which check nothing, in one thread."""
+    result: Overlaps = _KERNELS[pairs.solid](*pairs.arguments, **_one_thread(pairs.solid))
     return result
 
 
 def kernel_volumes(pairs: Pairs) -> FloatArray:
-    """Volumes alone, where the kernels can leave out the rest; else with all of it."""
-    kernel = _KERNELS[pairs.solid]
-    if volumes_apart(pairs.solid):
-        return np.asarray(kernel(*pairs.arguments, gradient=False)[0])
-    return np.asarray(kernel(*pairs.arguments)[0])
+    """Volumes alone, where the kernels can leave out the rest; else with all of it. In one thread."""
+    options = {"gradient": False} if volumes_apart(pairs.solid) else {}
+    return np.asarray(_KERNELS[pairs.solid](*pairs.arguments, **options, **_one_thread(pairs.solid))[0])
 
 
 def volumes_apart(solid: Solid) -> bool:
     """Whether the kernel can leave out gradients and areas."""
-    return "gradient" in inspect.signature(_KERNELS[solid]).parameters
+    return "gradient" in _options(solid)
+
+
+@functools.cache
+def _options(solid: Solid) -> frozenset[str]:
+    """The names of the kernel's parameters."""
+    return frozenset(inspect.signature(_KERNELS[solid]).parameters)
+
+
+def _one_thread(solid: Solid) -> dict[str, int]:
+    """Keeps a kernel that would share out many pairs among threads from doing so."""
+    return {"threads": 1} if "threads" in _options(solid) else {}
 
 
 def checked_volumes(pairs: Pairs) -> FloatArray:
@@ -74,7 +84,7 @@ def threaded_volumes(pairs: Pairs, pool: ThreadPoolExecutor, threads: int) -> Fl
 def precise_count(pairs: Pairs) -> int | None:
     """How many pairs took the compensated forms; None where the kernels do not say."""
     counter: Any = getattr(kernels, "PairCounts", None)
-    if counter is None or "counts" not in inspect.signature(_KERNELS[pairs.solid]).parameters:
+    if counter is None or "counts" not in _options(pairs.solid):
         return None
     counts = counter()
     _KERNELS[pairs.solid](*pairs.arguments, counts=counts)

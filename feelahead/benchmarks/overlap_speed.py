@@ -17,6 +17,8 @@ from feelahead.benchmarks.overlap_report import Report, Table, short
 from feelahead.benchmarks.overlap_timing import available_cores, nanoseconds_each, one_core
 
 TIMED_SOLIDS: tuple[Solid, ...] = ("tetrahedron", "box")
+_ATTEMPTS = 40
+"""How often as many pairs again are drawn, to choose from."""
 _ROUNDS = 3
 _CALLS = 500
 """Pairs timed a call each."""
@@ -53,10 +55,15 @@ def trivial_pairs(solid: Solid, name: str, count: int, seed: int = 2) -> Pairs:
 def _chosen(solid: Solid, kind: str, count: int, seed: int, valid: Callable[[Pairs, FloatArray], BoolArray]) -> Pairs:
     rng = np.random.default_rng(seed)
     found: list[Pairs] = []
-    while sum(len(pairs) for pairs in found) < count:
+    for _ in range(_ATTEMPTS):
+        if sum(len(pairs) for pairs in found) >= count:
+            break
         pairs = MAKERS[solid][kind](rng, 2 * count, False)
         found.append(pairs[np.flatnonzero(valid(pairs, overlap_ours.kernel_volumes(pairs)))])
-    return Pairs.joined(found)[slice(0, count)]
+    chosen = Pairs.joined(found)[slice(0, count)]
+    if len(chosen) < count:
+        raise RuntimeError(f"{len(chosen)} of {count} pairs of the class {kind!r} are what they are to be")
+    return chosen
 
 
 def measure_speed(

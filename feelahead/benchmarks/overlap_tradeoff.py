@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from rich.progress import Progress
@@ -24,7 +25,10 @@ Volumes = Callable[[Pairs], FloatArray]
 
 @dataclass(frozen=True)
 class Method:
-    """A way to volumes: at most `rows` pairs of a family are given to it, repeated to `batch` for its time."""
+    """A way to volumes: at most `rows` pairs of a family are given to it, repeated to `batch` to time it.
+
+    A batch of 0 is for slow ones, whose only call is timed.
+    """
 
     name: str
     volumes: Volumes
@@ -115,13 +119,16 @@ def _point(method: Method, sample: Sample, clock: Clock) -> tuple[float, float, 
     """(ns a pair, worst and median error as shares of the sphere's volume); NaN counts as an error of 1."""
     rows = _spread_rows(sample, method.rows)
     chosen = Sample(sample.name, sample.pairs[rows], [sample.truths[row] for row in rows])
+    start_s = clock.now()
     errors = chosen.errors(method.volumes(chosen.pairs))
+    time_ns = 1e9 * (clock.now() - start_s) / len(rows)
     errors[~np.isfinite(errors)] = 1.0
-    timed = chosen.pairs[np.resize(np.arange(len(rows)), max(method.batch, len(rows)))]
-    if method.own_time_ns is not None:
-        time_ns = method.own_time_ns(timed)
-    else:
-        time_ns = nanoseconds_each(lambda: method.volumes(timed), len(timed), 3 if method.batch else 1, clock)
+    if method.batch:
+        timed = chosen.pairs[np.resize(np.arange(len(rows)), max(method.batch, len(rows)))]
+        if method.own_time_ns is not None:
+            time_ns = method.own_time_ns(timed)
+        else:
+            time_ns = nanoseconds_each(partial(method.volumes, timed), len(timed), 3, clock)
     return time_ns, float(errors.max()), float(np.median(errors))
 
 
