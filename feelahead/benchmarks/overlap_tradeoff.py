@@ -120,8 +120,9 @@ def _point(method: Method, sample: Sample, clock: Clock) -> tuple[float, float, 
     rows = _spread_rows(sample, method.rows)
     chosen = Sample(sample.name, sample.pairs[rows], [sample.truths[row] for row in rows])
     start_s = clock.now()
-    errors = chosen.errors(method.volumes(chosen.pairs))
+    volumes = method.volumes(chosen.pairs)
     time_ns = 1e9 * (clock.now() - start_s) / len(rows)
+    errors = chosen.errors(volumes)
     errors[~np.isfinite(errors)] = 1.0
     if method.batch:
         timed = chosen.pairs[np.resize(np.arange(len(rows)), max(method.batch, len(rows)))]
