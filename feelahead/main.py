@@ -5,10 +5,12 @@ from collections.abc import Callable, Sequence
 
 from common.command_line import run_command
 from common.errors import ConfigurationError
+from feelahead.bench import bench
 from feelahead.demo import demo
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
+    "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
 }
 
 

@@ -18,7 +18,12 @@ IO_ROOMS = {
     "zmq": {"common/sockets.py"},
     "hid": {"operator_side/dualsense/device.py"},
     "hidraw": {"operator_side/dualsense/device.py"},
-    "mujoco": {"robot_side/arm.py", "robot_side/scene.py", "robot_side/cameras.py"},
+    "mujoco": {
+        "robot_side/arm.py",
+        "robot_side/scene.py",
+        "robot_side/cameras.py",
+        "feelahead/benchmarks/overlap_distances.py",  # times MuJoCo's distances beside our overlaps
+    },
     "viser": {"operator_side/console.py"},
 }
 CLOCK_READERS = {
