@@ -54,7 +54,6 @@ def test_nothing_visible_is_returned_as_zero(counts: Counts) -> None:
     assert counts.largest_missed <= WORST
 
 
-@pytest.mark.xfail(reason="the sum over faces cannot tell overlaps below 1e-16 of the sphere from nothing", strict=True)
 def test_no_overlap_is_returned_as_zero(counts: Counts) -> None:
     assert counts.false_zeros == 0
 
@@ -72,13 +71,11 @@ def test_no_error_is_large(samples: list[Sample]) -> None:
     assert worst[0] <= LARGE_ERROR, worst[1]
 
 
-@pytest.mark.xfail(reason="spheres much smaller than the solid are off by 1e-16 of their ratio", strict=True)
 def test_no_error_is_above_the_goal(samples: list[Sample]) -> None:
     worst = max((float(sample.errors(our_volumes(sample.pairs)[0]).max()), sample.name) for sample in samples)
     assert worst[0] <= WORST, worst[1]
 
 
-@pytest.mark.xfail(reason="spheres much smaller than the solid are off by 1e-16 of their ratio", strict=True)
 def test_labels_do_not_matter(classes: dict[str, Pairs]) -> None:
     assert max(asymmetry(pairs, our_volumes(pairs)[0]) for pairs in classes.values()) <= WORST
 

@@ -40,7 +40,8 @@ def settle(
     # Every choice is between values that have been worked out, so that it becomes an instruction and no branch.
     volume, gradient, area = overlap
     whole, whole_area = sphere_volume(radius), sphere_area(radius)
-    engulfed = (lowest > 0.0) & (solid_volume > 0.0)
+    # Inside, it is at least the radius, and outside at most 0: rounding cannot take one for the other.
+    engulfed = (lowest > 0.5 * radius) & (solid_volume > 0.0)
     uncut_volume, uncut_area = whole if engulfed else 0.0, whole_area if engulfed else 0.0
     apart = (nearest_2 > CLEAR * (radius * radius)) | (solid_volume == 0.0)
     bounded_volume = min(max(volume, 0.0), whole, solid_volume)

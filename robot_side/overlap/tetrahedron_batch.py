@@ -40,6 +40,9 @@ _COLUMNS = _RESULT + RESULT_COLUMNS
 _SURE = 1.0 + 1e-9
 """Bounds settle a pair only with this margin for what they round."""
 
+_ROUNDING_2 = 1e-21
+"""(8 · 2⁻⁵³)² / 1e-9: what products of three lengths may round, squared, where the margin above does not cover it."""
+
 
 @compiled(
     input_array(2),
@@ -142,8 +145,12 @@ def _bound_by_corners(block: FloatArray, groups: int) -> None:
         )
         farthest_2 = max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
         away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
-        verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
-        volume_6 = dot(subtract(second, first), cross(subtract(third, first), subtract(fourth, first)))
+        ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
+        volume_6 = dot(ab, cross(ac, ad))
+        longest_2 = max(dot(ab, ab), dot(ac, ac), dot(ad, ad))
+        # The volume of a flatter one would lose digits here.
+        solid = volume_6 * volume_6 > 1e-14 * (longest_2 * longest_2 * longest_2)
+        verdict = WHOLE_SOLID if (farthest_2 * _SURE <= radius_2) & solid else PARTIAL
         block[np.uint64(_BOUNDS * LANES + lane)] = NOTHING if away else verdict
         block[np.uint64(_SOLID_VOLUME * LANES + lane)] = abs(volume_6) / 6.0
 
@@ -156,15 +163,14 @@ def _bound_by_planes(block: FloatArray, groups: int) -> None:
         center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
         a, b = subtract(first, center), subtract(second, center)
         ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
-        # What the distances of planes round to is in proportion to the size of the whole.
         size_2 = max(dot(a, a), dot(ab, ab), dot(ac, ac), dot(ad, ad))
-        enough_2 = radius * radius * _SURE + 1e-12 * size_2
+        enough_2, rounding = radius * radius * _SURE, _ROUNDING_2 * (size_2 * size_2 * size_2)
         across_d = cross(ac, ab)
         sense = 1.0 if dot(ad, across_d) < 0.0 else -1.0
-        below_a, above_a = _side(sense, b, cross(subtract(third, second), subtract(fourth, second)), enough_2)
-        below_b, above_b = _side(sense, a, cross(ad, ac), enough_2)
-        below_c, above_c = _side(sense, a, cross(ab, ad), enough_2)
-        below_d, above_d = _side(sense, a, across_d, enough_2)
+        below_a, above_a = _side(sense, b, cross(subtract(third, second), subtract(fourth, second)), enough_2, rounding)
+        below_b, above_b = _side(sense, a, cross(ad, ac), enough_2, rounding)
+        below_c, above_c = _side(sense, a, cross(ab, ad), enough_2, rounding)
+        below_d, above_d = _side(sense, a, across_d, enough_2, rounding)
         verdict = column(block, _BOUNDS, lane)
         partial = verdict == PARTIAL
         verdict = WHOLE_SPHERE if partial & (below_a & below_b & below_c & below_d) else verdict
@@ -189,10 +195,13 @@ def _beyond_2(a: float, b: float, c: float, d: float) -> float:
 
 
 @inlined
-def _side(sense: float, corner: Vector, across: Vector, enough_2: float) -> tuple[bool, bool]:
-    """Whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane."""
+def _side(sense: float, corner: Vector, across: Vector, enough_2: float, rounding: float) -> tuple[bool, bool]:
+    """Whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane.
+
+    `rounding` (m⁶) is the square of what the product of the face's normal, twice its area long, may have rounded.
+    """
     height = sense * dot(corner, across)
-    far = height * height >= enough_2 * dot(across, across)
+    far = height * height >= enough_2 * dot(across, across) + rounding
     return far & (height > 0.0), far & (height < 0.0)
 
 
