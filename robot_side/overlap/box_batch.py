@@ -25,15 +25,17 @@ from robot_side.overlap.lanes import (
     column,
     copy_lane,
     lane_groups,
+    load_columns,
     scatter,
     store_result,
     vector_column,
+    weight,
 )
 from robot_side.overlap.solid import sphere_area, sphere_volume
 from robot_side.overlap.vectors import cross, dot, scale, subtract
 
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
-_CENTER, _RADIUS, _BOX_CENTER, _COLUMNS_OF_ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
+_CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
 _BOUNDS, _SOLID_VOLUME, _RESULT = 19, 20, 21
 _COLUMNS = _RESULT + RESULT_COLUMNS
 
@@ -78,7 +80,8 @@ def overlap_boxes(
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, box_centers, box_rotations, box_half_sizes, first, count, block)
-        _bound(block, lane_groups(count))
+        if _bound(block, lane_groups(count)) == 0:
+            continue
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)
             if verdict == NOTHING:
@@ -118,33 +121,33 @@ def _load(
     count: int,
     block: FloatArray,
 ) -> None:
+    flat_centers, flat_places, flat_halves = centers.reshape(-1), box_centers.reshape(-1), box_half_sizes.reshape(-1)
+    flat_rotations = box_rotations.reshape(-1)
     for lane in range(count):
-        pair = np.uint64(first + lane)
-        for axis in range(3):
-            block[np.uint64((_CENTER + axis) * LANES + lane)] = centers[pair, axis]
-            block[np.uint64((_BOX_CENTER + axis) * LANES + lane)] = box_centers[pair, axis]
-            block[np.uint64((_HALF_SIZES + axis) * LANES + lane)] = box_half_sizes[pair, axis]
-            for row in range(3):
-                block[np.uint64((_COLUMNS_OF_ROTATION + 3 * axis + row) * LANES + lane)] = box_rotations[
-                    pair, row, axis
-                ]
-        block[np.uint64(_RADIUS * LANES + lane)] = radii[pair]
+        load_columns(flat_centers, first + lane, 3, block, _CENTER, lane)
+        load_columns(radii, first + lane, 1, block, _RADIUS, lane)
+        load_columns(flat_places, first + lane, 3, block, _BOX_CENTER, lane)
+        load_columns(flat_rotations, first + lane, 9, block, _ROTATION, lane)
+        load_columns(flat_halves, first + lane, 3, block, _HALF_SIZES, lane)
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, _INPUTS)
 
 
 @inlined
 def _columns(block: FloatArray, lane: int) -> Columns:
+    first, second = vector_column(block, _ROTATION, lane), vector_column(block, _ROTATION + 3, lane)
+    third = vector_column(block, _ROTATION + 6, lane)
     return (
-        vector_column(block, _COLUMNS_OF_ROTATION, lane),
-        vector_column(block, _COLUMNS_OF_ROTATION + 3, lane),
-        vector_column(block, _COLUMNS_OF_ROTATION + 6, lane),
+        (first[0], second[0], third[0]),
+        (first[1], second[1], third[1]),
+        (first[2], second[2], third[2]),
     )
 
 
 @building_block
-def _bound(block: FloatArray, groups: int) -> None:
-    """Fill in what the bounds of the first groups of lanes tell, and the volumes of the boxes."""
+def _bound(block: FloatArray, groups: int) -> int:
+    """Fill in what the bounds of the first groups of lanes tell, and the boxes' volumes; the sum of the weights."""
+    total = 0
     for lane in range(groups * WIDTH):
         q_0, q_1, q_2 = _columns(block, lane)
         half = vector_column(block, _HALF_SIZES, lane)
@@ -165,8 +168,11 @@ def _bound(block: FloatArray, groups: int) -> None:
         within = dot(corner, corner) <= radius_2
         verdict = WHOLE_SPHERE if lowest - slack >= radius else PARTIAL
         verdict = WHOLE_SOLID if within else verdict
-        block[np.uint64(_BOUNDS * LANES + lane)] = NOTHING if away else verdict
+        verdict = NOTHING if away else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
         block[np.uint64(_SOLID_VOLUME * LANES + lane)] = volume
+    return total
 
 
 @building_block

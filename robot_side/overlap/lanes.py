@@ -23,6 +23,9 @@ RESULT_COLUMNS = 6
 NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
 """What a pair's bounds tell: no contact, the sphere within the solid, the solid within the sphere, or neither."""
 
+SOME_PARTIAL = 1 << 32
+"""The sum of `weight` over a block is at least this if a lane is `PARTIAL`, and 0 if there is no contact in any."""
+
 
 @inlined
 def column(lanes: FloatArray, index: int, lane: int) -> float:
@@ -42,6 +45,12 @@ def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
 
 
 @inlined
+def weight(verdict: float) -> int:
+    """What one lane's bounds add to the block's sum: whole numbers, because LLVM adds no others in vectors."""
+    return 0 if verdict == NOTHING else (SOME_PARTIAL if verdict == PARTIAL else 1)
+
+
+@inlined
 def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, size: float, unsettled: float) -> None:
     """Write an overlap that was worked out with lengths divided by `size` to the columns from `index`."""
     area = size * size
@@ -51,6 +60,13 @@ def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, siz
     lanes[np.uint64((index + 3) * LANES + lane)] = overlap[1][2] * area
     lanes[np.uint64((index + 4) * LANES + lane)] = overlap[2] * area
     lanes[np.uint64((index + 5) * LANES + lane)] = unsettled
+
+
+@inlined
+def load_columns(rows: FloatArray, row: int, width: int, lanes: FloatArray, index: int, lane: int) -> None:
+    """Copy `row` of an array of `width` numbers a row, given flat, to the columns of `lane` from `index`."""
+    for number in range(width):
+        lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64(row * width + number)]
 
 
 @inlined

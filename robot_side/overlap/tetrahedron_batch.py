@@ -18,15 +18,18 @@ from robot_side.overlap.lanes import (
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
+    SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
     column,
     copy_lane,
     lane_groups,
+    load_columns,
     scatter,
     store_result,
     vector_column,
+    weight,
 )
 from robot_side.overlap.solid import sphere_area, sphere_volume
 from robot_side.overlap.tetrahedron_lane import tetrahedron_lane
@@ -75,8 +78,10 @@ def overlap_tetrahedra(
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, vertices, first, count, block)
-        _bound_by_corners(block, lane_groups(count))
-        if _any_partial(block, count):
+        left = _bound_by_corners(block, lane_groups(count))
+        if left == 0:
+            continue
+        if left >= SOME_PARTIAL:
             _bound_by_planes(block, lane_groups(count))
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)
@@ -110,13 +115,11 @@ def overlap_tetrahedra(
 def _load(
     centers: FloatArray, radii: FloatArray, vertices: FloatArray, first: int, count: int, block: FloatArray
 ) -> None:
+    flat_centers, flat_vertices = centers.reshape(-1), vertices.reshape(-1)
     for lane in range(count):
-        pair = np.uint64(first + lane)
-        for axis in range(3):
-            block[np.uint64((_CENTER + axis) * LANES + lane)] = centers[pair, axis]
-            for corner in range(4):
-                block[np.uint64((_CORNERS + 3 * corner + axis) * LANES + lane)] = vertices[pair, corner, axis]
-        block[np.uint64(_RADIUS * LANES + lane)] = radii[pair]
+        load_columns(flat_centers, first + lane, 3, block, _CENTER, lane)
+        load_columns(radii, first + lane, 1, block, _RADIUS, lane)
+        load_columns(flat_vertices, first + lane, 12, block, _CORNERS, lane)
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, _INPUTS)
 
@@ -132,8 +135,9 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
 
 
 @building_block
-def _bound_by_corners(block: FloatArray, groups: int) -> None:
-    """Fill in what the corners and their bounding box tell, and the tetrahedra's volumes."""
+def _bound_by_corners(block: FloatArray, groups: int) -> int:
+    """Fill in what the corners and their bounding box tell, and the tetrahedra's volumes; the sum of the weights."""
+    total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
         center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
@@ -151,8 +155,11 @@ def _bound_by_corners(block: FloatArray, groups: int) -> None:
         # The volume of a flatter one would lose digits here.
         solid = volume_6 * volume_6 > 1e-14 * (longest_2 * longest_2 * longest_2)
         verdict = WHOLE_SOLID if (farthest_2 * _SURE <= radius_2) & solid else PARTIAL
-        block[np.uint64(_BOUNDS * LANES + lane)] = NOTHING if away else verdict
+        verdict = NOTHING if away else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
         block[np.uint64(_SOLID_VOLUME * LANES + lane)] = abs(volume_6) / 6.0
+    return total
 
 
 @building_block
@@ -177,14 +184,6 @@ def _bound_by_planes(block: FloatArray, groups: int) -> None:
         block[np.uint64(_BOUNDS * LANES + lane)] = (
             NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
         )
-
-
-@inlined
-def _any_partial(block: FloatArray, count: int) -> bool:
-    for lane in range(count):  # noqa: SIM110 - Numba compiles no generator
-        if column(block, _BOUNDS, lane) == PARTIAL:
-            return True
-    return False
 
 
 @inlined
