@@ -40,6 +40,8 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
+        for text in core.notes:
+            status.note(text)
         compile_s = warm_up()
         if compile_s > _NOTEWORTHY_WARM_UP_S:
             status.note(f"compiled the overlap kernels in {compile_s:.1f} s; the next start finds them ready")

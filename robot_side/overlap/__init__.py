@@ -4,10 +4,15 @@ Read `volumes` and `mesh` for the functions, `orthoscheme` and `triangle_lanes` 
 1 kHz tick calls.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from robot_side.overlap.kernels import warm_up
-from robot_side.overlap.mesh import Mesh, sphere_mesh
-from robot_side.overlap.mesh_library import MeshLibrary
 from robot_side.overlap.volumes import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+
+if TYPE_CHECKING:
+    from robot_side.overlap.mesh import Mesh, sphere_mesh
+    from robot_side.overlap.mesh_library import MeshLibrary
 
 __all__ = [
     "Mesh",
@@ -19,3 +24,12 @@ __all__ = [
     "sphere_tetrahedron",
     "warm_up",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """What deals with meshes, loaded when it is first asked for: `warm_up` compiles all kernels that are loaded."""
+    if name == "MeshLibrary":
+        return import_module("robot_side.overlap.mesh_library").MeshLibrary
+    if name in {"Mesh", "sphere_mesh"}:
+        return getattr(import_module("robot_side.overlap.mesh"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
