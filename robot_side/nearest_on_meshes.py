@@ -16,8 +16,8 @@ from robot_side.mesh_bounds import mesh_bounds
 from robot_side.overlap.mesh_library import MeshLibrary, nearest_mesh_pairs
 
 _BALL = 1.0 / 3.0
-"""Radius of the ball as a share of the depth. In a plate the vector shrinks from a quarter of the thickness before the
-middle: with a box's ways out it has fallen to 0.9 there."""
+"""Radius of the ball as a share of the depth. In a plate the vector shrinks over the last quarter of the way from the
+face to the middle; that of a box has fallen to 0.77 where this begins."""
 
 _SHALLOW = 1e-9
 """Less deep than this share of the mesh's size, differences of distances are mostly rounding."""
@@ -59,8 +59,9 @@ def _deepening(
     reach = _BALL * depths_m
     radii = reach[:, None, None] * axes
     ends = np.stack([points_m[:, None] - radii, points_m[:, None] + radii], axis=2)
+    points = np.ascontiguousarray(ends).reshape(-1, 3)
     placed = np.repeat(positions_m, 6, axis=0), np.repeat(rotations, 6, axis=0)
-    distances, _ = nearest_mesh_pairs(ends.reshape(-1, 3), library, np.repeat(mesh_index, 6), *placed)
+    distances, _ = nearest_mesh_pairs(points, library, np.repeat(mesh_index, 6), *placed)
     behind, ahead = np.moveaxis(distances.reshape(-1, 3, 2), 2, 0)
     vectors: FloatArray = np.einsum("qa,qai->qi", (behind - ahead) / (2.0 * reach[:, None]), axes)
     lengths = np.linalg.norm(vectors, axis=1)
