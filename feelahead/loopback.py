@@ -40,9 +40,10 @@ class Loopback:
     """Two cores, a controller with a person, and the link between them, driven by one virtual clock."""
 
     def __init__(self, settings: LoopbackSettings) -> None:
-        warm_up()
         self.clock = VirtualClock()
         self.robot: RobotSide = build_robot_side(settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK)
+        # After the scene, which decides what kernels there are.
+        warm_up()
         self.operator = OperatorSide(
             2,
             _VIRTUAL_CLOCK,

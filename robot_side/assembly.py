@@ -1,5 +1,6 @@
 """Settings to a robot side that is ready to tick: the simulated arm, its camera, and everything in between."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,8 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.stiffness import StiffnessMap
 
 _SAMPLED_CONFIGURATIONS = 256
+_NAMED_APPROXIMATIONS = 8
+"""So many objects are named in a note about all of them."""
 
 
 class SimulationObserver:
@@ -79,7 +82,22 @@ def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> 
         settings.motion,
         SimulationObserver(scene),
         settings.seed,
+        _notes(scene),
     )
+
+
+def _notes(scene: Scene) -> tuple[str, ...]:
+    """One line that names what is perceived larger than it is, and by how much; none where all is exact."""
+    if not scene.volume_errors:
+        return ()
+    largest_first = sorted(scene.volume_errors.items(), key=lambda item: -item[1])
+    shown = [
+        f"{name} by {100.0 * error:.1f} %" if math.isfinite(error) else f"{name} as its convex hull or bounding box"
+        for name, error in largest_first[:_NAMED_APPROXIMATIONS]
+    ]
+    if len(largest_first) > len(shown):
+        shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
+    return (f"perceived larger than they are (in volume): {', '.join(shown)}",)
 
 
 def _sampled_covariances(

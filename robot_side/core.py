@@ -4,6 +4,7 @@ payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion �
 arm ─▶ kinematics ─▶ sensing of what is ahead ─▶ stiffness, telemetry ─▶ payloads
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -66,7 +67,10 @@ class RobotSide:
         motion: ToolMotionSettings,
         observer: Observer | None = None,
         seed: int = 0,
+        notes: Sequence[str] = (),
     ) -> None:
+        self.notes = tuple(notes)
+        """What a person should know about the scene before the run."""
         self.figures = RunFigures(seed)
         self.session = session
         self.stiffness_sent = 0

@@ -7,6 +7,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm_port import GripperPose
 from robot_side.gripper_spheres import cover_boxes
+from robot_side.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.nearest_object import distance_to_object
 from robot_side.perceived_objects import PerceivedObjects, Role
 
@@ -46,14 +47,9 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject
     """The object `index`, fixed to the tool from now on."""
     centers = [objects.sphere_centers_m[objects.sphere_object == index]]
     radii = [objects.sphere_radii_m[objects.sphere_object == index]]
-    boxes = objects.box_object == index
-    if boxes.any():
-        cover = cover_boxes(
-            objects.box_centers_m[boxes],
-            objects.box_rotations[boxes],
-            objects.box_half_sizes_m[boxes],
-            _SPHERES_PER_BOX * int(boxes.sum()),
-        )
+    boxes = _boxes(objects, index)
+    if len(boxes[0]):
+        cover = cover_boxes(*boxes, _SPHERES_PER_BOX * len(boxes[0]))
         centers.append(cover.centers_m)
         radii.append(cover.radii_m)
     vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
@@ -66,6 +62,21 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject
         name=objects.names[index],
         centers_in_tool_m=(in_world - pose.tool_position_m) @ pose.tool_rotation,
         radii_m=np.concatenate(radii),
+    )
+
+
+def _boxes(objects: PerceivedObjects, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Centres (b, 3), rotations and half sizes (b, 3) of the object's boxes, and of those around its meshes."""
+    boxes, meshes = objects.box_object == index, objects.mesh_object == index
+    own = objects.box_centers_m[boxes], objects.box_rotations[boxes], objects.box_half_sizes_m[boxes]
+    if objects.mesh_library is None:
+        return own
+    centers, rotations, half_sizes = own
+    around = mesh_bounds(objects.mesh_library).half_sizes_m[objects.mesh_index[meshes]]
+    return (
+        np.concatenate([centers, placed_middles(objects)[meshes]]),
+        np.concatenate([rotations, objects.mesh_rotations[meshes]]),
+        np.concatenate([half_sizes, around]),
     )
 
 

@@ -39,6 +39,8 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
+        for text in core.notes:
+            status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
         status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)

@@ -28,4 +28,18 @@ def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArra
         objects.half_space_normals,
         objects.half_space_offsets_m,
     )
+    rows = np.flatnonzero(objects.mesh_object == index)
+    if len(rows) and objects.mesh_library is not None:
+        # A scene without meshes does not load the kernels for them.
+        from robot_side.overlap.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
+
+        points = np.repeat(np.ascontiguousarray(point_m, dtype=np.float64).reshape(1, 3), len(rows), axis=0)
+        to_meshes, _ = nearest_mesh_pairs(
+            points,
+            objects.mesh_library,
+            objects.mesh_index.take(rows),
+            objects.mesh_positions_m.take(rows, axis=0),
+            objects.mesh_rotations.take(rows, axis=0),
+        )
+        distance_m = min(distance_m, float(to_meshes.min()))
     return distance_m

@@ -104,6 +104,15 @@ def nearest_surfaces(centers_m: FloatArray, objects: PerceivedObjects, pairs: Ca
                 direction[part],
                 deepening[part],
             )
+    part = pairs.meshes
+    if part.start < part.stop and objects.mesh_library is not None:
+        # A scene without meshes does not load the kernels for them.
+        from robot_side.nearest_on_meshes import nearest_on_meshes  # noqa: PLC0415
+
+        points = centers_m.take(pairs.sphere_index[part], axis=0)
+        distance[part], direction[part], deepening[part] = nearest_on_meshes(
+            points, objects.mesh_library, *_placed(objects, pairs.primitive_index[part])
+        )
     return NearestSurfaces(distance, direction, deepening)
 
 
@@ -167,6 +176,13 @@ def evaluate(
             rows = pairs.primitive_index[part]
             of_pairs = (array.take(rows, axis=0) for array in primitives)
             volume[part], gradient[part], _ = kernel(points[part], pair_radii_m[part], *of_pairs)
+    part = pairs.meshes
+    if part.start < part.stop and objects.mesh_library is not None:
+        from robot_side.overlap.mesh_library import mesh_pairs  # noqa: PLC0415
+
+        volume[part], gradient[part], _ = mesh_pairs(
+            points[part], pair_radii_m[part], objects.mesh_library, *_placed(objects, pairs.primitive_index[part])
+        )
     return Overlaps(
         pairs.sphere_index,
         pairs.object_index,
@@ -177,6 +193,15 @@ def evaluate(
         nearest.direction,
         nearest.deepening,
         nearest.signed_distance_m < 0.0,
+    )
+
+
+def _placed(objects: PerceivedObjects, rows: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Index (p,), position (p, 3) and rotation (p, 3, 3) of the meshes `rows` (p,)."""
+    return (
+        objects.mesh_index.take(rows),
+        objects.mesh_positions_m.take(rows, axis=0),
+        objects.mesh_rotations.take(rows, axis=0),
     )
 
 

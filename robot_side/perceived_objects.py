@@ -1,10 +1,16 @@
-"""What the camera reports: objects as spheres, boxes, tetrahedra and half-spaces, each with a role."""
+"""What the camera reports: objects as spheres, boxes, tetrahedra, meshes and half-spaces, each with a role."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
 
 from common.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.mesh_library import MeshLibrary
 
 
 class Role(Enum):
@@ -48,6 +54,15 @@ class PerceivedObjects:
     half_space_offsets_m: FloatArray
     """(p,)"""
     half_space_object: IntArray
+    mesh_library: "MeshLibrary | None" = None
+    """The shapes that meshes may have, prepared once for all frames; None without meshes."""
+    mesh_index: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """(q,) into `mesh_library`"""
+    mesh_positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    """(q, 3) where the origins of the meshes' own frames are"""
+    mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    """(q, 3, 3) mesh to world"""
+    mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 class ObjectSource(Protocol):

@@ -13,6 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.kinematic_error import require_finite
+from robot_side.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.overlap.compile import (
     COUNT,
     compiled,
@@ -35,7 +36,7 @@ _USUAL_PAIRS = 256
 
 @dataclass(frozen=True)
 class CandidatePairs:
-    """Pairs of a gripper sphere and a primitive, by kind: spheres, boxes, tetrahedra, half-spaces.
+    """Pairs of a gripper sphere and a primitive, by kind: spheres, boxes, tetrahedra, meshes, half-spaces.
 
     The arrays run over the pairs of all kinds; the slices say which are whose.
     """
@@ -49,6 +50,7 @@ class CandidatePairs:
     spheres: slice
     boxes: slice
     tetrahedra: slice
+    meshes: slice
     half_spaces: slice
     pairs_skipped: int
     """How many pairs were culled."""
@@ -59,13 +61,13 @@ class CandidatePairs:
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Bounding spheres of the bounded primitives, in the order spheres, boxes, tetrahedra."""
+    """Bounding spheres of the bounded primitives, in the order spheres, boxes, tetrahedra, meshes."""
 
     centers_m: FloatArray
     radii_m: FloatArray
     object_index: IntArray
     ends: IntArray
-    """(3,) where each kind's rows end"""
+    """(4,) where each kind's rows end"""
 
 
 _bounds: dict[int, tuple[weakref.ref[PerceivedObjects], _Bounds]] = {}
@@ -87,7 +89,7 @@ def candidate_pairs(centers_m: FloatArray, radii_m: FloatArray, objects: Perceiv
     room = max(_USUAL_PAIRS, len(radii_m))
     while True:
         sphere_index, primitive_index, object_index = np.empty((3, room), dtype=np.int64)
-        ends = np.zeros(3, dtype=np.int64)
+        ends = np.zeros(4, dtype=np.int64)
         count = _find_pairs(
             np.ascontiguousarray(centers_m),
             np.ascontiguousarray(radii_m),
@@ -108,14 +110,15 @@ def candidate_pairs(centers_m: FloatArray, radii_m: FloatArray, objects: Perceiv
         if count <= room:
             break
         room = count
-    first_box, first_tetrahedron, first_half_space = ends.tolist()
+    first_box, first_tetrahedron, first_mesh, first_half_space = ends.tolist()
     return CandidatePairs(
         sphere_index[:count],
         primitive_index[:count],
         object_index[:count],
         slice(0, first_box),
         slice(first_box, first_tetrahedron),
-        slice(first_tetrahedron, first_half_space),
+        slice(first_tetrahedron, first_mesh),
+        slice(first_mesh, first_half_space),
         slice(first_half_space, count),
         len(radii_m) * (len(bounds.radii_m) + len(objects.half_space_offsets_m)) - count,
     )
@@ -186,7 +189,7 @@ def _find_pairs(
     object_index: IntArray,
     ends: IntArray,
 ) -> int:
-    """Write the pairs that touch by kind, primitive and sphere, and in `ends` (3,) where each bounded kind's end.
+    """Write the pairs that touch by kind, primitive and sphere, and in `ends` (4,) where each bounded kind's end.
 
     The number of pairs; those for which there is no room are only counted. -1 for spheres that cannot be.
     """
@@ -198,7 +201,7 @@ def _find_pairs(
     for sphere in range(radii.size):
         reach = max(reach, math.sqrt(_apart(load(centers, sphere), middle)) + radii[sphere])
     count = 0
-    for kind in range(3):
+    for kind in range(4):
         first = 0 if kind == 0 else bound_ends[kind - 1]
         for bound in range(first, bound_ends[kind]):
             center = load(bound_centers, bound)
@@ -228,11 +231,15 @@ def _bounds_of(objects: PerceivedObjects) -> _Bounds:
     middles, radii = np.empty((len(tetrahedra), 3)), np.empty(len(tetrahedra))
     _enclose(tetrahedra, middles, radii)
     half_sizes = objects.box_half_sizes_m
-    by_kind = objects.sphere_radii_m, np.sqrt(np.einsum("bi,bi->b", half_sizes, half_sizes)), radii
+    by_kind = [objects.sphere_radii_m, np.sqrt(np.einsum("bi,bi->b", half_sizes, half_sizes)), radii]
+    if objects.mesh_library is None:
+        by_kind.append(np.empty(0))
+    else:
+        by_kind.append(mesh_bounds(objects.mesh_library).radii_m.take(objects.mesh_index))
     bounds = _Bounds(
-        np.concatenate([objects.sphere_centers_m, objects.box_centers_m, middles]),
+        np.concatenate([objects.sphere_centers_m, objects.box_centers_m, middles, placed_middles(objects)]),
         np.concatenate(by_kind),
-        np.concatenate([objects.sphere_object, objects.box_object, objects.tetrahedron_object]),
+        np.concatenate([objects.sphere_object, objects.box_object, objects.tetrahedron_object, objects.mesh_object]),
         np.cumsum([len(part) for part in by_kind]),
     )
     _bounds[key] = weakref.ref(objects, lambda _: _bounds.pop(key, None)), bounds

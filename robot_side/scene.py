@@ -45,8 +45,13 @@ class Scene:
 
     @property
     def approximated(self) -> tuple[str, ...]:
-        """Names of the objects that are perceived as the boxes around their shapes."""
+        """Names of the objects that are perceived larger than they are."""
         return self.primitives.approximated
+
+    @property
+    def volume_errors(self) -> Mapping[str, float]:
+        """How much larger `approximated` objects are perceived, see `ObjectPrimitives.volume_errors`."""
+        return self.primitives.volume_errors
 
 
 def load_scene(

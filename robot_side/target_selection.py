@@ -3,6 +3,7 @@
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.mesh_bounds import placed_middles
 from robot_side.perceived_objects import PerceivedObjects, Role
 
 _OFF_AXIS_WEIGHT = 3.0
@@ -10,13 +11,17 @@ _OFF_AXIS_WEIGHT = 3.0
 
 
 def object_centers(objects: PerceivedObjects) -> FloatArray:
-    """(k, 3) the mean of each object's primitives' centres, in metres; NaN for half-spaces and ignored objects."""
+    """(k, 3) the mean of each object's primitives' centres, in metres; NaN for half-spaces and ignored objects.
+
+    A mesh's centre is that of its bounding box in its own frame.
+    """
     sums = np.zeros((len(objects.names), 3))
     counts = np.zeros(len(objects.names))
     for centers, owner in (
         (objects.sphere_centers_m, objects.sphere_object),
         (objects.box_centers_m, objects.box_object),
         (objects.tetrahedron_vertices_m.mean(axis=1), objects.tetrahedron_object),
+        (placed_middles(objects), objects.mesh_object),
     ):
         np.add.at(sums, owner, centers)
         np.add.at(counts, owner, 1.0)

@@ -18,8 +18,8 @@ def touching_pairs(
 
     pair_radii_m (p,) as for `evaluate`; pairs with the object `excluded` are left out, too.
     """
-    rows, ends = np.empty(len(pairs), dtype=np.int64), np.empty(3, dtype=np.int64)
-    kinds = np.array((pairs.boxes.start, pairs.tetrahedra.start, pairs.half_spaces.start))
+    rows, ends = np.empty(len(pairs), dtype=np.int64), np.empty(4, dtype=np.int64)
+    kinds = np.array((pairs.boxes.start, pairs.tetrahedra.start, pairs.meshes.start, pairs.half_spaces.start))
     count = _touching_rows(
         nearest.signed_distance_m,
         pair_radii_m,
@@ -32,7 +32,7 @@ def touching_pairs(
     if count == len(pairs):
         return pairs, nearest, pair_radii_m
     rows = rows[:count]
-    first_box, first_tetrahedron, first_half_space = ends.tolist()
+    first_box, first_tetrahedron, first_mesh, first_half_space = ends.tolist()
     return (
         CandidatePairs(
             pairs.sphere_index.take(rows),
@@ -40,7 +40,8 @@ def touching_pairs(
             pairs.object_index.take(rows),
             slice(0, first_box),
             slice(first_box, first_tetrahedron),
-            slice(first_tetrahedron, first_half_space),
+            slice(first_tetrahedron, first_mesh),
+            slice(first_mesh, first_half_space),
             slice(first_half_space, count),
             pairs.pairs_skipped,
         ),

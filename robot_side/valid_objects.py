@@ -21,6 +21,8 @@ _FIELDS = (
     ("box_object", "box_rotations", (3, 3)),
     ("box_object", "box_half_sizes_m", (3,)),
     ("tetrahedron_object", "tetrahedron_vertices_m", (4, 3)),
+    ("mesh_object", "mesh_positions_m", (3,)),
+    ("mesh_object", "mesh_rotations", (3, 3)),
     ("half_space_object", "half_space_normals", (3,)),
     ("half_space_object", "half_space_offsets_m", ()),
 )
@@ -42,8 +44,25 @@ def require_valid(objects: PerceivedObjects) -> None:
             raise ValueError(
                 f"objects.{name} holds {_described(values)}; valid: contiguous float64 in the shape {shape}"
             )
+    _require_known_meshes(objects)
     if not _are_possible(*(getattr(objects, name) for _, name, _ in _FIELDS)):
         _refuse(objects)
+
+
+def _require_known_meshes(objects: PerceivedObjects) -> None:
+    """Raise a ValueError unless each mesh is one of the library's."""
+    indices, count = objects.mesh_index, objects.mesh_object.size
+    if indices.dtype != np.int64 or indices.shape != (count,) or not indices.flags.c_contiguous:
+        raise ValueError(
+            f"objects.mesh_index holds {_described(indices)}; valid: contiguous int64 in the shape ({count},)"
+        )
+    if count == 0:
+        return
+    if objects.mesh_library is None:
+        raise ValueError(f"objects.mesh_library is None with {count} meshes placed; valid: the library of their shapes")
+    known = len(objects.mesh_library)
+    if indices.min() < 0 or indices.max() >= known:
+        raise ValueError(f"objects.mesh_index holds {indices.min()} to {indices.max()}; valid: 0 to {known - 1}")
 
 
 def _described(values: np.ndarray) -> str:
@@ -58,9 +77,12 @@ def _refuse(objects: PerceivedObjects) -> None:
         values = getattr(objects, name)
         if (values < 0.0).any():
             raise ValueError(f"objects.{name} = {values.min()} is negative; valid: 0 or more")
-    grams = objects.box_rotations.swapaxes(1, 2) @ objects.box_rotations
+    errors = {
+        name: np.abs(rotations.swapaxes(1, 2) @ rotations - np.eye(3))
+        for name, rotations in (("box_rotations", objects.box_rotations), ("mesh_rotations", objects.mesh_rotations))
+    }
     squared = np.einsum("hi,hi->h", objects.half_space_normals, objects.half_space_normals)
-    for name, error in (("box_rotations", np.abs(grams - np.eye(3))), ("half_space_normals", np.abs(squared - 1.0))):
+    for name, error in (errors | {"half_space_normals": np.abs(squared - 1.0)}).items():
         if (error > _UNIT_TOLERANCE).any():
             raise ValueError(
                 f"objects.{name} is {error.max():.1e} off unit length or a right angle; valid: at most 1e-6"
@@ -105,6 +127,7 @@ def _are_unit(vectors: FloatArray) -> bool:
     *(input_array(2), input_array(1)),
     *(input_array(2), input_array(3), input_array(2)),
     input_array(3),
+    *(input_array(2), input_array(3)),
     *(input_array(2), input_array(1)),
     returns=TRUTH,
 )
@@ -115,6 +138,8 @@ def _are_possible(
     box_rotations: FloatArray,
     box_half_sizes: FloatArray,
     vertices: FloatArray,
+    mesh_positions: FloatArray,
+    mesh_rotations: FloatArray,
     normals: FloatArray,
     offsets: FloatArray,
 ) -> bool:
@@ -125,6 +150,8 @@ def _are_possible(
         and _are_orthonormal(box_rotations)
         and _are_at_least(box_half_sizes, 0.0)
         and _are_at_least(vertices, _LOWEST)
+        and _are_at_least(mesh_positions, _LOWEST)
+        and _are_orthonormal(mesh_rotations)
         and _are_unit(normals)
         and _are_at_least(offsets, _LOWEST)
     )

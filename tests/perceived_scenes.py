@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
+from robot_side.overlap import Mesh, MeshLibrary
+from robot_side.overlap.mesh_shapes import ellipsoid_mesh
 from robot_side.perceived_objects import PerceivedObjects, Role
 
 # A cube's corners, numbered by their bits (x, y, z), and five tetrahedra that fill it.
@@ -22,6 +24,8 @@ class Scene:
         self._boxes: list[tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, int]] = []
         self._tetrahedra: list[tuple[npt.ArrayLike, int]] = []
         self._half_spaces: list[tuple[npt.ArrayLike, float, int]] = []
+        self._meshes: list[tuple[int, npt.ArrayLike, npt.ArrayLike, int]] = []
+        self._shapes: list[Mesh] = []
 
     def add(self, role: Role = Role.OBSTACLE) -> "Scene":
         """A new object; what follows belongs to it."""
@@ -46,6 +50,13 @@ class Scene:
             self.tetrahedron(corners[indices])
         return self
 
+    def mesh(self, mesh: Mesh, position_m: npt.ArrayLike, rotation: FloatArray | None = None) -> "Scene":
+        if mesh not in self._shapes:
+            self._shapes.append(mesh)
+        rows = self._shapes.index(mesh), position_m, np.eye(3) if rotation is None else rotation
+        self._meshes.append((*rows, len(self.roles) - 1))
+        return self
+
     def half_space(self, normal: npt.ArrayLike, offset_m: float) -> "Scene":
         self._half_spaces.append((normal, offset_m, len(self.roles) - 1))
         return self
@@ -67,6 +78,11 @@ class Scene:
             half_space_normals=_stacked([row[0] for row in self._half_spaces], (3,)),
             half_space_offsets_m=_stacked([row[1] for row in self._half_spaces], ()),
             half_space_object=np.array([row[-1] for row in self._half_spaces], dtype=np.int64),
+            mesh_library=MeshLibrary(self._shapes) if self._shapes else None,
+            mesh_index=np.array([row[0] for row in self._meshes], dtype=np.int64),
+            mesh_positions_m=_stacked([row[1] for row in self._meshes], (3,)),
+            mesh_rotations=_stacked([row[2] for row in self._meshes], (3, 3)),
+            mesh_object=np.array([row[-1] for row in self._meshes], dtype=np.int64),
         )
 
 
@@ -76,8 +92,10 @@ def random_rotation(rng: np.random.Generator) -> FloatArray:
     return rotation
 
 
-def random_scene(rng: np.random.Generator, of_each_kind: int, extent_m: float = 1.0) -> PerceivedObjects:
-    """Objects of every kind, each of one primitive, within `extent_m` of the origin."""
+def random_scene(
+    rng: np.random.Generator, of_each_kind: int, extent_m: float = 1.0, meshes: int = 0
+) -> PerceivedObjects:
+    """Objects of every kind, and `meshes`, each of one primitive, within `extent_m` of the origin."""
     scene = Scene()
     for _ in range(of_each_kind):
         center = rng.uniform(-extent_m, extent_m, 3)
@@ -87,6 +105,10 @@ def random_scene(rng: np.random.Generator, of_each_kind: int, extent_m: float = 
         scene.add().tetrahedron(rng.uniform(-extent_m, extent_m, 3) + rng.normal(size=(4, 3)) * 0.1)
         normal = rng.normal(size=3)
         scene.add().half_space(normal / np.linalg.norm(normal), float(rng.uniform(-extent_m, extent_m)))
+    shapes = [Mesh(*ellipsoid_mesh(rng.uniform(0.03, 0.2, 3), 3)[:2]) for _ in range(min(meshes, 3))]
+    for number in range(meshes):
+        position = rng.uniform(-extent_m, extent_m, 3)
+        scene.add().mesh(shapes[number % len(shapes)], position, random_rotation(rng))
     return scene.objects()
 
 

@@ -4,6 +4,7 @@ Read `volumes` and `mesh` for the functions, `face_angles` for the idea, `tetrah
 used, `precise_polyhedron` for what tiny overlaps need, and `kernels` for what a 1 kHz tick calls.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from robot_side.overlap.kernels import warm_up
@@ -26,13 +27,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import meshes when they are first asked for: who has none does not wait for their kernels to compile."""
-    if name in ("Mesh", "sphere_mesh"):
-        from robot_side.overlap import mesh  # noqa: PLC0415 - the point of this function
-
-        return getattr(mesh, name)
+    """What deals with meshes, loaded when first asked for: who has none does not wait for their kernels to compile."""
     if name == "MeshLibrary":
-        from robot_side.overlap.mesh_library import MeshLibrary  # noqa: PLC0415
-
-        return MeshLibrary
+        return import_module("robot_side.overlap.mesh_library").MeshLibrary
+    if name in {"Mesh", "sphere_mesh"}:
+        return getattr(import_module("robot_side.overlap.mesh"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

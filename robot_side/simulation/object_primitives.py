@@ -1,14 +1,23 @@
-"""The primitives of a scene's objects: which geoms are spheres, boxes, tetrahedra and half-spaces, and where."""
+"""The primitives of a scene's objects: which geoms are spheres, boxes, tetrahedra, meshes, half-spaces; and where."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
+
+if TYPE_CHECKING:
+    from robot_side.overlap.mesh_library import MeshLibrary
+
+_EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
+_MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH}
+"""What a mesh describes, unless it has four vertices."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +32,8 @@ class SceneObject:
 class ObjectPrimitives:
     """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
 
-    A sphere, a box, a plane and a mesh of four vertices are exact. Any other shape stands for its bounding box,
-    which contains it, and its object is named in `approximated`.
+    A sphere, a box, a plane and a closed mesh are exact. A cylinder, a capsule and an ellipsoid stand for meshes
+    around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
     """
 
     def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:
@@ -32,14 +41,23 @@ class ObjectPrimitives:
         self._names = tuple(thing.name for thing in objects)
         geoms = [(geom, index) for index, thing in enumerate(objects) for geom in thing.geoms]
         of_kind: dict[str, list[tuple[int, int]]] = {"sphere": [], "box": [], "tetrahedron": [], "plane": []}
-        approximated: dict[str, None] = {}
+        wanted: list[tuple[int, int]] = []
         for geom, index in geoms:
             kind = _primitive_kind(model, geom)
-            of_kind[kind or "box"].append((geom, index))
-            if kind is None:
-                approximated[self._names[index]] = None
-        self.approximated = tuple(approximated)
-        """Names of the objects that are seen larger than they are."""
+            (wanted if kind is None else of_kind[kind]).append((geom, index))
+        self._mesh_library, meshes, boxes = _meshes(model, [geom for geom, _ in wanted])
+        of_kind["box"] += [(geom, index) for geom, index in wanted if geom in boxes]
+        of_kind["mesh"] = [(geom, index) for geom, index in wanted if geom in meshes]
+        errors: dict[str, float] = {}
+        for geom, index in wanted:
+            error = meshes[geom][1] if geom in meshes else math.inf
+            if error > 0.0:
+                errors[self._names[index]] = max(error, errors.get(self._names[index], 0.0))
+        self.volume_errors: Mapping[str, float] = errors
+        """Of each object that is seen larger than it is, the greatest share by which a part's volume is greater.
+
+        Infinite for what has no known volume of its own, and stands for its convex hull or bounding box.
+        """
 
         self._sphere_geoms, self._sphere_object = _columns(of_kind["sphere"])
         self._radii_m: FloatArray = model.geom_size[self._sphere_geoms, 0].copy()
@@ -48,9 +66,16 @@ class ObjectPrimitives:
         self._box_half_sizes_m: FloatArray = model.geom_aabb[self._box_geoms, 3:].copy()
         self._tetrahedron_geoms, self._tetrahedron_object = _columns(of_kind["tetrahedron"])
         self._corners_m: FloatArray = np.array(
-            [_mesh_vertices(model, int(geom)) for geom in self._tetrahedron_geoms], dtype=np.float64
+            [mesh_vertices(model, int(geom)) for geom in self._tetrahedron_geoms], dtype=np.float64
         ).reshape(-1, 4, 3)
+        self._mesh_geoms, self._mesh_object = _columns(of_kind["mesh"])
+        self._mesh_index = np.array([meshes[int(geom)][0] for geom in self._mesh_geoms], dtype=np.int64)
         self._plane_geoms, self._plane_object = _columns(of_kind["plane"])
+
+    @property
+    def approximated(self) -> tuple[str, ...]:
+        """Names of the objects that are seen larger than they are."""
+        return tuple(self.volume_errors)
 
     def place(
         self,
@@ -68,6 +93,7 @@ class ObjectPrimitives:
         spheres = seen[self._sphere_object]
         boxes = seen[self._box_object]
         tetrahedra = seen[self._tetrahedron_object]
+        meshes = seen[self._mesh_object]
         planes = seen[self._plane_object]
 
         def position(geoms: IntArray, objects: IntArray) -> FloatArray:
@@ -99,22 +125,34 @@ class ObjectPrimitives:
             half_space_normals=normals,
             half_space_offsets_m=np.einsum("pi,pi->p", normals, plane_points),
             half_space_object=self._plane_object[planes],
+            mesh_library=self._mesh_library,
+            mesh_index=self._mesh_index[meshes],
+            mesh_positions_m=position(self._mesh_geoms[meshes], self._mesh_object[meshes]),
+            mesh_rotations=rotation(self._mesh_geoms[meshes]),
+            mesh_object=self._mesh_object[meshes],
         )
 
 
 def _primitive_kind(model: Any, geom: int) -> str | None:
     kind = int(model.geom_type[geom])
-    exact = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
     if kind == GeomKind.MESH and model.mesh_vertnum[model.geom_dataid[geom]] == 4:
         return "tetrahedron"
-    return exact.get(GeomKind(kind)) if kind in set(GeomKind) else None
+    return _EXACT.get(GeomKind(kind)) if kind in set(GeomKind) else None
 
 
-def _mesh_vertices(model: Any, geom: int) -> FloatArray:
-    mesh = int(model.geom_dataid[geom])
-    first = int(model.mesh_vertadr[mesh])
-    vertices: FloatArray = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
-    return vertices
+def _meshes(
+    model: Any, geoms: Sequence[int]
+) -> tuple["MeshLibrary | None", dict[int, tuple[int, float]], frozenset[int]]:
+    """The library, (mesh index, volume error) of each geom that has a mesh, and the geoms that have none."""
+    candidates = [geom for geom in geoms if int(model.geom_type[geom]) in _MESHES]
+    if not candidates:
+        return None, {}, frozenset(geoms)
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.simulation.geom_meshes import GeomMeshes  # noqa: PLC0415
+
+    shapes = GeomMeshes(model)
+    found = {geom: shape for geom in candidates if (shape := shapes.add(geom)) is not None}
+    return shapes.library(), found, frozenset(geoms) - found.keys()
 
 
 def _columns(pairs: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:

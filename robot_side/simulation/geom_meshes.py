@@ -1,0 +1,106 @@
+"""Closed meshes for the geoms that no simpler primitive describes, prepared once when a scene is loaded.
+
+Only a scene that needs them imports this module, and so compiles the mesh kernels.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from robot_side.overlap.closed_surface import signed_volume
+from robot_side.overlap.mesh import Mesh
+from robot_side.overlap.mesh_library import MeshLibrary
+from robot_side.overlap.mesh_shapes import (
+    ShapeMesh,
+    capsule_mesh,
+    convex_hull_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+)
+from robot_side.simulation.mesh_arrays import mesh_triangles, mesh_vertices
+from robot_side.simulation.model_enums import GeomKind
+
+_LARGEST_VOLUME_ERROR = 0.01
+"""The share by which a mesh around a round shape is larger, at most."""
+_LEAST_SEGMENTS = 8
+_LEAST_SUBDIVISIONS = 4
+
+
+@dataclass(frozen=True)
+class GeomMesh:
+    """A mesh in the frame of the geoms that have this shape."""
+
+    mesh: Mesh
+    volume_error: float
+    """The share of the shape's volume by which the mesh's is greater; infinite where the shape encloses none."""
+
+
+class GeomMeshes:
+    """The meshes of a model's geoms; geoms of the same shape share one."""
+
+    def __init__(self, model: Any) -> None:
+        """For the geoms of a compiled MuJoCo model."""
+        self._model = model
+        self._shapes: dict[tuple[Any, ...], tuple[int, GeomMesh] | None] = {}
+
+    def add(self, geom: int) -> tuple[int, float] | None:
+        """The index into `library` of the geom's mesh and its volume error; None where no mesh can be made.
+
+        A round shape gets a mesh around it. A mesh geom is itself where its surface is closed and each part of it is
+        oriented consistently, else its convex hull, as it is in the simulation's contacts.
+        """
+        kind = GeomKind(self._model.geom_type[geom])
+        size = tuple(self._model.geom_size[geom].tolist())
+        key = (kind, int(self._model.geom_dataid[geom])) if kind is GeomKind.MESH else (kind, *size)
+        if key not in self._shapes:
+            made = _mesh_geom(self._model, geom) if kind is GeomKind.MESH else _round_geom(kind, size)
+            count = sum(shape is not None for shape in self._shapes.values())
+            self._shapes[key] = None if made is None else (count, made)
+        shape = self._shapes[key]
+        return None if shape is None else (shape[0], shape[1].volume_error)
+
+    def library(self) -> MeshLibrary | None:
+        """All the meshes so far; None for none."""
+        meshes = [shape[1].mesh for shape in self._shapes.values() if shape is not None]
+        return MeshLibrary(meshes) if meshes else None
+
+
+def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
+    """The coarsest mesh around the shape that is large enough by no more than it may be."""
+    finenesses = itertools.count(_LEAST_SEGMENTS if kind is GeomKind.CYLINDER else _LEAST_SUBDIVISIONS)
+    for fineness in finenesses:
+        if (made := _around(kind, size, fineness)) is None:
+            return None
+        vertices, triangles, excess = made
+        if excess <= _LARGEST_VOLUME_ERROR:
+            return GeomMesh(Mesh(vertices, triangles), excess)
+    return None
+
+
+def _around(kind: GeomKind, size: tuple[float, ...], fineness: int) -> ShapeMesh | None:
+    match kind:
+        case GeomKind.CYLINDER:
+            return cylinder_mesh(size[0], size[1], fineness)
+        case GeomKind.CAPSULE:
+            return capsule_mesh(size[0], size[1], fineness)
+        case GeomKind.ELLIPSOID:
+            return ellipsoid_mesh(size, fineness)
+        case _:
+            return None
+
+
+def _mesh_geom(model: Any, geom: int) -> GeomMesh | None:
+    vertices, triangles = mesh_vertices(model, geom), mesh_triangles(model, geom)
+    if signed_volume(vertices[triangles]) < 0.0:
+        triangles = triangles[:, ::-1]
+    try:
+        return GeomMesh(Mesh(vertices, triangles), 0.0)
+    except ValueError:
+        pass
+    try:
+        hull, hull_triangles, _ = convex_hull_mesh(vertices)
+        return GeomMesh(Mesh(hull, hull_triangles), math.inf)
+    except ValueError:
+        # All in one plane.
+        return None
