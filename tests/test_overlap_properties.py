@@ -20,6 +20,9 @@ radii = st.floats(0.0, 5.0) | st.integers(0, 5).map(float) | st.integers(0, 40).
 half_sizes = arrays.arrays(np.float64, 3, elements=st.floats(0.0, 3.0) | st.integers(0, 3).map(float))
 seeds = st.integers(0, 2**32 - 1)
 
+SUBNORMAL = 1e-300
+"""Smaller volumes (m³) lose digits, or come of products that did: they are near the least doubles."""
+
 SIZE = 16.0
 """The largest distance (m) between any two of these points, generously."""
 
@@ -54,7 +57,7 @@ def test_a_box_bounds_its_overlap(
 ) -> None:
     volume, gradient, area = sphere_box(center, radius, box, rotation(seed), half, gradient=True)
     assert 0.0 <= volume <= 4.0 / 3.0 * np.pi * radius**3 * (1.0 + 1e-15)
-    assert volume <= 8.0 * half.prod() * (1.0 + 1e-14)
+    assert volume <= 8.0 * half.prod() * (1.0 + 1e-14) + SUBNORMAL
     assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
     assert np.linalg.norm(gradient) <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
 

@@ -19,7 +19,7 @@ from robot_side.overlap.double_double_vectors import (
     precise_cross,
     precise_dot,
 )
-from robot_side.overlap.solid import Overlap
+from robot_side.overlap.solid import Overlap, nothing
 from robot_side.overlap.vectors import Vector, add, norm, scale
 
 SHARP_CORNER = 4e-4
@@ -74,6 +74,8 @@ def corner_overlap(
     for axis in range(3):
         sharpness = max(sharpness, lengths[axis] / outward[axis] if outward[axis] > 0.0 else math.inf)
     determinant = abs(precise_dot(first, precise_cross(second, third))[0])
+    if determinant == 0.0:
+        return nothing(), math.inf
     tetrahedron = lengths[0] * lengths[1] * lengths[2] * determinant / 6.0
     arms = scale(lengths[0], highs(first)), scale(lengths[1], highs(second)), scale(lengths[2], highs(third))
     volume, area, push = 0.0, 0.0, (0.0, 0.0, 0.0)
@@ -112,6 +114,8 @@ def edge_overlap(
     least = min(outward[0], outward[1])
     sharpness = half_chord / least if least > 0.0 else math.inf
     sine = norm(highs(precise_cross(first, second)))
+    if sine == 0.0:
+        return nothing(), math.inf
     volume, area, push = 0.0, 0.0, (0.0, 0.0, 0.0)
     for slice_number in range(ALONG_WEIGHTS.size):
         node = ALONG_NODES[slice_number]

@@ -66,39 +66,38 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
     reached, number = screened(features, solid, radius)
-    final, most, summed = False, 0.0, nothing()
-    sharpest = SHARP_CORNER if reached == CORNER else SHARP_EDGE
-    if reached == ANYTHING:
-        measure_all(features, solid, radius)
-    else:
+    if reached != ANYTHING:
         _measure_lone(features, solid, radius, reached, number)
-    while True:
-        overlap, sharpness = _local_form(features, solid, radius, reached, number)
-        if final:
-            return _below_noise(overlap, summed, most, radius)
-        if sharpness < sharpest:
-            return bounded(overlap, radius, solid_volume)
-        if reached != ANYTHING:
-            measure_all(features, solid, radius)
-        farthest, inside = 0.0, 0
-        for corner in range(CORNERS[solid]):
-            farthest = max(farthest, features[LENGTHS + corner, 0, 0])
-            inside += 1 if features[POWERS + corner, 0, 0] >= 0.0 else 0
-        if inside == CORNERS[solid]:
-            return whole_solid(solid_volume)
-        summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
-        most = NOISE * radius * radius * max(radius, farthest)
-        if summed[0] > most:
-            return summed
-        most = min(most, solid_volume)
-        reached, number = _deepest(features, solid)
-        final = True
+        alone, sharpness = _local_form(features, solid, radius, reached, number)
+        if sharpness < (SHARP_CORNER if reached == CORNER else SHARP_EDGE):
+            return bounded(alone, radius, solid_volume)
+    measure_all(features, solid, radius)
+    farthest, inside = 0.0, 0
+    for corner in range(CORNERS[solid]):
+        farthest = max(farthest, features[LENGTHS + corner, 0, 0])
+        inside += 1 if features[POWERS + corner, 0, 0] >= 0.0 else 0
+    if inside == CORNERS[solid]:
+        return whole_solid(solid_volume)
+    summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
+    noise = NOISE * radius * radius * max(radius, farthest)
+    if summed[0] > noise:
+        return summed
+    most = min(noise, solid_volume)
+    reached, number = _deepest(features, solid)
+    local, _ = _local_form(features, solid, radius, reached, number)
+    # A corner or edge within the ball has some volume there, if too thin for its faces to be told apart.
+    thin = most if reached in (CORNER, EDGE) else 0.0
+    return _below_noise(local, summed, most, thin, radius)
 
 
 @inlined
-def _below_noise(local: Overlap, summed: Overlap, most: float, radius: float) -> Overlap:
-    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not."""
+def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radius: float) -> Overlap:
+    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not.
+
+    The volume is at most `most`, and `thin` where the form has none.
+    """
     volume, gradient, area = local
+    volume = thin if volume == 0.0 else volume
     if volume == 0.0:
         return nothing()
     most_area = NOISE * radius * radius
@@ -108,7 +107,7 @@ def _below_noise(local: Overlap, summed: Overlap, most: float, radius: float) ->
     return min(volume, most), scale(share, gradient), share * area
 
 
-@inlined
+@building_block
 def _local_form(
     features: FloatArray, solid: np.int64, radius: float, reached: int, number: int
 ) -> tuple[Overlap, float]:
