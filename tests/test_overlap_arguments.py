@@ -101,7 +101,7 @@ def test_numbers_that_are_not_finite_or_too_large_are_refused(kind: str, name: s
 def test_negative_lengths_are_refused(kind: str, name: str) -> None:
     value = CALLS[kind][1][name].copy()
     value[-1] = -0.25
-    with pytest.raises(ValueError, match=rf"^{name}\[1.*\] = -0\.25 is out of range; valid: 0 to 1e\+50 m$"):
+    with pytest.raises(ValueError, match=rf"^{name}\[1.*\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"):
         changed(kind, name, value)()
 
 

@@ -57,6 +57,11 @@ class Pairs:
             tuple(np.concatenate(arrays) for arrays in zip(*(part.parameters for part in parts), strict=True)),
         )
 
+    def in_single_precision(self) -> "Pairs":
+        """The same pairs, each number rounded to the nearest float32."""
+        rounded = [array.astype(np.float32).astype(float) for array in self.arguments]
+        return Pairs(self.solid, rounded[0], rounded[1], tuple(rounded[2:]))
+
     @property
     def arguments(self) -> tuple[FloatArray, ...]:
         """The arguments of the public function, and of the kernel."""
