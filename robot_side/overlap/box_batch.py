@@ -25,7 +25,8 @@ from robot_side.overlap.lanes import (
     column,
     copy_lane,
     lane_groups,
-    load_columns,
+    load_rows,
+    load_vectors,
     scatter,
     store_result,
     vector_column,
@@ -121,14 +122,11 @@ def _load(
     count: int,
     block: FloatArray,
 ) -> None:
-    flat_centers, flat_places, flat_halves = centers.reshape(-1), box_centers.reshape(-1), box_half_sizes.reshape(-1)
-    flat_rotations = box_rotations.reshape(-1)
-    for lane in range(count):
-        load_columns(flat_centers, first + lane, 3, block, _CENTER, lane)
-        load_columns(radii, first + lane, 1, block, _RADIUS, lane)
-        load_columns(flat_places, first + lane, 3, block, _BOX_CENTER, lane)
-        load_columns(flat_rotations, first + lane, 9, block, _ROTATION, lane)
-        load_columns(flat_halves, first + lane, 3, block, _HALF_SIZES, lane)
+    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(radii, first, count, 1, block, _RADIUS)
+    load_vectors(box_centers.reshape(-1), first, count, block, _BOX_CENTER)
+    load_rows(box_rotations.reshape(-1), first, count, 9, block, _ROTATION)
+    load_vectors(box_half_sizes.reshape(-1), first, count, block, _HALF_SIZES)
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, _INPUTS)
 

@@ -9,6 +9,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.overlap.compile import inlined
 from robot_side.overlap.solid import Overlap
+from robot_side.overlap.transpose import transpose_four, transpose_three
 from robot_side.overlap.vectors import Vector
 
 LANES = 64
@@ -63,10 +64,31 @@ def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, siz
 
 
 @inlined
-def load_columns(rows: FloatArray, row: int, width: int, lanes: FloatArray, index: int, lane: int) -> None:
-    """Copy `row` of an array of `width` numbers a row, given flat, to the columns of `lane` from `index`."""
-    for number in range(width):
-        lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64(row * width + number)]
+def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: FloatArray, index: int) -> None:
+    """Put `count` rows of `width` numbers from the row `first`, given flat, into the columns from `index`."""
+    if count == LANES:
+        # A number of lanes that is known when compiling, and vector instructions.
+        for lane in range(0, LANES, 4):
+            for part in range(width // 4):
+                start, end = (first + lane) * width + 4 * part, (index + 4 * part) * LANES + lane
+                transpose_four(rows, start, width, lanes, end, LANES)
+        for number in range(width // 4 * 4, width):
+            for lane in range(LANES):
+                lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]
+    else:
+        for lane in range(count):
+            for number in range(width):
+                lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]
+
+
+@inlined
+def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, index: int) -> None:
+    """`load_rows` for rows of three numbers."""
+    if count == LANES:
+        for lane in range(0, LANES, 4):
+            transpose_three(rows, 3 * (first + lane), lanes, index * LANES + lane, LANES)
+    else:
+        load_rows(rows, first, count, 3, lanes, index)
 
 
 @inlined

@@ -25,7 +25,8 @@ from robot_side.overlap.lanes import (
     column,
     copy_lane,
     lane_groups,
-    load_columns,
+    load_rows,
+    load_vectors,
     scatter,
     store_result,
     vector_column,
@@ -81,6 +82,8 @@ def overlap_tetrahedra(
         left = _bound_by_corners(block, lane_groups(count))
         if left == 0:
             continue
+        if left % SOME_PARTIAL > 0:
+            left = _measure_within(block, lane_groups(count))
         if left >= SOME_PARTIAL:
             _bound_by_planes(block, lane_groups(count))
         for lane in range(count):
@@ -115,11 +118,9 @@ def overlap_tetrahedra(
 def _load(
     centers: FloatArray, radii: FloatArray, vertices: FloatArray, first: int, count: int, block: FloatArray
 ) -> None:
-    flat_centers, flat_vertices = centers.reshape(-1), vertices.reshape(-1)
-    for lane in range(count):
-        load_columns(flat_centers, first + lane, 3, block, _CENTER, lane)
-        load_columns(radii, first + lane, 1, block, _RADIUS, lane)
-        load_columns(flat_vertices, first + lane, 12, block, _CORNERS, lane)
+    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(radii, first, count, 1, block, _RADIUS)
+    load_rows(vertices.reshape(-1), first, count, 12, block, _CORNERS)
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, _INPUTS)
 
@@ -136,7 +137,7 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
 
 @building_block
 def _bound_by_corners(block: FloatArray, groups: int) -> int:
-    """Fill in what the corners and their bounding box tell, and the tetrahedra's volumes; the sum of the weights."""
+    """Fill in what the corners and their bounding box tell; the sum of the weights."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -149,13 +150,26 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
         )
         farthest_2 = max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
         away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
+        verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
+        verdict = NOTHING if away else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+    return total
+
+
+@building_block
+def _measure_within(block: FloatArray, groups: int) -> int:
+    """Fill in the volumes of the tetrahedra, for those within the sphere; the sum of the weights."""
+    total = 0
+    for lane in range(groups * WIDTH):
+        first, second, third, fourth = _corners(block, lane)
         ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
         volume_6 = dot(ab, cross(ac, ad))
         longest_2 = max(dot(ab, ab), dot(ac, ac), dot(ad, ad))
         # The volume of a flatter one would lose digits here.
-        solid = volume_6 * volume_6 > 1e-14 * (longest_2 * longest_2 * longest_2)
-        verdict = WHOLE_SOLID if (farthest_2 * _SURE <= radius_2) & solid else PARTIAL
-        verdict = NOTHING if away else verdict
+        flat = volume_6 * volume_6 <= 1e-14 * (longest_2 * longest_2 * longest_2)
+        verdict = column(block, _BOUNDS, lane)
+        verdict = PARTIAL if (verdict == WHOLE_SOLID) & flat else verdict
         total += weight(verdict)
         block[np.uint64(_BOUNDS * LANES + lane)] = verdict
         block[np.uint64(_SOLID_VOLUME * LANES + lane)] = abs(volume_6) / 6.0

@@ -1,0 +1,92 @@
+"""Rows of numbers to columns in vector instructions, four rows at a time; in kernels only.
+
+LLVM copies a loop that does this number by number: gathering the pairs' arrays would cost as much as their bounds.
+"""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numba
+import numba.extending
+from llvmlite import ir
+
+from common.arrays import FloatArray
+
+_INDEX = ir.IntType(64)
+_FOUR = ir.VectorType(ir.DoubleType(), 4)
+_DOUBLE_BYTES = 8
+
+
+def _transpose_four(_typing: Any, rows: Any, _start: Any, _width: Any, columns: Any, _end: Any, _apart: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source, start, width, target, end, apart = arguments
+        read, write = _access(context, builder, signature.args[0], source, signature.args[3], target)
+        first, second, third, fourth = (read(_plus(builder, start, width, row)) for row in range(4))
+        even_low, odd_low = _pick(builder, first, second, 0, 4, 2, 6), _pick(builder, first, second, 1, 5, 3, 7)
+        even_high, odd_high = _pick(builder, third, fourth, 0, 4, 2, 6), _pick(builder, third, fourth, 1, 5, 3, 7)
+        write(_plus(builder, end, apart, 0), _pick(builder, even_low, even_high, 0, 1, 4, 5))
+        write(_plus(builder, end, apart, 1), _pick(builder, odd_low, odd_high, 0, 1, 4, 5))
+        write(_plus(builder, end, apart, 2), _pick(builder, even_low, even_high, 2, 3, 6, 7))
+        write(_plus(builder, end, apart, 3), _pick(builder, odd_low, odd_high, 2, 3, 6, 7))
+        return context.get_dummy_value()
+
+    index = numba.types.int64
+    return numba.types.void(rows, index, index, columns, index, index), generate
+
+
+def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: Any, _apart: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source, start, target, end, apart = arguments
+        read, write = _access(context, builder, signature.args[0], source, signature.args[2], target)
+        # x0 y0 z0 x1, y1 z1 x2 y2, z2 x3 y3 z3
+        first, second, third = (read(builder.add(start, _INDEX(4 * part))) for part in range(3))
+        picks = ((0, 3, 6, 6), (0, 1, 2, 5)), ((1, 4, 7, 7), (0, 1, 2, 6)), ((2, 5, 5, 5), (0, 1, 4, 7))
+        for number, (low, high) in enumerate(picks):
+            column = _pick(builder, _pick(builder, first, second, *low), third, *high)
+            write(_plus(builder, end, apart, number), column)
+        return context.get_dummy_value()
+
+    index = numba.types.int64
+    return numba.types.void(rows, index, columns, index, index), generate
+
+
+transpose_four: Callable[[FloatArray, int, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
+    _transpose_four
+)
+"""(rows, start, width, columns, end, apart): four numbers from `start` of each of four rows, `width` numbers apart in
+`rows`, to four numbers from `end` of each of four columns, `apart` numbers apart in `columns`. Both are flat."""
+
+transpose_three: Callable[[FloatArray, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
+    _transpose_three
+)
+"""(rows, start, columns, end, apart): the same for three numbers of each of four rows of just three."""
+
+
+def _access(context: Any, builder: Any, source_type: Any, source: Any, target_type: Any, target: Any) -> Any:
+    """Functions that read four numbers from an index of `source`, and write four to one of `target`."""
+    pointers = [
+        context.make_array(kind)(context, builder, array).data
+        for kind, array in ((source_type, source), (target_type, target))
+    ]
+
+    def at(pointer: Any, index: Any) -> Any:
+        return builder.bitcast(builder.gep(pointer, [index]), _FOUR.as_pointer())
+
+    def read(index: Any) -> Any:
+        numbers = builder.load(at(pointers[0], index))
+        numbers.align = _DOUBLE_BYTES
+        return numbers
+
+    def write(index: Any, numbers: Any) -> None:
+        builder.store(numbers, at(pointers[1], index)).align = _DOUBLE_BYTES
+
+    return read, write
+
+
+def _plus(builder: Any, start: Any, step: Any, count: int) -> Any:
+    return builder.add(start, builder.mul(step, _INDEX(count)))
+
+
+def _pick(builder: Any, first: Any, second: Any, *numbers: int) -> Any:
+    """Four of the numbers of two vectors, counted through both."""
+    return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), 4), numbers))
