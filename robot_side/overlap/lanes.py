@@ -6,7 +6,7 @@ can tell them apart and turn a loop over lanes into vector instructions.
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import inlined
 from robot_side.overlap.solid import Overlap
 from robot_side.overlap.transpose import transpose_four, transpose_three
@@ -100,14 +100,29 @@ def copy_lane(lanes: FloatArray, lane: int, target: FloatArray, target_lane: int
 
 @inlined
 def scatter(
-    lanes: FloatArray, index: int, lane: int, pair: int, volumes: FloatArray, gradients: FloatArray, areas: FloatArray
-) -> None:
-    """Write the result of `lane`, in the columns from `index`, to row `pair` of the results."""
-    volumes[pair] = lanes[np.uint64(index * LANES + lane)]
-    gradients[pair, 0] = lanes[np.uint64((index + 1) * LANES + lane)]
-    gradients[pair, 1] = lanes[np.uint64((index + 2) * LANES + lane)]
-    gradients[pair, 2] = lanes[np.uint64((index + 3) * LANES + lane)]
-    areas[pair] = lanes[np.uint64((index + 4) * LANES + lane)]
+    lanes: FloatArray,
+    index: int,
+    pairs: IntArray,
+    count: int,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+    rows: IntArray,
+    unsettled: int,
+) -> int:
+    """Write the results of `count` lanes, in the columns from `index`, to the rows `pairs` (LANES,) of the results.
+
+    `rows` holds `unsettled` pairs that need precise forms; those of these lanes are added. How many there are then.
+    """
+    for lane in range(count):
+        pair = pairs[lane]
+        volumes[pair] = column(lanes, index, lane)
+        gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = vector_column(lanes, index + 1, lane)
+        areas[pair] = column(lanes, index + 4, lane)
+        if column(lanes, index + 5, lane) != 0.0:
+            rows[unsettled] = pair
+            unsettled += 1
+    return unsettled
 
 
 @inlined

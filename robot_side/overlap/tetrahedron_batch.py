@@ -98,7 +98,7 @@ def overlap_tetrahedra(
                 if waiting_count == LANES:
                     _work_out(waiting, LANES // WIDTH)
                     partial += LANES
-                    unsettled = _write(waiting, pairs, LANES, volumes, gradients, areas, rows, unsettled)
+                    unsettled = scatter(waiting, _RESULT, pairs, LANES, volumes, gradients, areas, rows, unsettled)
                     waiting_count = 0
             elif verdict == WHOLE_SOLID:
                 volumes[pair] = column(block, _SOLID_VOLUME, lane)
@@ -109,7 +109,7 @@ def overlap_tetrahedra(
             copy_lane(waiting, 0, waiting, lane, _INPUTS)
         _work_out(waiting, lane_groups(waiting_count))
         partial += waiting_count
-        unsettled = _write(waiting, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
+        unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
     rows[total] = partial
     return unsettled
 
@@ -230,22 +230,3 @@ def _work_out(block: FloatArray, groups: int) -> None:
         center = scale(shrink, vector_column(block, _CENTER, lane))
         overlap, unsettled = tetrahedron_lane(center, shrink * radius, corners)
         store_result(block, _RESULT, lane, overlap, size, unsettled)
-
-
-@inlined
-def _write(
-    block: FloatArray,
-    pairs: IntArray,
-    count: int,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    areas: FloatArray,
-    rows: IntArray,
-    unsettled: int,
-) -> int:
-    for lane in range(count):
-        scatter(block, _RESULT, lane, pairs[lane], volumes, gradients, areas)
-        if column(block, _RESULT + 5, lane) != 0.0:
-            rows[unsettled] = pairs[lane]
-            unsettled += 1
-    return unsettled
