@@ -135,6 +135,18 @@ def _offset(rng: Rng) -> Tetrahedra:
     return centers + shift[:, 0], radii, vertices + shift
 
 
+def _sliver(ratio: float, thickness: float) -> Callable[[Rng], Tetrahedra]:
+    """Spheres of `ratio` at tetrahedra of `thickness`, whose faces and edges are much longer than they are apart."""
+
+    def make(rng: Rng) -> Tetrahedra:
+        vertices = _vertices(rng) * np.array([1.0, 1.0, thickness])
+        weights = rng.dirichlet(np.full(4, 0.4), CASES)
+        radii = ratio * _radii(rng)
+        return _near(rng, np.einsum("nv,nvi->ni", weights, vertices), radii, 0.0, 1.0), radii, vertices
+
+    return make
+
+
 TETRAHEDRA: dict[str, Callable[[Rng], Tetrahedra]] = {
     "random": _random,
     "binary": _binary,
@@ -150,6 +162,7 @@ TETRAHEDRA: dict[str, Callable[[Rng], Tetrahedra]] = {
     **{f"needle {t:g}": _needle(t, 1) for t in (1e-3, 1e-8, 1e-14)},
     **{f"spike {t:g}": _needle(t, 3) for t in (1e-3, 1e-8, 1e-14)},
     **{f"R/L {r:g} on {p}": _sized(r, p) for r in (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3) for p in (1, 2, 3)},
+    **{f"R/L {r:g}, {t:g} thick": _sliver(r, t) for r in (1e-6, 1e-4, 1e-2, 0.1) for t in (1.0, 0.1, 1e-2, 1e-4)},
     "offset 1e6": _offset,
 }
 

@@ -3,6 +3,7 @@
 Errors are fractions of the sphere's volume, great circle and surface.
 """
 
+import itertools
 import zlib
 from collections.abc import Sequence
 
@@ -51,6 +52,40 @@ def test_tetrahedra_match_the_reference(name: str) -> None:
     truth = [solid.overlap(*sphere) for solid, *sphere in zip(solids, centers, radii, strict=True)]
     assert_accurate(results, radii, truth)
     assert any(true.volume > 0 for true in truth)
+
+
+@pytest.mark.parametrize(
+    ("center", "radius", "vertices"),
+    [
+        (
+            [-0.25162593747458606, 0.4360392579414266, 0.3748546912138514],
+            0.0008322727699515414,
+            [
+                [-1.3035029078083071, 1.933292742911719, 0.23180023576275277],
+                [-0.02926608529093122, 1.0875151961339506, 0.8913138044451872],
+                [0.7362529514292786, -0.9824995371313381, 0.526547168916321],
+                [-0.1575054867104039, 0.30622125493623675, 0.38297093455855563],
+            ],
+        ),
+        (
+            [-0.00014874421643229507, 4.71115961800582e-05, -0.00016674427542140438],
+            1.1289077467688542e-09,
+            [
+                [-0.00016436731854130047, 5.4036318961108714e-06, 0.00012591179473741212],
+                [-0.00014897741349158245, 6.56821283373545e-05, -0.0002129618978727887],
+                [-0.0001506379344936611, 5.917827341658696e-05, -0.00017639872178558314],
+                [-8.697844529079273e-05, -0.0002853888388953899, -1.2812856245987086e-05],
+            ],
+        ),
+    ],
+)
+def test_slivers_match_the_reference_however_their_vertices_are_numbered(
+    center: list[float], radius: float, vertices: list[list[float]]
+) -> None:
+    orders = np.array([np.array(vertices)[list(order)] for order in itertools.permutations(range(4))])
+    results = sphere_tetrahedron(np.array(center), radius, orders, gradient=True)
+    truth = Polyhedron.tetrahedron(np.array(vertices)).overlap(np.array(center), radius)
+    assert_accurate(results, np.full(24, radius), [truth] * 24)
 
 
 @pytest.mark.parametrize("name", BOXES)

@@ -1,6 +1,9 @@
 """Blocks, lanes and threads: how pairs are grouped changes nothing about their results."""
 
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -131,3 +134,22 @@ def test_a_repeated_corner_has_no_volume() -> None:
         for scale in (1.0, 10.0):
             for result in kernels.tetrahedron_pairs(centers, scale * radii, flat):
                 assert not result.any()
+
+
+def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
+    program = (
+        "import multiprocessing, numpy as np\n"
+        "from robot_side.overlap import sphere_sphere, sphere_tetrahedron\n"
+        "def total(_): return float(sphere_tetrahedron(np.zeros((20000, 3)), 1.0, np.eye(4, 3)).sum())\n"
+        "expected = total(None)\n"
+        "pool = multiprocessing.get_context('fork').Pool(1)\n"
+        "assert pool.map_async(total, [0]).get(60.0) == [expected]\n"
+        "pool.terminate()\n"
+        "import atexit\n"
+        "atexit.register(lambda: print('the same' if total(None) == expected else 'another'))\n"
+    )
+    root = Path(__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=False, timeout=120.0
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("the same\n", "", 0)

@@ -41,6 +41,19 @@ def test_machine_code_is_kept_on_disk_until_any_source_changes(tmp_path: Path, m
     assert _kernel().cache_hits == 0
 
 
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("content", [b"", b"\x80\x05garbage", None])
+def test_damaged_machine_code_is_compiled_anew(
+    suffix: str, content: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    _kernel()
+    (file,) = tmp_path.rglob(f"*.{suffix}")
+    file.write_bytes(file.read_bytes()[:50] if content is None else content)
+    assert _kernel().cache_hits == 0
+    assert _kernel().cache_hits == 1
+
+
 def test_a_kernel_works_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_place(_: object) -> None:
         raise RuntimeError("cannot cache function: no locator available")

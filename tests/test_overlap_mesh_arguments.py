@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_side.overlap import Mesh, sphere_mesh
+from robot_side.overlap import Mesh, MeshLibrary, sphere_mesh
 from tests.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -39,6 +39,12 @@ def two(shift: float, size: float) -> npt.NDArray[np.float64]:
         (TETRAHEDRON, TETRAHEDRON_TRIANGLES[:, ::-1], "triangles[0] and those connected with it enclose -0.167 m³"),
         (TETRAHEDRON, [[0, 1, 2], [2, 1, 0]], "triangles enclose 0 m³"),
         (TETRAHEDRON, [[0, 0, 1]], "triangles all have a corner twice"),
+        (np.empty((0, 3)), TETRAHEDRON_TRIANGLES, "vertices is empty"),
+        (
+            TETRAHEDRON,
+            np.concatenate([TETRAHEDRON_TRIANGLES, np.roll(TETRAHEDRON_TRIANGLES, 1, axis=1)]),
+            "triangles[4] is triangles[0] again, the same way round",
+        ),
         (two(5.0, 1.0), CUBE_AND_HOLE, "triangles[12] and those connected with it enclose -8 m³"),
         (two(0.0, 0.5), TWO_CUBES, "triangles[12] and those connected with it lie within another part"),
     ],
@@ -111,3 +117,22 @@ def test_sizes_of_every_magnitude(size: float) -> None:
             results = mesh.overlap(center - [0.1 * size, 0.0, 0.0], size * ratio, gradient=True)
         assert all(np.isfinite(result).all() for result in results)
         assert 0.0 <= results[0] <= mesh.volume_m3
+
+
+def test_parts_are_told_apart_however_many() -> None:
+    places = 3.0 * np.array(list(np.ndindex(6, 6, 6)), dtype=float)
+    vertices = (CUBE_CORNERS + places[:, None]).reshape(-1, 3)
+    triangles = (CUBE_TRIANGLES + 8 * np.arange(len(places))[:, None, None]).reshape(-1, 3)
+    assert Mesh(vertices, triangles).volume_m3 == pytest.approx(8.0 * len(places))
+    inner = np.concatenate([vertices, CUBE_CORNERS / 4.0]), CUBE_TRIANGLES + len(vertices)
+    with pytest.raises(ValueError, match="lie within another part"):
+        Mesh(inner[0], np.concatenate([triangles, inner[1]]))
+    hollow = Mesh(inner[0], np.concatenate([triangles, inner[1][:, ::-1]]))
+    assert hollow.volume_m3 == pytest.approx(8.0 * len(places) - 8.0 / 64.0)
+
+
+def test_a_meshes_tables_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        Mesh(TETRAHEDRON, TETRAHEDRON_TRIANGLES).tables.triangles[0, 0] = 5.0
+    with pytest.raises(ValueError, match=re.escape("meshes[0] is a NoneType")):
+        MeshLibrary([None])  # type: ignore[list-item]

@@ -190,13 +190,15 @@ def test_a_box_as_a_mesh_is_the_box(tmp_path: Path) -> None:
     np.testing.assert_allclose(of_mesh, of_box, atol=1e-6 * 4.0 / 3.0 * math.pi * 0.05**3)
 
 
-@pytest.mark.parametrize("change", ["open", "one triangle turned", "inward"])
+@pytest.mark.parametrize("change", ["open", "one triangle turned", "each triangle twice", "inward"])
 def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_path: Path) -> None:
     vertices, triangles = cup()
     if change == "open":
         triangles = triangles[1:]
     elif change == "one triangle turned":
         triangles = np.concatenate([triangles[:1, ::-1], triangles[1:]])
+    elif change == "each triangle twice":
+        triangles = np.concatenate([triangles, triangles])
     else:
         triangles = triangles[:, ::-1]
     scene = scene_with(
@@ -215,6 +217,20 @@ def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_pa
         assert mouth == pytest.approx(4.0 / 3.0 * math.pi * 0.01**3)
         around = overlap_of(objects, "cup", placed(scene, np.zeros((1, 3)), "cup"), 0.2)[0]
         assert around == pytest.approx((3.0 * CELL_M) ** 3, rel=1e-6)
+
+
+def test_an_open_mesh_of_four_vertices_is_no_tetrahedron(tmp_path: Path) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    scene = scene_with(
+        tmp_path, '<geom name="shard" type="mesh" mesh="m" pos="1 0 0"/>', mesh_asset("m", corners, faces)
+    )
+    assert scene.volume_errors == {"shard": math.inf}
+
+
+def test_a_capsule_too_thin_for_a_mesh_stands_for_its_bounding_box(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, '<geom name="thread" type="capsule" size="1e-12 1" pos="1 0 0"/>')
+    assert scene.volume_errors == {"thread": math.inf}
 
 
 def test_what_no_mesh_describes_stands_for_its_bounding_box(tmp_path: Path) -> None:

@@ -143,6 +143,21 @@ def _flat(thickness: float) -> Maker:
     return make
 
 
+def _sliver(ratio: float) -> Maker:
+    """Small spheres at slivers: tetrahedra with faces and edges that are much longer than they are apart."""
+
+    def make(rng: Rng, count: int, grid: bool) -> Pairs:
+        thin = 2.0 ** -rng.integers(0, 14, count)
+        vertices = points(rng, count, 4, grid=grid)
+        vertices[:, :, 2] *= thin[:, None]
+        shares = np.array([0.5, 0.25, 0.25, 0.0]) if grid else rng.dirichlet(np.full(4, 0.4), count)[:, :, None]
+        middle = np.tensordot(shares, vertices, (0, 1)) if grid else (shares * vertices).sum(axis=1)
+        sizes = ratio * radii(rng, count, grid=grid)
+        return _tetrahedron(middle + 0.5 * sizes[:, None] * points(rng, count, grid=grid), sizes, vertices)
+
+    return make
+
+
 def _needle(thickness: float) -> Maker:
     """All vertices within `thickness` of a line."""
 
@@ -253,6 +268,7 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "without volume": _without_volume,
         **{f"flat {name}": _flat(thickness) for name, thickness in THIN.items()},
         **{f"needle {name}": _needle(thickness) for name, thickness in THIN.items()},
+        **{f"R/L {name}, sliver": _sliver(RATIOS[name]) for name in ("1e-1", "1e-2", "1e-4", "1e-6")},
         "offset 1e6": _shifted(_random_tetrahedra),
         **_features("tetrahedron"),
     },

@@ -98,7 +98,7 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
     nearest_2 = max(dot(reference, reference), depth * depth)
     farthest = max(abs(middle[0]), abs(middle[1]), abs(middle[2]))
     extent = 2.0 * max(half[0], half[1], half[2])
-    return settle(overlap, radius, volume, nearest_2, lowest, 0.0, farthest, extent)
+    return settle(overlap, radius, volume, nearest_2, lowest, 0.0, farthest, extent, False)
 
 
 @inlined

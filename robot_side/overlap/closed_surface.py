@@ -1,11 +1,13 @@
 """What makes a list of triangles the surface of a solid: closed, oriented outward, its parts not in each other."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from common.arrays import BoolArray, FloatArray, IntArray
+from common.arrays import FloatArray, IntArray
 from robot_side.overlap.arguments import numbers
 
 _FLAT = 1e-14
@@ -32,6 +34,8 @@ def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
         raise ValueError(f"triangles has the shape {raw.shape}; valid: the shape (t, 3), t > 0")
     if raw.dtype.kind not in "iu":
         raise ValueError(f"triangles has the type {raw.dtype}; valid: integers, indices of vertices")
+    if vertex_count == 0:
+        raise ValueError("vertices is empty; valid: four vertices or more")
     wrong = np.argwhere((raw < 0) | (raw >= vertex_count))
     if len(wrong):
         row = int(wrong[0, 0])
@@ -81,21 +85,48 @@ def components(triangles: IntArray) -> IntArray:
     return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
 
 
+def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
+    """ValueError naming the first triangle that is there twice, the same way round: a solid laid over itself."""
+    first = triangles.argmin(axis=1)
+    rows = np.arange(len(triangles))
+    turned = np.column_stack([triangles[rows, (first + corner) % 3] for corner in range(3)])
+    _, place, count = np.unique(turned, axis=0, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    repeated = np.flatnonzero(count[place] > 1)
+    if len(repeated) == 0:
+        return
+    one, other = np.flatnonzero(place == place[repeated[0]])[:2]
+    raise ValueError(
+        f"triangles[{numbers_given[other]}] is triangles[{numbers_given[one]}] again, the same way round; "
+        "valid: each triangle once"
+    )
+
+
 def signed_volume(corners: FloatArray) -> float:
     """The volume (m³) within closed triangles `corners` (t, 3, 3), negative if they are oriented inward."""
-    a, b, c = np.moveaxis(corners - corners.reshape(-1, 3).mean(axis=0), 1, 0)
+    # In extended precision where the machine has it: the terms of a thin plate cancel.
+    a, b, c = np.moveaxis((corners - corners.reshape(-1, 3).mean(axis=0)).astype(np.longdouble), 1, 0)
     return float(np.sum(a * np.cross(b, c)) / 6.0)
 
 
 def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArray) -> None:
     """ValueError unless each part is oriented outward where the others leave space, and inward within another."""
-    for part in range(int(parts.max()) + 1):
-        own = parts == part
+    order = np.argsort(parts, kind="stable")
+    ends = np.cumsum(np.bincount(parts))
+    members = np.split(order, ends[:-1])
+    if len(members) == 1:
+        boxes = np.empty((0, 2, 3))
+    else:
+        starts = ends - np.bincount(parts)
+        lowest = np.minimum.reduceat(corners.min(axis=1)[order], starts)
+        highest = np.maximum.reduceat(corners.max(axis=1)[order], starts)
+        boxes = np.stack([lowest, highest], axis=1)
+    for part, own in enumerate(members):
         volume, size = signed_volume(corners[own]), float(np.ptp(corners[own].reshape(-1, 3), axis=0).max())
         if abs(volume) <= _FLAT * size**3:
             continue
-        first = int(numbers_given[np.flatnonzero(own)[0]])
-        around = _winding_around(corners, own)
+        first = int(numbers_given[own[0]])
+        around = _winding_around(corners, members, boxes, part)
         if volume < 0.0 and around in (0, None):
             raise ValueError(
                 f"triangles[{first}] and those connected with it enclose {volume:.3g} m³; valid: a volume above 0, "
@@ -108,13 +139,19 @@ def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArra
             )
 
 
-def _winding_around(corners: FloatArray, own: BoolArray) -> int | None:
+def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: FloatArray, part: int) -> int | None:
     """How often the other parts go round this one; None where this part touches them wherever it was tried."""
-    if own.all():
+    if len(members) == 1:
         return 0
-    candidates = corners[own].mean(axis=1)
+    candidates = corners[members[part]].mean(axis=1)
     points = candidates[np.linspace(0, len(candidates) - 1, _SAMPLES).astype(int)]
-    winding = np.array([_winding(corners[~own], point) for point in points])
+    winding = np.zeros(len(points))
+    for row, point in enumerate(points):
+        # A part goes round nothing that lies outside of its box.
+        near = np.flatnonzero((boxes[:, 0] <= point).all(axis=1) & (point <= boxes[:, 1]).all(axis=1))
+        others = [members[other] for other in near.tolist() if other != part]
+        if others:
+            winding[row] = _winding(corners[np.concatenate(others)], point)
     off = np.abs(winding - np.round(winding))
     best = int(off.argmin())
     return round(float(winding[best])) if off[best] < _CERTAIN else None

@@ -138,7 +138,11 @@ def _many(
             own = results[0][rows], results[1][rows], results[2][rows]
             return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own)
 
-        parts = list(_pool().map(part_of, ends[:-1], ends[1:]))
+        try:
+            parts = list(_pool().map(part_of, ends[:-1], ends[1:]))
+        except RuntimeError:
+            # The interpreter is ending, and starts no threads any more.
+            parts = list(map(part_of, ends[:-1], ends[1:]))
     if counts is not None:
         counts.pairs += total
         counts.early += total - sum(partial for partial, _ in parts)
@@ -160,6 +164,10 @@ def _part(
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="overlap")
+
+
+# A forked process has none of the threads, and would wait for them for ever.
+os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def _empty(count: int) -> Overlaps:

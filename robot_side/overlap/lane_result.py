@@ -19,6 +19,9 @@ FARTHEST_CORNER = 1e10
 CLEAR = 1.0 + 1e-9
 """A squared distance above the squared radius by this factor is no contact, whatever was rounded on the way."""
 
+WELL_CLEAR = 1.1
+"""The same where digits were lost."""
+
 
 @inlined
 def settle(
@@ -30,12 +33,14 @@ def settle(
     reference_2: float,
     farthest: float,
     extent: float,
+    strained: bool,
 ) -> LaneResult:
     """`overlap` within its bounds, and exact where the solid's surface does not reach the sphere.
 
     `nearest_2` is the squared distance (m²) of the surface from the sphere's centre, `lowest` the least signed
     distance (m) of the centre below the faces' planes, positive inside, `reference_2` the squared distance (m²) of the
-    reference point, `farthest` (m) that of the farthest corner, `extent` (m) the length of the longest edge.
+    reference point, `farthest` (m) that of the farthest corner, `extent` (m) the length of the longest edge; `strained`
+    means that digits were lost on the way.
     """
     # Every choice is between values that have been worked out, so that it becomes an instruction and no branch.
     volume, gradient, area = overlap
@@ -43,12 +48,13 @@ def settle(
     # Inside, it is at least the radius, and outside at most 0: rounding cannot take one for the other.
     engulfed = (lowest > 0.5 * radius) & (solid_volume > 0.0)
     uncut_volume, uncut_area = whole if engulfed else 0.0, whole_area if engulfed else 0.0
-    apart = (nearest_2 > CLEAR * (radius * radius)) | (solid_volume == 0.0)
+    clear = WELL_CLEAR if strained else CLEAR
+    apart = (nearest_2 > clear * (radius * radius)) | (solid_volume == 0.0)
     bounded_volume = min(max(volume, 0.0), whole, solid_volume)
     bounded_area = min(max(area, 0.0), whole_area)
     # The error of a solid smaller than the sphere is smaller, too.
     tiny = TINY * whole * min(extent, radius)
-    doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny)
+    doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | strained
     sane = farthest <= FARTHEST_CORNER * radius
     unsettled = 1.0 if doubtful else 0.0
     unsettled = 0.0 if apart else unsettled

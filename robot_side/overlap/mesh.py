@@ -13,6 +13,7 @@ from robot_side.overlap.closed_surface import (
     checked_vertices,
     components,
     merged,
+    require_all_different,
     require_closed,
     require_outward,
     signed_volume,
@@ -28,7 +29,8 @@ class Mesh:
     """A solid bounded by triangles, prepared once for many queries; it does not change.
 
     `vertices` (v, 3) in m, `triangles` (t, 3) indices of them, anticlockwise as seen from outside. Vertices at exactly
-    the same place count as one. Every edge must be used as often in one direction as in the other. Parts that hang
+    the same place count as one. Every edge must be used as often in one direction as in the other, no triangle be there
+    twice. Parts that hang
     together through no edge may touch but not overlap each other; one that lies inside another is a cavity and must be
     oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not found out: what they
     share then counts wrongly.
@@ -44,6 +46,7 @@ class Mesh:
         if len(kept) == 0:
             raise ValueError("triangles all have a corner twice; valid: a closed surface with a volume above 0")
         require_closed(kept, numbers_given)
+        require_all_different(kept, numbers_given)
         corners = places[kept]
         require_outward(corners, components(kept), numbers_given)
         self.volume_m3 = signed_volume(corners)

@@ -42,7 +42,7 @@ def mesh_tables(corners: FloatArray, volume: float) -> MeshTables:
     triangles[:, 9:12] = _normals(edges, lengths)
     triangles[:, 12:15] = 1.0 / lengths
     triangles[:, 15] = lengths.max(axis=1)
-    return MeshTables(
+    return _read_only(
         triangles,
         _enclosing_balls(corners, edges, lengths),
         tree.boxes,
@@ -62,7 +62,7 @@ def joined(parts: Sequence[MeshTables]) -> MeshTables:
         nodes += len(part.boxes)
         triangles += len(part.triangles)
         roots.append(nodes)
-    return MeshTables(
+    return _read_only(
         np.concatenate([part.triangles for part in parts]),
         np.concatenate([part.spheres for part in parts]),
         np.concatenate([part.boxes for part in parts]),
@@ -71,6 +71,12 @@ def joined(parts: Sequence[MeshTables]) -> MeshTables:
         np.array(roots, dtype=np.int64),
         np.concatenate([part.volumes for part in parts]),
     )
+
+
+def _read_only(*arrays: np.ndarray) -> MeshTables:
+    for array in arrays:
+        array.setflags(write=False)
+    return MeshTables(*arrays)
 
 
 def _normals(edges: FloatArray, lengths: FloatArray) -> FloatArray:

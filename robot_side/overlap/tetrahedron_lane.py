@@ -20,9 +20,15 @@ from robot_side.overlap.vectors import Vector, add, cross, dot, negative, norm, 
 Corners = tuple[Vector, Vector, Vector, Vector]
 Shares = tuple[float, float, float, float]
 
-PlacedEdge = tuple[Vector, Vector, SplitEdge, float, float]
+PlacedEdge = tuple[Vector, Vector, SplitEdge, float, float, bool]
 """(unit direction, foot of the line relative to the centre, the edge's split, its squared distance from the centre,
-its length)"""
+its length, whether the foot lost digits)"""
+
+LARGEST_CANCELLATION = 10.0
+"""A foot that came of terms so many times as large as itself, or as the radius, has lost digits."""
+
+SHARPEST_FACE = 20.0
+"""The normal of a triangle whose two shortest sides are together so many times the height has lost digits."""
 
 
 @inlined
@@ -64,6 +70,13 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     height_c = dot(reference, normal_c) + share_c * (volume_6 * per_area_c)
     height_d = dot(reference, normal_d) + share_d * (volume_6 * per_area_d)
 
+    radius_2 = radius * radius
+    strained = (
+        _is_sharp((bc, cd, bd), across_a, height_a, radius_2)
+        | _is_sharp((ad, cd, ac), across_b, height_b, radius_2)
+        | _is_sharp((ab, bd, ad), across_c, height_c, radius_2)
+        | _is_sharp((ac, bc, ab), across_d, height_d, radius_2)
+    )
     edge_ab = _edge(
         reference, ab, negative(ac), negative(ad), (share_a, share_b, share_c, share_d), norm_a, norm_b, radius
     )
@@ -77,6 +90,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     edge_bd = _edge(reference, bd, ab, negative(bc), (share_b, share_d, share_a, share_c), norm_b, norm_d, radius)
     edge_cd = _edge(reference, cd, ac, bc, (share_c, share_d, share_a, share_b), norm_c, norm_d, radius)
 
+    strained |= edge_ab[5] | edge_ac[5] | edge_ad[5] | edge_bc[5] | edge_bd[5] | edge_cd[5]
     face_a = _face((edge_bc, edge_cd, edge_bd), (1.0, 1.0, -1.0), normal_a, height_a)
     face_b = _face((edge_ad, edge_cd, edge_ac), (1.0, -1.0, -1.0), normal_b, height_b)
     face_c = _face((edge_ab, edge_bd, edge_ad), (1.0, 1.0, -1.0), normal_c, height_c)
@@ -96,8 +110,10 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
         face_c[1],
         face_d[1],
     )
-    farthest = max(norm_a, norm_b, norm_c, norm_d)
-    extent = max(edge_ab[4], edge_ac[4], edge_ad[4], edge_bc[4], edge_bd[4], edge_cd[4])
+    farthest, extent = (
+        max(norm_a, norm_b, norm_c, norm_d),
+        max(edge_ab[4], edge_ac[4], edge_ad[4], edge_bc[4], edge_bd[4], edge_cd[4]),
+    )
     disc_a, covered_a = face_areas(height_a, face_a[0], radius)
     disc_b, covered_b = face_areas(height_b, face_b[0], radius)
     disc_c, covered_c = face_areas(height_c, face_c[0], radius)
@@ -106,10 +122,12 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     push = add(
         add(scale(disc_a, normal_a), scale(disc_b, normal_b)), add(scale(disc_c, normal_c), scale(disc_d, normal_d))
     )
-    covered = covered_a + covered_b + covered_c + covered_d
     # The normals of an inverted tetrahedron point inward, which turns every sign round.
-    overlap = from_faces(sense * moment, scale(sense, push), sense * covered, radius)
-    return settle(overlap, radius, abs(volume_6) / 6.0, nearest_2, lowest, dot(reference, reference), farthest, extent)
+    overlap = from_faces(
+        sense * moment, scale(sense, push), sense * (covered_a + covered_b + covered_c + covered_d), radius
+    )
+    sizes = dot(reference, reference), farthest, extent
+    return settle(overlap, radius, abs(volume_6) / 6.0, nearest_2, lowest, *sizes, strained)
 
 
 @inlined
@@ -121,6 +139,16 @@ def _across(ab: Vector, bc: Vector, ca: Vector) -> Vector:
     return cross(
         _select(ab_longest, bc, _select(bc_longest, ca, ab)), _select(ab_longest, ca, _select(bc_longest, ab, bc))
     )
+
+
+@inlined
+def _is_sharp(edges: tuple[Vector, Vector, Vector], across: Vector, height: float, radius_2: float) -> bool:
+    """Whether a face that the sphere cuts has a normal without its last digits, and is large enough for it to show."""
+    first_2, second_2, third_2 = dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])
+    shortest_4 = min(first_2 * second_2, first_2 * third_2, second_2 * third_2)
+    cut = height * height < radius_2
+    large = shortest_4 > 36.0 * (radius_2 * radius_2)
+    return (shortest_4 > SHARPEST_FACE**2 * dot(across, across)) & cut & large
 
 
 @inlined
@@ -173,7 +201,11 @@ def _edge(
     foot_2 = dot(foot, foot)
     nearest = min(max(0.0, start), end)
     split = split_edge(start, end, start_norm, end_norm, foot_2, radius)
-    return direction, foot, split, foot_2 + nearest * nearest, length
+    terms_2 = shares[2] * shares[2] * dot(from_third, from_third) + shares[3] * shares[3] * dot(
+        from_fourth, from_fourth
+    )
+    strained = terms_2 > LARGEST_CANCELLATION**2 * max(radius * radius, foot_2)
+    return direction, foot, split, foot_2 + nearest * nearest, length, strained
 
 
 @inlined

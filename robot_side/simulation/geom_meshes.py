@@ -74,7 +74,11 @@ def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
             return None
         vertices, triangles, excess = made
         if excess <= _LARGEST_VOLUME_ERROR:
-            return GeomMesh(Mesh(vertices, triangles), excess)
+            try:
+                return GeomMesh(Mesh(vertices, triangles), excess)
+            except ValueError:
+                # So thin that its vertices fall together.
+                return None
     return None
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
 _MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH}
-"""What a mesh describes, unless it has four vertices."""
+"""What a mesh describes, unless it is a tetrahedron."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,10 @@ class ObjectPrimitives:
 
 def _primitive_kind(model: Any, geom: int) -> str | None:
     kind = int(model.geom_type[geom])
-    if kind == GeomKind.MESH and model.mesh_vertnum[model.geom_dataid[geom]] == 4:
-        return "tetrahedron"
+    if kind == GeomKind.MESH:
+        # An open surface of four vertices has no more inside than any other.
+        mesh = model.geom_dataid[geom]
+        return "tetrahedron" if model.mesh_vertnum[mesh] == 4 and model.mesh_facenum[mesh] == 4 else None
     return _EXACT.get(GeomKind(kind)) if kind in set(GeomKind) else None
 
 
