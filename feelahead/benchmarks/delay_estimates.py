@@ -150,7 +150,8 @@ def _ours(outcomes: Sequence[Outcome]) -> Table:
     )
     note = (
         "Errors in ms, of the skew in ppm. Good: within 0.5 ms from then on, in s. "
-        "What one way's floor has more than the other's and nobody told costs half of itself, whatever the estimator; the bound covers it."
+        "What one way's floor has more than the other's and nobody told costs half of itself, whatever the estimator; "
+        "the bound covers it."
     )
     return Table("Errors of both sides' estimates at the end of a run", columns, rows, note)
 
