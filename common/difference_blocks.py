@@ -6,7 +6,7 @@ its delay plus what the receiver's clock is ahead.
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 MOST_BLOCKS = 64
 """Blocks kept of one direction."""
@@ -30,35 +30,20 @@ class Block:
     """Sum of the squared deviations from the mean."""
     cubes_s3: float
     """Sum of the cubed deviations from the mean."""
-
-    @property
-    def skewness(self) -> float | None:
-        """Third standardised moment: 0 where symmetric, 2 for an exponential; None for too few or too alike samples."""
-        if self.count < _LEAST_COUNT_FOR_SHAPE:
-            return None
-        variance_s2 = self.squares_s2 / self.count
-        if variance_s2 < _LEAST_VARIANCE_FOR_SHAPE_S2:
-            return None
-        return self.cubes_s3 / self.count / (variance_s2 * math.sqrt(variance_s2))
+    skewness: float | None
+    """Third standardised moment: 0 where symmetric, 2 for an exponential; None for too few or too alike samples."""
 
     def merged(self, later: "Block") -> "Block":
         """Both as one block. Combining central moments: Chan, Golub and LeVeque 1979; Terriberry 2007 for the third."""
         least = self if self.least_s <= later.least_s else later
         if not self.count or not later.count:
             full = self if self.count else later
-            return Block(
-                least.least_s,
-                least.least_at_s,
-                full.count,
-                full.mean_at_s,
-                full.mean_s,
-                full.squares_s2,
-                full.cubes_s3,
-            )
+            return replace(full, least_s=least.least_s, least_at_s=least.least_at_s)
         count = self.count + later.count
         share = later.count / count
         apart_s = later.mean_s - self.mean_s
         across = apart_s * apart_s * self.count * share
+        squares_s2 = self.squares_s2 + later.squares_s2 + across
         cubes_s3 = (
             self.cubes_s3
             + later.cubes_s3
@@ -71,9 +56,19 @@ class Block:
             count,
             self.mean_at_s + share * (later.mean_at_s - self.mean_at_s),
             self.mean_s + share * apart_s,
-            self.squares_s2 + later.squares_s2 + across,
+            squares_s2,
             cubes_s3,
+            _skewness(count, squares_s2, cubes_s3),
         )
+
+
+def _skewness(count: int, squares_s2: float, cubes_s3: float) -> float | None:
+    if count < _LEAST_COUNT_FOR_SHAPE:
+        return None
+    variance_s2 = squares_s2 / count
+    if variance_s2 < _LEAST_VARIANCE_FOR_SHAPE_S2:
+        return None
+    return cubes_s3 / count / (variance_s2 * math.sqrt(variance_s2))
 
 
 class BlockTrack:
@@ -114,14 +109,17 @@ class BlockTrack:
             return None
         count = self._count
         mean_s = self._sum_s / count if count else 0.0
+        squares_s2 = max(0.0, self._squares_s2 - mean_s * self._sum_s)
+        cubes_s3 = self._cubes_s3 - 3.0 * mean_s * self._squares_s2 + 2.0 * mean_s * mean_s * self._sum_s
         block = Block(
             self._least_s,
             self._least_at_s,
             count,
             self._times_s / count if count else 0.0,
             self._pivot_s + mean_s,
-            max(0.0, self._squares_s2 - mean_s * self._sum_s),
-            self._cubes_s3 - 3.0 * mean_s * self._squares_s2 + 2.0 * mean_s * mean_s * self._sum_s,
+            squares_s2,
+            cubes_s3,
+            _skewness(count, squares_s2, cubes_s3),
         )
         self._open()
         return block

@@ -125,57 +125,50 @@ def fit_envelope(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Average:
-    """One direction's differences as a whole."""
+class Average:
+    """One direction's blocks as a whole; every block has a count above 0, and there is one at least."""
 
-    count: int
-    at_s: float
-    mean_s: float
-    variance_s2: float
-    """Of one sample, about its block's mean."""
-    spread_s2: float
-    """Sum of the squared times from `at_s`."""
-    tilt_s2: float
-    """Sum of times from `at_s`, each multiplied with its difference."""
+    def __init__(self, blocks: Sequence[Block]) -> None:
+        self._blocks = blocks
+        count = 0
+        times_s = values_s = squares_s2 = 0.0
+        for block in blocks:
+            count += block.count
+            times_s += block.count * block.mean_at_s
+            values_s += block.count * block.mean_s
+            squares_s2 += block.squares_s2
+        self.at_s = times_s / count
+        self.mean_s = values_s / count
+        self.variance_s2 = max(squares_s2 / count, _LEAST_SCALE_S**2)
+        """Of one sample, about its block's mean."""
+        self.spread_s2 = self.tilt_s2 = 0.0
+        """Sums over the samples of their times from `at_s`, squared, and multiplied with their differences."""
+        for block in blocks:
+            weight_s = block.count * (block.mean_at_s - self.at_s)
+            self.spread_s2 += weight_s * (block.mean_at_s - self.at_s)
+            self.tilt_s2 += weight_s * (block.mean_s - self.mean_s)
 
+    def wander(self, slope: float) -> float:
+        """How far the blocks' means stray from a line of `slope`, in standard errors; the median.
 
-def _average(blocks: Sequence[Block]) -> _Average:
-    count = sum(block.count for block in blocks)
-    at_s = sum(block.count * block.mean_at_s for block in blocks) / count
-    mean_s = sum(block.count * block.mean_s for block in blocks) / count
-    variance_s2 = max(sum(block.squares_s2 for block in blocks) / count, _LEAST_SCALE_S**2)
-    spread_s2 = sum(block.count * (block.mean_at_s - at_s) ** 2 for block in blocks)
-    tilt_s2 = sum(block.count * (block.mean_at_s - at_s) * (block.mean_s - mean_s) for block in blocks)
-    return _Average(count, at_s, mean_s, variance_s2, spread_s2, tilt_s2)
-
-
-def fit_mean(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew: float) -> OffsetLine:
-    """The least-squares line through the blocks' means, with the same prior on the skew, within ± `max_skew`.
-
-    Both sequences need blocks with a count above 0; others must not be in them.
-    """
-    out, back = _average(to_peer), _average(from_peer)
-    information = out.spread_s2 / out.variance_s2 + back.spread_s2 / back.variance_s2 + TYPICAL_SKEW**-2
-    skew = (out.tilt_s2 / out.variance_s2 - back.tilt_s2 / back.variance_s2) / information
-    skew = min(max(skew, -max_skew), max_skew)
-    return OffsetLine((out.at_s + back.at_s) / 2.0, (out.mean_s - back.mean_s) / 2.0, skew)
+        0.67 for independent delays. Much more means that something slower than a block moves them, such as a queue.
+        """
+        strays = [
+            abs(block.mean_s - self.mean_s - slope * (block.mean_at_s - self.at_s)) * math.sqrt(block.count)
+            for block in self._blocks
+        ]
+        return median(strays) / math.sqrt(self.variance_s2)
 
 
-def typical_skewness(blocks: Sequence[Block], least_blocks: int) -> float | None:
+def fit_mean(to_peer: Average, from_peer: Average, max_skew: float) -> OffsetLine:
+    """The least-squares line through the blocks' means, with the same prior on the skew, within ± `max_skew`."""
+    information = to_peer.spread_s2 / to_peer.variance_s2 + from_peer.spread_s2 / from_peer.variance_s2
+    tilt = to_peer.tilt_s2 / to_peer.variance_s2 - from_peer.tilt_s2 / from_peer.variance_s2
+    skew = min(max(tilt / (information + TYPICAL_SKEW**-2), -max_skew), max_skew)
+    return OffsetLine((to_peer.at_s + from_peer.at_s) / 2.0, (to_peer.mean_s - from_peer.mean_s) / 2.0, skew)
+
+
+def typical_skewness(blocks: Iterable[Block], least_blocks: int) -> float | None:
     """The median skewness of blocks, untouched by a few with a stall; None below `least_blocks` that have one."""
-    found = [skewness for block in blocks if (skewness := block.skewness) is not None]
+    found = [block.skewness for block in blocks if block.skewness is not None]
     return median(found) if len(found) >= least_blocks else None
-
-
-def wander(blocks: Sequence[Block], slope: float) -> float:
-    """How far blocks' means stray from a line of `slope`, in standard errors; the median, 0.67 if independent.
-
-    Much more means that something slower than a block moves the delays, such as a queue.
-    """
-    average = _average(blocks)
-    return median(
-        abs(block.mean_s - average.mean_s - slope * (block.mean_at_s - average.at_s))
-        / math.sqrt(average.variance_s2 / block.count)
-        for block in blocks
-    )

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from common.difference_blocks import MOST_BLOCKS, Block, BlockTrack
-from common.offset_fits import Envelope, OffsetLine, fit_envelope, fit_mean, typical_skewness, wander
+from common.offset_fits import Average, Envelope, OffsetLine, fit_envelope, fit_mean, typical_skewness
 
 _FIRST_BLOCK_S = 0.1
 _LAST_BLOCK_S = 0.8
@@ -88,24 +88,22 @@ class OffsetTracking:
             return
         guess = 0.0 if self.line is None else self.line.skew
         self._envelope = fit_envelope(to_peer, from_peer, max_skew, guess)
-        mean = self._fit_mean([*filter(_has_moments, to_peer)], [*filter(_has_moments, from_peer)], max_skew)
+        mean = self._fit_mean(max_skew)
         if mean is None:
             self.line, self.estimator = self._envelope.line, "lower envelope"
         else:
             self.line, self.estimator = mean, "mean"
 
-    def _fit_mean(self, to_peer: list[Block], from_peer: list[Block], max_skew: float) -> OffsetLine | None:
+    def _fit_mean(self, max_skew: float) -> OffsetLine | None:
         """The line through the means; None where the delays look as if they had a floor."""
         leaving = self.estimator == "mean"  # hysteresis: harder to leave than to enter
-        for blocks in (to_peer, from_peer):
-            skewness = typical_skewness(blocks, _SETTLED_BLOCKS)
+        tracks = self.to_peer, self.from_peer
+        for track in tracks:
+            skewness = typical_skewness(track.blocks, _SETTLED_BLOCKS)
             if skewness is None or abs(skewness) > _SYMMETRIC[leaving]:
                 return None
+        to_peer, from_peer = (Average([block for block in track.blocks if block.count]) for track in tracks)
         line = fit_mean(to_peer, from_peer, max_skew)
-        if max(wander(to_peer, line.skew), wander(from_peer, -line.skew)) > _STEADY[leaving]:
+        if max(to_peer.wander(line.skew), from_peer.wander(-line.skew)) > _STEADY[leaving]:
             return None
         return line
-
-
-def _has_moments(block: Block) -> bool:
-    return block.count > 0

@@ -216,7 +216,7 @@ def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
     assert offset.jumps == 0
 
 
-@repeatable
+@settings(repeatable, max_examples=40)
 @given(st.integers(0, 1000), st.floats(-0.05, 0.05), st.sampled_from(["normal", "exponential", "constant"]), drift)
 def test_the_bound_holds_while_lines_are_fitted(seed: int, asymmetry_s: float, shape: str, skew: float) -> None:
     generator, clock = np.random.default_rng(seed), ahead(-40.0, skew)
