@@ -159,12 +159,17 @@ class ClockOffset:
 
     def _relative_offset_s(self, now_s: float) -> float | None:
         """The offset between the origins, `now_s` from ours; None while unknown or in doubt."""
+        if self._contradictions_to or self._contradictions_from:
+            return None
         least_s, greatest_s = self._interval.at(now_s)
-        if greatest_s - least_s == math.inf or self._contradictions_to or self._contradictions_from:
+        if greatest_s - least_s == math.inf:
             return None
         line = self._tracking.line
         likeliest_s = (least_s + greatest_s) / 2.0 if line is None else line.value(now_s)
-        return min(max(likeliest_s - self._asymmetry_s / 2.0, least_s), greatest_s)
+        likeliest_s -= self._asymmetry_s / 2.0
+        if likeliest_s < least_s:
+            return least_s
+        return greatest_s if likeliest_s > greatest_s else likeliest_s
 
     def offset_at(self, now_s: float) -> float | None:
         """The peer's clock minus ours at `now_s` by ours, in seconds; None while unknown or in doubt."""

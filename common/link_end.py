@@ -62,6 +62,7 @@ class LinkEnd:
     def _forget_peer(self, epoch: int | None, *, shared_clock: bool) -> None:
         self.peer_epoch = epoch
         self.clock_offset = ClockOffset(shared_clock=shared_clock, asymmetry_s=self._to_peer_asymmetry_s)
+        """What the peer's clock is ahead of ours; another one in each of its epochs."""
         self._jumps = 0
         self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
         self._queueing = QueueingAge()

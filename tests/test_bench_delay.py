@@ -25,7 +25,7 @@ from feelahead.benchmarks.delay_traffic import OperatorClock, Scenario, Traffic,
 
 
 def stamps(there_s: FloatArray, back_s: FloatArray, ahead_s: float, skew: float = 0.0) -> Stamps:
-    sent_s: FloatArray = 0.004 * np.arange(there_s.size)
+    sent_s = 0.004 * np.arange(there_s.size, dtype=np.float64)
     received_s = sent_s + there_s + 0.001 + back_s
     drifted_s = ahead_s + skew * sent_s
     return Stamps(sent_s, sent_s + there_s + drifted_s, sent_s + there_s + 0.001 + drifted_s, received_s)
