@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 MOST_BLOCKS = 64
 """Blocks kept of one direction."""
 _LEAST_COUNT_FOR_SHAPE = 8
-_LEAST_VARIANCE_FOR_SHAPE_S2 = 1e-12
-"""Jitter below a microsecond has the shape of the clocks' rounding, not of the link."""
+_LEAST_VARIANCE_FOR_SHAPE_S2 = 0.1e-3**2
+"""Jitter below a tenth of a millisecond has the shape of the clocks' own drift within a block, not of the link."""
 
 
 @dataclass(frozen=True, slots=True)

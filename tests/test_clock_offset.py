@@ -290,6 +290,48 @@ def test_a_clock_that_jumps_is_followed_within_a_second(jump_s: float) -> None:
     assert abs(error_s(offset, after, end_s)) <= bound_s
 
 
+def delays_of(kind: str, generator: np.random.Generator, count: int) -> np.ndarray:
+    """Delays in seconds of messages 4 ms apart, as real links have them."""
+    exponential_s = generator.exponential(0.001, count)
+    if kind == "wireless":
+        return 0.002 + exponential_s + (generator.random(count) < 0.02) * generator.exponential(0.030, count)
+    if kind == "local":
+        return 50e-6 + exponential_s / 50.0
+    if kind == "queue":  # Lindley's recursion: waiting behind all that came before
+        waits_s = np.zeros(count)
+        for k, served_s in enumerate(generator.exponential(0.0032, count - 1)):
+            waits_s[k + 1] = max(0.0, waits_s[k] + served_s - 0.004)
+        return 0.020 + waits_s
+    if kind == "bursts":
+        busy = np.repeat(generator.random(-(-count // 400)) < 0.4, 400)[:count]
+        return 0.020 + exponential_s + 0.060 * busy
+    wave_s = 0.010 * np.cumsum(generator.normal(0.0, 0.1, count))
+    return 0.050 + np.abs(wave_s)  # wandering
+
+
+@pytest.mark.parametrize("in_order", [False, True])
+@pytest.mark.parametrize("kind", ["wireless", "local", "queue", "bursts", "wandering"])
+def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool) -> None:
+    generator, clock = np.random.default_rng(22), ahead(-7.0, 60e-6)
+    offset = ClockOffset(shared_clock=False)
+    sent_s = 0.004 * np.arange(2500)
+    arrived_s = sent_s + delays_of(kind, generator, 2500)
+    if in_order:
+        arrived_s = np.maximum.accumulate(arrived_s)
+    received_s = arrived_s + delays_of(kind, generator, 2500)
+    if in_order:
+        received_s = np.maximum.accumulate(received_s)
+    for k in np.argsort(received_s, kind="stable"):
+        now_s = float(received_s[k])
+        offset.update(float(sent_s[k]), clock(float(arrived_s[k])), 0.0, now_s)
+        bound_s = offset.bound_at(now_s)
+        assert bound_s is not None
+        assert abs(error_s(offset, clock, now_s)) <= bound_s
+    assert (offset.jumps, offset.rejected) == (0, 0)
+    if kind != "wandering":  # that has no floor to speak of
+        assert abs(error_s(offset, clock, now_s)) < 0.5e-3
+
+
 def test_a_route_that_gets_shorter_is_no_jump() -> None:
     generator, clock = np.random.default_rng(24), ahead(70.0)
     offset = ClockOffset(shared_clock=False)

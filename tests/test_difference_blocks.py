@@ -76,8 +76,9 @@ def test_skewness_tells_shapes_apart(shape: str, expected: float) -> None:
 
 def test_a_few_or_equal_samples_have_no_shape() -> None:
     assert block_of([(0.0, 0.1 * k) for k in range(7)]).skewness is None
+    assert block_of([(0.0, 0.1 * k) for k in range(8)]).skewness is not None
     assert block_of([(0.0, 0.1)] * 100).skewness is None
-    assert block_of([(0.0, 0.1 + 1e-9 * (k % 7)) for k in range(100)]).skewness is None
+    assert block_of([(0.0, 0.1 + 20e-6 * (k % 7)) for k in range(100)]).skewness is None
 
 
 def test_an_empty_block_is_none() -> None:

@@ -35,7 +35,9 @@ class DelayEstimatesSettings:
     stamps stands beside. The first link, exponential queues above 50 ms both ways, takes all the runs; the other
     rows a twentieth each.
 
-    A thousand runs take about five minutes. Try: python -m feelahead.benchmarks.delay_estimates --runs 50
+    A thousand runs take about four minutes on a core of their own.
+
+    Try: python -m feelahead.benchmarks.delay_estimates --runs 50
     """
 
     runs: Annotated[int, tyro.conf.arg(metavar="N")] = 1000
