@@ -77,10 +77,7 @@ class ClockOffset:
         or longer than the whole exchange.
         """
         round_trip_s = local_received_s - local_sent_s - peer_held_s
-        # Two clocks measure the two parts, which may differ by their skew.
-        allowed_s = self._max_skew * peer_held_s + _ROUNDING * (abs(local_sent_s) + abs(local_received_s))
-        if not (math.isfinite(peer_sent_s) and peer_held_s >= 0.0 and -allowed_s <= round_trip_s < math.inf):
-            self.rejected += 1
+        if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
             return False
         self.round_trip_s = max(0.0, round_trip_s)
         self.arrived(peer_sent_s, local_received_s)
@@ -95,12 +92,20 @@ class ClockOffset:
         Comes after `update` with the same message's newest stamp. Without it, every delay to the peer would seem
         shorter than it is on a link that reorders, because a message that was overtaken would never be echoed.
         """
-        if not (math.isfinite(peer_sent_s) and 0.0 <= peer_held_s < math.inf and local_sent_s <= local_received_s):
-            self.rejected += 1
+        round_trip_s = local_received_s - local_sent_s - peer_held_s
+        if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
             return False
         if not self._shared_clock:
             self._take_to_peer(local_sent_s, peer_sent_s - peer_held_s, local_received_s, fair=True)
         return True
+
+    def _is_possible(self, round_trip_s: float, peer_sent_s: float, held_s: float, received_s: float) -> bool:
+        # Two clocks measure the round trip and the holding, and may differ by their skew.
+        allowed_s = self._max_skew * held_s + 2.0 * _ROUNDING * abs(received_s)
+        if math.isfinite(peer_sent_s) and held_s >= 0.0 and -allowed_s <= round_trip_s < math.inf:
+            return True
+        self.rejected += 1
+        return False
 
     def arrived(self, peer_sent_s: float, local_received_s: float) -> None:
         """Take in the stamps of a message that echoes none of ours; `update` does so by itself."""
