@@ -255,6 +255,15 @@ def test_a_peer_that_slept_is_followed_and_its_messages_are_not_old_for_ever(sle
     assert arrival.one_way_s == pytest.approx(0.02, abs=1e-3)
 
 
+def test_the_summary_of_a_shared_clock_is_exact_and_that_of_no_peer_is_empty() -> None:
+    robot, operator = ends()
+    unknown = {"value": None, "bound": None, "skew_ppm": None, "estimator": None, "rejected": 0, "jumps": 0}
+    assert robot.offset_summary_ms() == unknown
+    robot.arrived(operator.hello(0.0), 0.02)
+    shared = {"value": 0.0, "bound": 0.0, "skew_ppm": 0.0, "estimator": "shared clock", "rejected": 0, "jumps": 0}
+    assert robot.offset_summary_ms() == shared
+
+
 def test_an_overtaken_message_is_echoed_beside_the_newest() -> None:
     robot, operator = ends()
     operator.arrived(robot.hello(0.0), 0.0)
