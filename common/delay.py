@@ -1,9 +1,8 @@
-"""Delay estimation from stamps alone: loop age (eq. 8), queueing age, and the offset between two clocks."""
+"""How old what arrives is, without knowing the offset of two clocks: loop age (eq. 8) and queueing age."""
 
 import math
-from collections import deque
 
-from common.statistics import SlidingQuantile
+from common.statistics import SlidingMinimum, SlidingQuantile
 
 
 class LoopAge:
@@ -89,105 +88,3 @@ class QueueingAge:
             self._flowing_s += min(max(gap_s, 0.0), self._step_s)
         self._last_received_s = received_s
         return one_way_s - self._least_delay_s.update(int(self._flowing_s / self._step_s), one_way_s)
-
-
-class ClockOffset:
-    """Offset of the peer's clock and round trip, from the four stamps that ordinary traffic carries.
-
-    The offset is the mean over the newest `window` exchanges, which is best where jitter is alike both ways.
-    Two processes that read the same clock (`shared_clock`) differ by exactly 0.
-    """
-
-    def __init__(self, *, shared_clock: bool, window: int = 1000) -> None:
-        if window < 1:
-            raise ValueError(f"window = {window}; valid: 1 exchange or more")
-        self.round_trip_s: float | None = None
-        """The newest exchange's time both ways without the peer's holding time; None before the first."""
-        self.rejected = 0
-        """Exchanges whose stamps contradict each other."""
-        self._shared_clock = shared_clock
-        self._exchanges = 0
-        # Sums of differences from the first offset: clocks may lie days apart, and jitter is microseconds.
-        self._first_offset_s = 0.0
-        self._deviations_s: deque[float] = deque()
-        self._sum_s = 0.0
-        self._window = window
-        self._best = SlidingMinimum(window)
-
-    def update(self, local_sent_s: float, peer_sent_s: float, peer_held_s: float, local_received_s: float) -> bool:
-        """Take in one exchange: our stamp, echoed by the peer in what it sent after holding it.
-
-        `peer_sent_s` is by the peer's clock, `local_sent_s` and `local_received_s` are by ours. False, and
-        counted in `rejected`, when the holding time is negative or longer than the whole exchange.
-        """
-        round_trip_s = local_received_s - local_sent_s - peer_held_s
-        if not (math.isfinite(peer_sent_s) and peer_held_s >= 0.0 and 0.0 <= round_trip_s < math.inf):
-            self.rejected += 1
-            return False
-        self.round_trip_s = round_trip_s
-        offset_s = peer_sent_s - peer_held_s / 2.0 - (local_sent_s + local_received_s) / 2.0
-        if self._exchanges == 0:
-            self._first_offset_s = offset_s
-        deviation_s = offset_s - self._first_offset_s
-        if len(self._deviations_s) == self._window:
-            self._sum_s -= self._deviations_s.popleft()
-        self._deviations_s.append(deviation_s)
-        self._sum_s += deviation_s
-        self._best.update(self._exchanges, round_trip_s)
-        self._exchanges += 1
-        return True
-
-    @property
-    def offset_s(self) -> float | None:
-        """The peer's clock minus ours, in seconds; None until known."""
-        if self._shared_clock:
-            return 0.0
-        if not self._deviations_s:
-            return None
-        return self._first_offset_s + self._sum_s / len(self._deviations_s)
-
-    @property
-    def bound_s(self) -> float | None:
-        """Half the window's least round trip: what an asymmetric floor can hide; None until known."""
-        if self._shared_clock:
-            return 0.0
-        least_s = self._best.value
-        return None if least_s is None else least_s / 2.0
-
-    def one_way_from_peer_s(self, peer_sent_s: float, local_received_s: float) -> float | None:
-        """The delay of a message from the peer, in seconds; None while the offset is unknown.
-
-        As uncertain as the offset, hence possibly below 0.
-        """
-        offset_s = self.offset_s
-        return None if offset_s is None else local_received_s - (peer_sent_s - offset_s)
-
-
-class SlidingMinimum:
-    """The least of the values at the newest `span` positions, in memory bounded by `span`.
-
-    A monotonic queue: a value is forgotten as soon as a later one is not above it.
-    """
-
-    def __init__(self, span: int) -> None:
-        self._span = span
-        self._candidates: deque[tuple[int, float]] = deque()
-
-    def update(self, position: int, value: float) -> float:
-        """Take in `value` at `position`, which never decreases; the minimum of the positions up to it."""
-        candidates = self._candidates
-        while candidates and candidates[-1][1] >= value:
-            candidates.pop()
-        if not candidates or candidates[-1][0] != position:
-            candidates.append((position, value))
-        while candidates[0][0] <= position - self._span:
-            candidates.popleft()
-        return candidates[0][1]
-
-    def __len__(self) -> int:
-        return len(self._candidates)
-
-    @property
-    def value(self) -> float | None:
-        """The present minimum; None before the first value."""
-        return self._candidates[0][1] if self._candidates else None

@@ -1,14 +1,18 @@
 """One end of a link to one peer: stamps what leaves, and orders and measures what arrives."""
 
+from collections import deque
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from common.delay import ClockOffset, QueueingAge
+from common.clock_offset import ClockOffset
+from common.delay import QueueingAge
 from common.messages import AnyMessage, Header, Hello
 from common.statistics import RunningStatistics
 
 _REMEMBERED_EPOCHS = 64
 """Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""
+_MOST_UNMEASURED = 4096
+"""Arrivals that wait for the offset to settle: it takes a second, in which a thousand or so arrive."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Arrival:
     queueing_age_s: float
     """Its one-way delay beyond the sliding minimum: what a queue added, whatever the distance."""
     one_way_s: float | None
-    """Its delay from the peer; None while the clock offset is unknown."""
+    """Its delay from the peer, as uncertain as the clock offset; None while that is unknown."""
     loop_age_s: float | None
     """Since we sent the stamp that it echoes: both ways, holding and ticks; None before the first echo."""
 
@@ -32,9 +36,17 @@ class LinkEnd:
     fresh. An epoch begins with the peer's Hello; one that has ended is refused for good.
     """
 
-    def __init__(self, side: Literal["operator", "robot"], epoch: int, clock_domain: str, seed: int = 0) -> None:
+    def __init__(
+        self,
+        side: Literal["operator", "robot"],
+        epoch: int,
+        clock_domain: str,
+        seed: int = 0,
+        asymmetry_s: float = 0.0,
+    ) -> None:
+        """`asymmetry_s`: the least delay to the robot minus that to the operator, where it is known otherwise."""
         self.delay = RunningStatistics(seed)
-        """One-way delay from the peer in seconds, every arrival, before ordering."""
+        """One-way delay from the peer in seconds, every arrival, before ordering; empty until the offset settles."""
         self.round_trip = RunningStatistics(seed)
         """Both ways without the peer's holding time, in seconds, every arrival that echoes a stamp."""
         self.stale = 0
@@ -42,17 +54,22 @@ class LinkEnd:
         self._side = side
         self._epoch = epoch
         self._clock_domain = clock_domain
+        self._to_peer_asymmetry_s = asymmetry_s if side == "operator" else -asymmetry_s
         self._sequence = 0
         self._ended_epochs: list[int] = []
         self._forget_peer(None, shared_clock=False)
 
     def _forget_peer(self, epoch: int | None, *, shared_clock: bool) -> None:
         self.peer_epoch = epoch
-        self._offset = ClockOffset(shared_clock=shared_clock)
+        self.clock_offset = ClockOffset(shared_clock=shared_clock, asymmetry_s=self._to_peer_asymmetry_s)
+        """What the peer's clock is ahead of ours; another one in each of its epochs."""
+        self._jumps = 0
+        self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
         self._queueing = QueueingAge()
         self._newest_of_kind: dict[type, int] = {}
         self._newest: Header | None = None
         self._newest_received_s = 0.0
+        self._last_sent_s = self._last_received_s = 0.0
 
     def hello(self, now_s: float) -> Hello:
         """The message that opens our epoch."""
@@ -63,12 +80,15 @@ class LinkEnd:
         self._sequence += 1
         if self._newest is None:
             return Header(epoch=self._epoch, sequence=self._sequence, sent_s=now_s)
+        overtaken = self._last_sent_s != self._newest.sent_s
         return Header(
             epoch=self._epoch,
             sequence=self._sequence,
             sent_s=now_s,
             echo_sent_s=self._newest.sent_s,
             echo_held_s=now_s - self._newest_received_s,
+            last_sent_s=self._last_sent_s if overtaken else None,
+            last_held_s=now_s - self._last_received_s if overtaken else None,
         )
 
     def arrived(self, message: AnyMessage, now_s: float) -> Arrival:
@@ -80,12 +100,11 @@ class LinkEnd:
             self.stale += 1
             return Arrival(fresh=False, queueing_age_s=0.0, one_way_s=None, loop_age_s=None)
         loop_age_s = self._measure_loop(header, now_s)
-        one_way_s = self._offset.one_way_from_peer_s(header.sent_s, now_s)
-        if one_way_s is not None:
-            self.delay.add(one_way_s)
+        one_way_s = self._measure_one_way(header.sent_s, now_s)
         queueing_age_s = self._queueing.update(header.sent_s, now_s)
         if self._newest is None or header.sequence > self._newest.sequence:
             self._newest, self._newest_received_s = header, now_s
+        self._last_sent_s, self._last_received_s = header.sent_s, now_s
         fresh = header.sequence > self._newest_of_kind.get(type(message), 0)
         if fresh:
             self._newest_of_kind[type(message)] = header.sequence
@@ -103,13 +122,49 @@ class LinkEnd:
         self._forget_peer(epoch, shared_clock=shared)
 
     def _measure_loop(self, header: Header, now_s: float) -> float | None:
-        loop_age_s = None
-        if header.echo_sent_s is not None and header.echo_held_s is not None:
-            loop_age_s = now_s - header.echo_sent_s
-            # A stamp from before our own restart, or a peer that invents one, says nothing about the link.
-            if loop_age_s < header.echo_held_s:
-                loop_age_s = None
-            else:
-                self._offset.update(header.echo_sent_s, header.sent_s, header.echo_held_s, now_s)
-                self.round_trip.add(loop_age_s - header.echo_held_s)
-        return loop_age_s
+        """Take in the stamps that came with a message; the loop age that they give."""
+        sent_s, held_s = header.echo_sent_s, header.echo_held_s
+        if sent_s is None or held_s is None:
+            self.clock_offset.arrived(header.sent_s, now_s)
+            return None
+        last = header.last_sent_s is None
+        # A stamp from before our own restart, or a peer that invents one, says nothing about the link.
+        if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s, arrived_last=last):
+            return None
+        if header.last_sent_s is not None and header.last_held_s is not None:
+            self.clock_offset.overtaken(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
+        if self.clock_offset.round_trip_s is not None:
+            self.round_trip.add(self.clock_offset.round_trip_s)
+        return now_s - sent_s
+
+    def _measure_one_way(self, sent_s: float, now_s: float) -> float | None:
+        if self.clock_offset.jumps != self._jumps:
+            # The peer's clock counts from another origin now, and old delays cannot be told any more.
+            self._jumps = self.clock_offset.jumps
+            self._queueing.reset()
+            self._unmeasured.clear()
+        one_way_s = self.clock_offset.one_way_from_peer_s(sent_s, now_s)
+        if one_way_s is None or not self.clock_offset.settled:
+            self._unmeasured.append((sent_s, now_s))
+            return one_way_s
+        while self._unmeasured:
+            earlier_s = self.clock_offset.one_way_from_peer_s(*self._unmeasured.popleft())
+            if earlier_s is not None:
+                self.delay.add(earlier_s)
+        self.delay.add(one_way_s)
+        return one_way_s
+
+    def offset_summary_ms(self) -> dict[str, Any]:
+        """What the peer's clock is ahead of ours: `value` and `bound` in ms, `skew_ppm`, the `estimator` behind it,
+        and how many stamps were `rejected` and clock `jumps` seen; None where unknown.
+        """
+        offset = self.clock_offset
+        value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew
+        return {
+            "value": None if value_s is None else 1e3 * value_s,
+            "bound": None if bound_s is None else 1e3 * bound_s,
+            "skew_ppm": None if skew is None else 1e6 * skew,
+            "estimator": offset.estimator,
+            "rejected": offset.rejected,
+            "jumps": offset.jumps,
+        }

@@ -30,6 +30,14 @@ def _finite(name: str, *values: float) -> None:
             raise ValueError(f"{name} = {value}; valid: a finite number")
 
 
+def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> None:
+    if (sent_s is None) != (held_s is None):
+        raise ValueError(f"{name}_sent_s and {name}_held_s; valid: both or neither")
+    if sent_s is not None and held_s is not None:
+        _finite(f"{name}_sent_s", sent_s)
+        _in_range(f"{name}_held_s", 0.0, 1e9, held_s)
+
+
 class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """Who sent it when, and which stamp of ours came back: four-timestamp delay estimation for free."""
 
@@ -43,16 +51,18 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     """The newest `sent_s` that the sender has received from us, on our clock."""
     echo_held_s: float | None = None
     """How long the sender held that stamp, on its clock."""
+    last_sent_s: float | None = None
+    """The `sent_s` of ours that arrived last at the sender, where a newer one had overtaken it: the newest stamps
+    alone would make delays look shorter than they are."""
+    last_held_s: float | None = None
+    """How long the sender held that one, on its clock."""
 
     def __post_init__(self) -> None:
         _in_range("epoch", 0, 2**63 - 1, self.epoch)
         _in_range("sequence", 0, 2**63 - 1, self.sequence)
         _finite("sent_s", self.sent_s)
-        if (self.echo_sent_s is None) != (self.echo_held_s is None):
-            raise ValueError("echo_sent_s and echo_held_s; valid: both or neither")
-        if self.echo_sent_s is not None and self.echo_held_s is not None:
-            _finite("echo_sent_s", self.echo_sent_s)
-            _in_range("echo_held_s", 0.0, 1e9, self.echo_held_s)
+        _both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
+        _both_or_neither("last", self.last_sent_s, self.last_held_s)
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):

@@ -138,3 +138,33 @@ class SlidingQuantile:
         if not self._sorted:
             return None
         return self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+
+
+class SlidingMinimum:
+    """The least of the values at the newest `span` positions, in memory bounded by `span`.
+
+    A monotonic queue: a value is forgotten as soon as a later one is not above it.
+    """
+
+    def __init__(self, span: int) -> None:
+        self._span = span
+        self._candidates: deque[tuple[int, float]] = deque()
+
+    def update(self, position: int, value: float) -> float:
+        """Take in `value` at `position`, which never decreases; the minimum of the positions up to it."""
+        candidates = self._candidates
+        while candidates and candidates[-1][1] >= value:
+            candidates.pop()
+        if not candidates or candidates[-1][0] != position:
+            candidates.append((position, value))
+        while candidates[0][0] <= position - self._span:
+            candidates.popleft()
+        return candidates[0][1]
+
+    def __len__(self) -> int:
+        return len(self._candidates)
+
+    @property
+    def value(self) -> float | None:
+        """The present minimum; None before the first value."""
+        return self._candidates[0][1] if self._candidates else None

@@ -173,4 +173,5 @@ class OperatorSide:
                 "round_trip": self.link.round_trip.summary_ms(),
             },
             "applied_age_ms": {"to_operator": self.applied_age.summary_ms()},
+            "offset_ms": {"operator": self.link.offset_summary_ms()},
         }

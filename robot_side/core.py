@@ -263,6 +263,7 @@ class RobotSide:
             },
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
+            "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
         }
 

@@ -1,7 +1,13 @@
-import pytest
+import math
 
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.clock_offset import MAX_SKEW
 from common.link_end import LinkEnd
 from common.messages import Header, MotionCommand, StiffnessUpdate
+from feelahead.benchmarks.delay_traffic import Estimate, Scenario, Traffic, Way
 
 CLOCK = "one clock"
 
@@ -110,4 +116,181 @@ def test_an_invented_echo_is_not_measured() -> None:
     invented = Header(epoch=2, sequence=99, sent_s=1.0, echo_sent_s=5.0, echo_held_s=0.0)
     arrival = robot.arrived(motion(invented), 1.01)
     assert arrival.loop_age_s is None
+    assert robot.round_trip.count == 0
+
+
+# What both ends say about clocks and delays, in virtual time at their real rates
+
+QUEUES = Way("exponential", 0.050, 0.010)
+JITTER = Way("normal", 0.050, 0.010)
+
+
+def last_estimates(traffic: Traffic) -> dict[str, Estimate]:
+    return {estimate.side: estimate for estimate in traffic}
+
+
+@pytest.mark.parametrize(("to_robot", "to_operator"), [(QUEUES, QUEUES), (QUEUES, Way("exponential", 0.050, 0.001))])
+@pytest.mark.parametrize("skew", [20e-6, -100e-6])
+def test_both_ends_know_the_offset_after_five_seconds_of_queues(to_robot: Way, to_operator: Way, skew: float) -> None:
+    traffic = Traffic(Scenario("", to_robot, to_operator, skew), seed=1, duration_s=5.0)
+    for estimate in last_estimates(traffic).values():
+        assert estimate.offset_error_s is not None
+        assert estimate.one_way_error_s is not None
+        assert abs(estimate.offset_error_s) < 0.5e-3
+        assert abs(estimate.one_way_error_s) < 0.5e-3
+    assert traffic.robot.offset_summary_ms()["skew_ppm"] == pytest.approx(1e6 * skew, abs=15.0)
+
+
+def test_reordering_does_not_pull_the_mean() -> None:
+    # Echoes of the newest stamps alone would be 10 ms off here: at 1 kHz the newest to have arrived is an early one.
+    traffic = Traffic(Scenario("", JITTER, JITTER, 20e-6), seed=1, duration_s=10.0)
+    for estimate in last_estimates(traffic).values():
+        assert estimate.offset_error_s is not None
+        assert abs(estimate.offset_error_s) < 0.6e-3
+    assert traffic.robot.offset_summary_ms()["estimator"] == "mean"
+    assert traffic.operator.offset_summary_ms()["estimator"] == "mean"
+
+
+def test_an_asymmetry_that_both_ends_are_told_costs_nothing() -> None:
+    nearer = Way("exponential", 0.030, 0.010)
+    for told_s, expected_s in ((0.0, 0.010), (0.020, 0.0)):
+        traffic = Traffic(Scenario("", QUEUES, nearer, 20e-6, told_s), seed=2, duration_s=3.0)
+        for estimate in last_estimates(traffic).values():
+            assert estimate.offset_error_s is not None
+            assert abs(estimate.offset_error_s) == pytest.approx(expected_s, abs=0.3e-3)
+
+
+ways = st.builds(
+    Way,
+    st.sampled_from(["normal", "exponential"]),
+    st.floats(0.0, 0.2),
+    st.floats(0.0, 0.05),
+    loss=st.floats(0.0, 0.5),
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(ways, ways, st.floats(-0.9 * MAX_SKEW, 0.9 * MAX_SKEW), st.floats(-0.1, 0.1), st.integers(0, 2**32))
+def test_the_bound_holds_on_every_arrival_whatever_the_link(
+    to_robot: Way, to_operator: Way, skew: float, asymmetry_s: float, seed: int
+) -> None:
+    traffic = Traffic(Scenario("", to_robot, to_operator, skew, asymmetry_s), seed, duration_s=1.0)
+    for estimate in traffic:
+        if estimate.offset_error_s is not None:
+            assert estimate.bound_s is not None
+            assert abs(estimate.offset_error_s) <= estimate.bound_s
+    assert traffic.robot.clock_offset.jumps == traffic.operator.clock_offset.jumps == 0
+
+
+def test_delays_cover_every_arrival_once_the_offset_has_settled() -> None:
+    traffic = Traffic(Scenario("", QUEUES, QUEUES, 20e-6), seed=3, duration_s=3.0)
+    arrivals = {"robot": 0, "operator": 0}
+    for estimate in traffic:
+        arrivals[estimate.side] += 1
+    assert traffic.robot.delay.count == arrivals["robot"]
+    assert traffic.operator.delay.count == arrivals["operator"]
+    assert traffic.robot.delay.mean == pytest.approx(0.060, abs=2e-3)
+    assert traffic.robot.delay.minimum == pytest.approx(0.050, abs=0.5e-3)
+
+
+def test_without_an_echo_no_delay_is_invented() -> None:
+    robot, operator = ends(robot_clock="another clock")
+    robot.arrived(operator.hello(0.0), 500.0)
+    for k in range(5000):
+        arrival = robot.arrived(motion(operator.stamp(0.004 * k)), 500.0 + 0.004 * k)
+        assert arrival.one_way_s is None
+    assert robot.delay.count == 0
+    assert robot.delay.summary_ms()["mean"] is None
+    assert robot.offset_summary_ms()["value"] is None
+    assert len(robot._unmeasured) <= 4096
+
+
+def test_delays_wait_for_the_offset_to_settle() -> None:
+    robot, operator = ends(robot_clock="another clock")
+    robot.arrived(operator.hello(0.0), 500.02)
+    operator.arrived(robot.hello(500.02), 0.04)
+    for k in range(60):
+        sent_s = 0.1 + 0.05 * k
+        arrival = robot.arrived(motion(operator.stamp(sent_s)), 500.02 + sent_s)
+        operator.arrived(stiffness(robot.stamp(500.02 + sent_s)), sent_s + 0.04)
+        assert arrival.one_way_s is not None
+        if sent_s < 0.9:
+            assert robot.delay.count == 0
+    assert robot.delay.count == 61
+    assert robot.delay.mean == pytest.approx(0.02, abs=1e-6)
+    assert robot.delay.sd == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_new_epoch_forgets_the_offset_and_all_that_hung_on_it() -> None:
+    robot, operator = ends(robot_clock="another clock")
+    robot.arrived(operator.hello(0.0), 500.02)
+    operator.arrived(robot.hello(500.02), 0.04)
+    robot.arrived(motion(operator.stamp(0.1)), 500.12)
+    assert robot.offset_summary_ms()["value"] == pytest.approx(-500.0e3, abs=0.1)
+    restarted = LinkEnd("operator", 3, "a clock after a reboot")
+    arrival = robot.arrived(restarted.hello(9000.0), 501.0)
+    assert arrival.one_way_s is None
+    assert arrival.queueing_age_s == 0.0
+    assert robot.offset_summary_ms()["value"] is None
+    assert robot.offset_summary_ms()["bound"] is None
+    assert robot.stamp(501.1).echo_sent_s == 9000.0
+
+
+@pytest.mark.parametrize("slept_s", [0.5, 600.0])
+def test_a_peer_that_slept_is_followed_and_its_messages_are_not_old_for_ever(slept_s: float) -> None:
+    robot, operator = ends(robot_clock="another clock")
+    robot.arrived(operator.hello(0.0), 500.02)
+    operator.arrived(robot.hello(500.02), 0.04)
+    true_s, ages_s = 0.1, []
+    for k in range(1000):
+        # The operator's machine is suspended once, in which its monotonic clock stands still.
+        ahead_s = 500.0 if k < 500 else 500.0 + slept_s
+        true_s = 0.1 + 0.05 * k + (0.0 if k < 500 else slept_s)
+        arrival = robot.arrived(motion(operator.stamp(true_s + 500.0 - ahead_s)), true_s + 500.02)
+        operator.arrived(stiffness(robot.stamp(true_s + 500.02)), true_s + 500.04 - ahead_s)
+        ages_s.append(arrival.queueing_age_s)
+    assert robot.clock_offset.jumps == 1
+    assert ages_s[500] == pytest.approx(slept_s, abs=1e-6)
+    assert max(ages_s[520:]) < 1e-6
+    assert arrival.one_way_s == pytest.approx(0.02, abs=1e-3)
+
+
+def test_the_summary_of_a_shared_clock_is_exact_and_that_of_no_peer_is_empty() -> None:
+    robot, operator = ends()
+    unknown = {"value": None, "bound": None, "skew_ppm": None, "estimator": None, "rejected": 0, "jumps": 0}
+    assert robot.offset_summary_ms() == unknown
+    robot.arrived(operator.hello(0.0), 0.02)
+    shared = {"value": 0.0, "bound": 0.0, "skew_ppm": 0.0, "estimator": "shared clock", "rejected": 0, "jumps": 0}
+    assert robot.offset_summary_ms() == shared
+
+
+def test_an_overtaken_message_is_echoed_beside_the_newest() -> None:
+    robot, operator = ends()
+    operator.arrived(robot.hello(0.0), 0.0)
+    older, newer = robot.stamp(1.0), robot.stamp(1.1)
+    operator.arrived(stiffness(newer), 1.15)
+    assert operator.stamp(1.155).last_sent_s is None
+    operator.arrived(stiffness(older), 1.16)
+    echo = operator.stamp(1.2)
+    assert (echo.echo_sent_s, echo.last_sent_s) == (1.1, 1.0)
+    assert echo.last_held_s == pytest.approx(0.04)
+    operator.arrived(stiffness(robot.stamp(1.2)), 1.25)
+    assert operator.stamp(1.26).last_sent_s is None
+
+
+@pytest.mark.parametrize(("sent_s", "held_s"), [(1.0, None), (None, 0.1), (math.nan, 0.1), (1.0, -0.1), (1.0, 2e9)])
+def test_a_header_refuses_half_of_an_echo_and_impossible_ones(sent_s: float | None, held_s: float | None) -> None:
+    for name in ("echo", "last"):
+        fields = {f"{name}_sent_s": sent_s, f"{name}_held_s": held_s}
+        with pytest.raises(ValueError, match=f"{name}_(sent|held)_s"):
+            Header(epoch=1, sequence=1, sent_s=0.0, **fields)
+
+
+def test_a_contradictory_echo_is_counted_and_measures_nothing() -> None:
+    robot, operator = ends(robot_clock="another clock")
+    robot.arrived(operator.hello(0.0), 500.02)
+    header = Header(epoch=2, sequence=9, sent_s=1.0, echo_sent_s=500.5, echo_held_s=10.0)
+    arrival = robot.arrived(motion(header), 501.02)
+    assert (arrival.loop_age_s, arrival.one_way_s) == (None, None)
+    assert robot.offset_summary_ms()["rejected"] == 1
     assert robot.round_trip.count == 0

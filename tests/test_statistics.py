@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.statistics import RESERVOIR_SIZE, RunningStatistics, SlidingQuantile
+from common.statistics import RESERVOIR_SIZE, RunningStatistics, SlidingMinimum, SlidingQuantile
 
 repeatable = settings(derandomize=True, deadline=None)
 samples = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200)
@@ -124,3 +124,20 @@ def test_sliding_quantile_forgets_on_request() -> None:
     assert sliding.value is None
     sliding.update(0.5)
     assert sliding.value == 0.5
+
+
+@repeatable
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 9)), min_size=1, max_size=200),
+    st.integers(1, 8),
+)
+def test_sliding_minimum_agrees_with_the_whole_window(steps: list[tuple[int, int]], span: int) -> None:
+    minimum, seen, position = SlidingMinimum(span), list[tuple[int, int]](), 0
+    assert minimum.value is None
+    for step, value in steps:
+        position += step
+        seen.append((position, value))
+        expected = min(other for place, other in seen if place > position - span)
+        assert minimum.update(position, value) == expected
+        assert minimum.value == expected
+        assert len(minimum) <= span

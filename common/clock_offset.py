@@ -1,0 +1,249 @@
+"""What the peer's clock is ahead of ours, from the stamps that ordinary traffic carries."""
+
+import math
+from typing import Literal
+
+from common.offset_interval import OffsetInterval
+from common.offset_tracking import OffsetTracking
+
+Estimator = Literal["shared clock", "interval", "lower envelope", "mean"]
+
+MAX_SKEW = 600e-6
+"""Two clocks drift apart by at most this share of time: 500 ppm while a time daemon slews one (adjtime), and 100 ppm
+by which quartz crystals differ."""
+_CONTRADICTIONS = 8
+"""As many in a row in one direction mean that a clock has jumped."""
+_REMEMBERED_ECHOES = 1024
+"""A second's stamps at 1 kHz: by then no message of before is on its way."""
+_ROUNDING = 1e-15
+"""Of the stamps, relative: what four operations on them lose."""
+
+
+class ClockOffset:
+    """Offset, skew and one-way delays, with a bound on the offset that holds while the clocks run within `max_skew`.
+
+    The lower envelope of the delays both ways decides, or the mean where both directions look symmetric: queues
+    leave a floor alone, symmetric jitter has none. Neither sees how much longer one way is than the other: half of
+    that difference goes into the offset, unless `asymmetry_s` says it: the least delay to the peer minus that from
+    it. The bound does not trust it. Two processes that read the same clock (`shared_clock`) differ by exactly 0.
+
+    A clock that jumps, as after a suspend, starts the estimate anew: as soon as messages seem to arrive before they
+    were sent, or within two blocks of time when both directions shift against each other. Only until then the bound
+    may be wrong.
+    """
+
+    def __init__(self, *, shared_clock: bool, asymmetry_s: float = 0.0, max_skew: float = MAX_SKEW) -> None:
+        if not math.isfinite(asymmetry_s):
+            raise ValueError(f"asymmetry_s = {asymmetry_s}; valid: a finite time")
+        if not 0.0 < max_skew < 0.01:
+            raise ValueError(f"max_skew = {max_skew}; valid: above 0 to below 0.01")
+        self.round_trip_s: float | None = None
+        """The newest exchange's time both ways without the peer's holding time; None before the first."""
+        self.rejected = 0
+        """Stamps that contradict each other or all that was known."""
+        self.jumps = 0
+        """How often a clock was found to have jumped."""
+        self._shared_clock = shared_clock
+        self._asymmetry_s = asymmetry_s
+        self._max_skew = max_skew
+        self._start_anew(-math.inf)
+
+    def _start_anew(self, now_s: float) -> None:
+        self._since_s = now_s
+        # Clocks may lie days apart, and jitter is microseconds: all sums are taken from an origin on each clock.
+        self._origin_s: float | None = None
+        self._peer_origin_s = 0.0
+        self._now_s = 0.0
+        self._tracking = OffsetTracking()
+        self._interval = OffsetInterval(self._max_skew)
+        self._echoed_s = math.nan
+        self._echoed_fairly_s: dict[float, None] = {}  # in order of insertion
+        self._contradictions_to = self._contradictions_from = 0
+
+    def update(
+        self,
+        local_sent_s: float,
+        peer_sent_s: float,
+        peer_held_s: float,
+        local_received_s: float,
+        *,
+        arrived_last: bool = True,
+    ) -> bool:
+        """Take in one exchange: our stamp, echoed by the peer in what it sent after holding it.
+
+        `peer_sent_s` is by the peer's clock, `local_sent_s` and `local_received_s` are by ours. `arrived_last` is
+        False when the peer chose the stamp for being our newest, while an older one arrived after it: then it is
+        early, and no fair sample of the delay. False, and counted in `rejected`, when the holding time is negative
+        or longer than the whole exchange.
+        """
+        round_trip_s = local_received_s - local_sent_s - peer_held_s
+        if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
+            return False
+        self.round_trip_s = max(0.0, round_trip_s)
+        self.arrived(peer_sent_s, local_received_s)
+        if not self._shared_clock and local_sent_s != self._echoed_s:
+            self._echoed_s = local_sent_s
+            self._take_to_peer(local_sent_s, peer_sent_s - peer_held_s, local_received_s, fair=arrived_last)
+        return True
+
+    def overtaken(self, local_sent_s: float, peer_sent_s: float, peer_held_s: float, local_received_s: float) -> bool:
+        """Take in the stamp of ours that arrived last at the peer, where it is not the newest; as for `update`.
+
+        Comes after `update` with the same message's newest stamp. Without it, every delay to the peer would seem
+        shorter than it is on a link that reorders, because a message that was overtaken would never be echoed.
+        """
+        round_trip_s = local_received_s - local_sent_s - peer_held_s
+        if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
+            return False
+        if not self._shared_clock:
+            self._take_to_peer(local_sent_s, peer_sent_s - peer_held_s, local_received_s, fair=True)
+        return True
+
+    def _is_possible(self, round_trip_s: float, peer_sent_s: float, held_s: float, received_s: float) -> bool:
+        # Two clocks measure the round trip and the holding, and may differ by their skew.
+        allowed_s = self._max_skew * held_s + 2.0 * _ROUNDING * abs(received_s)
+        if math.isfinite(peer_sent_s) and held_s >= 0.0 and -allowed_s <= round_trip_s < math.inf:
+            return True
+        self.rejected += 1
+        return False
+
+    def arrived(self, peer_sent_s: float, local_received_s: float) -> None:
+        """Take in the stamps of a message that echoes none of ours; `update` does so by itself."""
+        if self._shared_clock:
+            return
+        if not (math.isfinite(peer_sent_s) and math.isfinite(local_received_s)):
+            self.rejected += 1
+            return
+        if self._origin_s is not None and self._tracking.advance(local_received_s - self._origin_s, self._max_skew):
+            self._jumped(local_received_s)
+        if self._origin_s is None:
+            self._origin_s, self._peer_origin_s = local_received_s, peer_sent_s
+        now_s = local_received_s - self._origin_s
+        self._now_s = max(self._now_s, now_s)
+        self._interval.advance(now_s)
+        difference_s = now_s - (peer_sent_s - self._peer_origin_s)
+        if self._interval.take_least(-difference_s, self._margin(peer_sent_s, local_received_s)):
+            self._contradictions_from = 0
+            self._tracking.from_peer.add(now_s, difference_s)
+            return
+        self.rejected += 1
+        self._contradictions_from += 1
+        if self._contradictions_from >= _CONTRADICTIONS:
+            self._jumped(local_received_s)
+
+    def _take_to_peer(self, local_sent_s: float, peer_received_s: float, now_s: float, *, fair: bool) -> None:
+        if fair:
+            # Each of our stamps counts once, however many messages echo it and in whatever order they come.
+            seen = self._echoed_fairly_s
+            if local_sent_s in seen:
+                return
+            seen[local_sent_s] = None
+            if len(seen) > _REMEMBERED_ECHOES:
+                del seen[next(iter(seen))]
+        # Our clock may have jumped since we sent what is still on its way.
+        if self._origin_s is None or local_sent_s < self._since_s:
+            return
+        sent_s = local_sent_s - self._origin_s
+        difference_s = peer_received_s - self._peer_origin_s - sent_s
+        if self._interval.take_greatest(difference_s, sent_s, self._margin(peer_received_s, now_s)):
+            self._contradictions_to = 0
+            self._tracking.to_peer.add(sent_s, difference_s, fair=fair)
+            return
+        self.rejected += 1
+        self._contradictions_to += 1
+        if self._contradictions_to >= _CONTRADICTIONS:
+            self._jumped(now_s)
+
+    @staticmethod
+    def _margin(peer_s: float, local_s: float) -> float:
+        return _ROUNDING * (abs(peer_s) + abs(local_s))
+
+    def _jumped(self, now_s: float) -> None:
+        self.jumps += 1
+        self._start_anew(now_s)
+
+    def _relative_offset_s(self, now_s: float) -> float | None:
+        """The offset between the origins, `now_s` from ours; None while unknown or in doubt."""
+        if self._contradictions_to or self._contradictions_from:
+            return None
+        least_s, greatest_s = self._interval.at(now_s)
+        if greatest_s - least_s == math.inf:
+            return None
+        line = self._tracking.line
+        likeliest_s = (least_s + greatest_s) / 2.0 if line is None else line.value(now_s)
+        likeliest_s -= self._asymmetry_s / 2.0
+        if likeliest_s < least_s:
+            return least_s
+        return greatest_s if likeliest_s > greatest_s else likeliest_s
+
+    def offset_at(self, now_s: float) -> float | None:
+        """The peer's clock minus ours at `now_s` by ours, in seconds; None while unknown or in doubt."""
+        if self._shared_clock:
+            return 0.0
+        if self._origin_s is None:
+            return None
+        offset_s = self._relative_offset_s(now_s - self._origin_s)
+        return None if offset_s is None else self._peer_origin_s - self._origin_s + offset_s
+
+    def bound_at(self, now_s: float) -> float | None:
+        """How far `offset_at` can be from the truth, in seconds, whatever the delays were; None while unknown.
+
+        Half the least round trip where the offset lies in the middle of what is possible, and more where not.
+        """
+        if self._shared_clock:
+            return 0.0
+        if self._origin_s is None:
+            return None
+        elapsed_s = now_s - self._origin_s
+        offset_s = self._relative_offset_s(elapsed_s)
+        if offset_s is None:
+            return None
+        least_s, greatest_s = self._interval.at(elapsed_s)
+        # What the caller's own sums with stamps lose comes on top.
+        rounding_s = self._margin(self._peer_origin_s + elapsed_s, now_s)
+        return max(greatest_s - offset_s, offset_s - least_s) + rounding_s
+
+    @property
+    def offset_s(self) -> float | None:
+        """`offset_at` the newest arrival."""
+        return self.offset_at(self._now_s + (self._origin_s or 0.0))
+
+    @property
+    def bound_s(self) -> float | None:
+        """`bound_at` the newest arrival."""
+        return self.bound_at(self._now_s + (self._origin_s or 0.0))
+
+    @property
+    def skew(self) -> float | None:
+        """What the peer's clock gains on ours, in seconds a second; None while unknown."""
+        if self._shared_clock:
+            return 0.0
+        line = self._tracking.line
+        return None if line is None else line.skew
+
+    @property
+    def estimator(self) -> Estimator | None:
+        """What the offset comes from; None while it is unknown."""
+        if self._shared_clock:
+            return "shared clock"
+        if self.offset_s is None:
+            return None
+        return "interval" if self._tracking.line is None else self._tracking.estimator
+
+    @property
+    def settled(self) -> bool:
+        """Whether the offset rests on a second or so of messages both ways."""
+        return self._shared_clock or self._tracking.settled
+
+    def one_way_from_peer_s(self, peer_sent_s: float, local_received_s: float) -> float | None:
+        """The delay of a message from the peer, in seconds; None while the offset is unknown.
+
+        As uncertain as the offset. Never below 0 for stamps that were taken in.
+        """
+        if self._shared_clock:
+            return local_received_s - peer_sent_s
+        if self._origin_s is None:
+            return None
+        now_s = local_received_s - self._origin_s
+        offset_s = self._relative_offset_s(now_s)
+        return None if offset_s is None else now_s - (peer_sent_s - self._peer_origin_s) + offset_s
