@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.curve_authentication import OperatorKeys
 from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
 from common.priority import raise_priority
@@ -38,9 +39,10 @@ def command(arguments: Sequence[str]) -> int:
         calibration=settings.calibration,
         seed=settings.seed,
     )
+    keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(settings.connect, settings.view_connect) as sockets,
+        OperatorSockets(settings.connect, settings.view_connect, keys=keys) as sockets,
         StopSignal() as stop,
         Status(settings.status, "operator") as status,
     ):

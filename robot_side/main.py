@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.curve_authentication import RobotKeys
 from common.errors import FeelaheadError
 from common.link_model import DelayLine, LinkSpec
 from common.priority import raise_priority
@@ -32,9 +33,10 @@ def command(arguments: Sequence[str]) -> int:
     """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     # The sockets first: a port that is taken is found out before the kernels are compiled.
     with (
-        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure) as sockets,
+        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         StopSignal() as stop,
         Status(settings.status, "robot") as status,
     ):

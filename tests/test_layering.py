@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "feelahead": set(PACKAGES),
 }
 IO_ROOMS = {
-    "zmq": {"common/sockets.py"},
+    "zmq": {"common/sockets.py", "common/socket_shell.py", "common/curve_authentication.py"},
     "hid": {"operator_side/dualsense/device.py"},
     "hidraw": {"operator_side/dualsense/device.py"},
     "mujoco": {
