@@ -30,6 +30,8 @@ class OperatorSettings(RunOptions):
     it in after: feelahead keys allow NAME KEY."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
     """With --keys: the robot side's public key, as shown on its machine by: feelahead keys show robot."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     device: Literal["hid", "simulated"] = "hid"
     """A real controller, or a simulated one with a scripted person."""
     haptics: bool = True

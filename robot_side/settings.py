@@ -83,6 +83,8 @@ class RobotSettings(RunOptions):
     feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
     insecure: bool = False
     """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
     """Any MJCF arm with actuators instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
