@@ -69,7 +69,7 @@ def demo(arguments: Sequence[str]) -> int:
             # Whoever read our status has seen enough; the sides have ended in order.
             ignore_broken_output()
             errors = []
-        merged = merge_summaries(_read(summaries["robot"]), _read(summaries["operator"]), errors)
+        merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
         if settings.summary is not None:
             settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
     for line in _report(merged):
@@ -172,7 +172,7 @@ def _watch(
     return []
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_summary(path: Path) -> dict[str, Any]:
     """A side's summary; empty when it did not live to write one, which `errors` then says."""
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))

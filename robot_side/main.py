@@ -3,6 +3,7 @@
 import json
 import secrets
 import time
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -99,6 +100,7 @@ class _Loop:
         self._clock = MonotonicClock()
         self._admission = Admission()
         self._tick_time = RunningStatistics(settings.seed)
+        self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
         self._lines: dict[str, DelayLine[Outgoing]] = {
             stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
         }
@@ -106,7 +108,6 @@ class _Loop:
         self._start_s = self._clock.now()
         self._pacer = Pacer(TICK_PERIOD_S, self._start_s, settings.seed)
         self._next_keys_s = self._start_s
-        self._shown_late_s = 0.0
 
     def run(self, stop: StopSignal) -> None:
         """Go on until `stop` or --duration."""
@@ -152,7 +153,9 @@ class _Loop:
         self._admission.begin_tick()
         began_s = time.perf_counter()
         outgoing = self._core.tick(now_s)
-        self._tick_time.add(time.perf_counter() - began_s)
+        took_s = time.perf_counter() - began_s
+        self._tick_time.add(took_s)
+        self._latest_tick_times_s.append(took_s)
         for message in outgoing:
             self._lines[message.stream].push(now_s, message)
 
@@ -165,12 +168,21 @@ class _Loop:
                 else:
                     self._sockets.publish(b"telemetry", message.payload)
 
+    def _paced(self) -> dict[str, float | int]:
+        """The ticks since this was last asked for."""
+        latest_s = sorted(self._latest_tick_times_s) or [0.0]
+        self._latest_tick_times_s.clear()
+        return {
+            "tick_us": 1e6 * latest_s[len(latest_s) // 2],
+            "tick_p99_us": 1e6 * latest_s[len(latest_s) * 99 // 100],
+            "overruns": self._pacer.overruns,
+            "late_us": 1e6 * self._pacer.take_latest_s(),
+        }
+
     def _use_idle_time(self, now_s: float) -> None:
         """What no tick should wait for."""
         if self._status.due(now_s):
-            late_us = 1e6 * self._pacer.take_latest_s()
-            paced = {"overruns": self._pacer.overruns, "late_us": late_us}
-            self._status.show(now_s, self._core.status(now_s) | paced)
+            self._status.show(now_s, self._core.status(now_s) | self._paced())
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
