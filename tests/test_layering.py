@@ -28,6 +28,7 @@ IO_ROOMS = {
 }
 CLOCK_READERS = {
     "common/clock.py",  # the clock
+    "feelahead/benchmarks/wake_error.py",  # measures a clock's loop
     "feelahead/experiments/hostile_input.py",  # drives two real processes
     "feelahead/demo.py",  # shows two real processes to a person
     "robot_side/main.py",  # times its own ticks
