@@ -130,11 +130,11 @@ class KeyFolder:
             raise ConfigurationError(f"{len(peers)} peers are allowed already; valid: up to {PEER_LIMIT}")
         self._make_folder(self.path)
         self._make_folder(self.allowed_path)
-        _write(self._peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
+        _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
 
     def revoke(self, name: str) -> None:
         """Let a peer in no more; ConfigurationError when there is none of that name."""
-        path = self._peer_path(name)
+        path = self.peer_path(name)
         if not path.is_file():
             names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
             raise ConfigurationError(f"name {name!r}: no such peer in {self.allowed_path}; valid: {names}")
@@ -158,7 +158,8 @@ class KeyFolder:
         folder = "" if self.path == DEFAULT_FOLDER.expanduser() else f" --folder {self.path}"
         return f"feelahead keys {rest}{folder}"
 
-    def _peer_path(self, name: str) -> Path:
+    def peer_path(self, name: str) -> Path:
+        """Where the public key of the peer of that name stands; ConfigurationError for what is no name."""
         return self.allowed_path / f"{checked_name(name)}.public"
 
     def _peer_files(self) -> list[Path]:

@@ -108,11 +108,7 @@ class RobotSockets(SocketShell):
             self._view.close(linger=0)
             self._view = self._open_view(zmq.PUB)
             self._keys.secure(self._view)
-        if self._view_endpoint is not None:
-            # The old socket's port is free only after ZeroMQ's own thread has closed it.
-            with contextlib.suppress(ConfigurationError):
-                bind_socket(self._view, self._view_endpoint, "--view-bind")
-                self._view_endpoint = None
+        self._bind_view_again()
 
     def receive(self) -> list[tuple[bytes, bytes]]:
         """(peer, payload) of every control message that has arrived, oldest first."""
@@ -147,11 +143,19 @@ class RobotSockets(SocketShell):
 
         ValueError for more than VIEW_LIMIT_BYTES.
         """
+        self._bind_view_again()
         self.send_frames(self._view, [topic, payload], VIEW_LIMIT_BYTES)
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
         return self.wait_for(timeout_s, [self._control], self._authenticator)
+
+    def _bind_view_again(self) -> None:
+        """After a revocation: the old socket's port is free only when ZeroMQ's own thread has closed it."""
+        if self._view_endpoint is not None:
+            with contextlib.suppress(ConfigurationError):
+                bind_socket(self._view, self._view_endpoint, "--view-bind")
+                self._view_endpoint = None
 
     def _allows(self, key: str) -> bool:
         return self._keys is None or key in self._keys.allowed.names
