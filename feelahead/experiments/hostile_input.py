@@ -68,6 +68,8 @@ class Outcome:
     )
     memory_mb: list[float] = field(default_factory=list)
     """Resident, at the end of each stretch."""
+    growth_mb: dict[str, float] = field(default_factory=lambda: {"quiet": 0.0, "hostile": 0.0})
+    """In all stretches of each kind together; the statistics of a run fill up in both."""
     descriptors: list[int] = field(default_factory=list)
     """Open ones, likewise."""
     sent: Counter[str] = field(default_factory=Counter)
@@ -136,7 +138,10 @@ def _take_note(robot: SideProcess, outcome: Outcome, phase: str) -> None:
     outcome.states += [event["state"] for event in said]
     process = Path("/proc") / str(robot.process_id)
     resident = next(line for line in (process / "status").read_text().splitlines() if line.startswith("VmRSS"))
-    outcome.memory_mb.append(int(resident.split()[1]) / 1024)
+    resident_mb = int(resident.split()[1]) / 1024
+    if outcome.memory_mb:
+        outcome.growth_mb[phase] += resident_mb - outcome.memory_mb[-1]
+    outcome.memory_mb.append(resident_mb)
     outcome.descriptors.append(len(list((process / "fd").iterdir())))
 
 
@@ -152,6 +157,8 @@ def report(outcome: Outcome) -> Table:
     shown.add_section()
     for title, values in (("memory, MB", outcome.memory_mb), ("descriptors", outcome.descriptors)):
         shown.add_row(f"{title}: first, largest, last", *(f"{one:.0f}" for one in (values[0], max(values), values[-1])))
+    quiet_mb, hostile_mb = (f"{outcome.growth_mb[phase]:+.1f}" for phase in ("quiet", "hostile"))
+    shown.add_row("memory growth, MB", quiet_mb, hostile_mb, "", "flat")
     robot, operator = outcome.robot["messages"], outcome.operator["messages"]
     shown.add_row("commands sent, received", str(operator["motion_sent"]), str(robot["motion_received"]), "", "all")
     shown.add_row("stops of the arm", "", str(len(outcome.robot["stops"])), "", "0")
