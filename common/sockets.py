@@ -63,6 +63,7 @@ class RobotSockets(SocketShell):
         self.revoked = 0
         """Messages of peers that were allowed when they connected, and are no more."""
         self._keys = keys
+        self._told_unreadable: str | None = None
         self._peers: dict[bytes, _Peer] = {}
         self._second = 0
         self._reader = Reader(frames=2)
@@ -88,9 +89,20 @@ class RobotSockets(SocketShell):
         """Handshakes with a key that is not allowed."""
         return 0 if self._authenticator is None else self._authenticator.refused
 
-    def unknown_keys(self) -> list[str]:
-        """Keys refused for the first time since the last call; nothing without keys of our own."""
-        return [] if self._authenticator is None else self._authenticator.unknown_keys()
+    def key_news(self) -> list[str]:
+        """What a person should know about the keys since the last call, a line each with the command to run."""
+        if self._keys is None or self._authenticator is None:
+            return []
+        allowed = self._keys.allowed
+        news = [
+            f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
+            for key in self._authenticator.unknown_keys()
+        ]
+        if allowed.unreadable != self._told_unreadable:
+            self._told_unreadable = allowed.unreadable
+            if allowed.unreadable is not None:
+                news.append(f"nobody is let in any more: {allowed.unreadable}")
+        return news
 
     def refresh_keys(self) -> None:
         """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second.

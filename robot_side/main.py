@@ -186,8 +186,8 @@ class _Loop:
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
-            for key in self._sockets.unknown_keys():
-                self._status.note(f"refused an unknown key; to let it in: feelahead keys allow NAME {key}")
+            for text in self._sockets.key_news():
+                self._status.note(text)
         self._collection.idle(now_s, resting=self._core.session.safety.arming.state != "armed")
 
 

@@ -91,3 +91,19 @@ def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) 
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=20)
     assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+def test_the_summary_has_each_loops_pace_and_what_strangers_did(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    with start("--duration", "2", "--status", "none", "--realtime", "--summary", str(path)) as process:
+        _, complaint = process.communicate(timeout=120)
+    assert (process.returncode, complaint) == (0, "")
+    summary = json.loads(path.read_text())
+    for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
+        assert paced["overruns"] >= 0
+        assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
+    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "malformed": 0, "unread": 0}
+    # Every deadline was met by a tick or counted as an overrun.
+    ticks = summary["ticks"] + summary["overruns"]
+    assert ticks == pytest.approx(summary["duration_s"] * 1000, abs=100)

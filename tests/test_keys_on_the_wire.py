@@ -102,8 +102,9 @@ def test_an_unknown_key_gets_nothing_and_both_sides_say_what_to_do(robot: Robot)
         assert stays_out(robot, stranger, 1.2)
         assert f"feelahead keys allow NAME {public}" in str(stranger.trouble)
     assert robot.sockets.refused > 0
-    assert robot.sockets.unknown_keys() == [public]
-    assert robot.sockets.unknown_keys() == []
+    [told] = robot.sockets.key_news()
+    assert f"feelahead keys allow NAME {public} --folder {robot.folder.path}" in told
+    assert robot.sockets.key_news() == []
 
 
 def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> None:
@@ -196,3 +197,5 @@ def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
         robot.sockets.refresh_keys()
         exchange(robot, anna, 0.05, until_both=False)
         assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
+        assert any("nobody is let in" in text and "chmod 700" in text for text in robot.sockets.key_news())
+        assert robot.sockets.key_news() == []
