@@ -53,6 +53,18 @@ def parse_settings(settings_type: type[Settings], program: str, arguments: Seque
         raise ConfigurationError(str(error)) from error
 
 
+def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str]:
+    """The top-level fields that a person set, by a flag or in the `--config` file; the others have their defaults."""
+    hints = get_type_hints(settings_type)
+    flags = {argument.partition("=")[0] for argument in arguments if argument.startswith("--")}
+    said = {flag.removeprefix("--").partition(".")[0].replace("-", "_") for flag in flags}
+    said |= {name.removeprefix("no_") for name in said}
+    if (path := _config_path(arguments)) is not None:
+        with contextlib.suppress(OSError, ValueError):  # parse_settings has said what is wrong with it
+            said |= set(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+    return frozenset(said & set(hints))
+
+
 def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
     """Read `settings_type` from a TOML file; ConfigurationError names the file, the key and what is valid."""
     try:
@@ -78,7 +90,8 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         code = 0
     # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
 
 

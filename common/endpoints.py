@@ -70,6 +70,15 @@ def following(control: Endpoint, text: str, flag: str) -> Endpoint:
     return Endpoint(control.host, port, control.ipv6)
 
 
+def refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
+    """ConfigurationError with the way out when others than this machine's users could reach `endpoint`."""
+    if not endpoint.is_loopback():
+        raise ConfigurationError(
+            f"{flag}: {text!r} would be open to anyone on the network; valid: --keys ~/.config/feelahead/keys "
+            "(first: `feelahead keys make robot`), a loopback address such as tcp://127.0.0.1:5555, or --insecure"
+        )
+
+
 def _split(text: str, flag: str, example: str) -> tuple[str, str]:
     match = _ADDRESS.fullmatch(text)
     if match is None:

@@ -1,144 +1,42 @@
-"""The only module that knows ZeroMQ: a control and a view socket for each of the two processes.
+"""A control and a view socket for each of the two processes, over ZeroMQ.
 
 Control (ROUTER and DEALER) carries small messages both ways, view (PUB and SUB) frames and telemetry to
 the operator, apart so that a frame never delays a stiffness. No call but `wait` blocks; a message that cannot
 leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
 """
 
-import os
-import select
-from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
+import contextlib
+import socket
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import zmq
 
-from common.clock import MonotonicClock
-from common.endpoints import Endpoint, following, parse_bind, parse_connect
+from common.curve_authentication import Authenticator, HandshakeWatch, OperatorKeys, RobotKeys
+from common.endpoints import Endpoint, following, parse_bind, parse_connect, refuse_open
 from common.errors import ConfigurationError
+from common.socket_shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket, connect_socket
 
-CONTROL_HIGH_WATER_MARK = 16
-"""Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.
-
-With 2, half of a burst of five was lost, and a peer that stood still got no fewer stale ones: those wait in
-the kernel's buffers, until the heartbeat ends the connection.
-"""
-VIEW_HIGH_WATER_MARK = 8
-"""View messages that wait on either side: both cameras' frames, telemetry, and as many again."""
-RECEIVE_HIGH_WATER_MARK = 100_000
-"""Control messages that wait to be received: out of reach for whoever drains once per tick.
-
-A low mark would not keep them fresh (the kernel's buffers hold thousands more, and a drain would end at the
-mark instead of at the newest), and libzmq up to 4.3.5 aborts the process when a socket at its mark finds a
-heartbeat before the end of the connection (libzmq issues 3937, 4364 and 4767).
-"""
-CONTROL_LIMIT_BYTES = 64 * 1024
-VIEW_LIMIT_BYTES = 4 * 1024 * 1024
-MESSAGES_PER_RECEIVE = 1000
-"""At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
+PEER_LIMIT_PER_S = 5000
+"""A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
+_REMEMBERED_PEERS = 1024
+_RETRY_S = 0.5
 
 
-class _Sockets:
-    """What both processes' shells have in common: the context, two sockets, waiting and closing."""
+@dataclass
+class _Peer:
+    """What the robot side remembers of a connection."""
 
-    def __init__(self, control_type: int, view_type: int, heartbeat_timeout_s: float) -> None:
-        if not 0.03 <= heartbeat_timeout_s <= 60.0:
-            raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
-        self.dropped = 0
-        """Messages that could not leave at once: the peer is gone, or does not keep up."""
-        self.rejected = 0
-        """Messages received with a wrong number of frames."""
-        self._clock = MonotonicClock()
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._control = self._context.socket(control_type)
-        self._view = self._context.socket(view_type)
-        self._control.setsockopt(zmq.SNDHWM, CONTROL_HIGH_WATER_MARK)
-        self._control.setsockopt(zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK)
-        self._control.setsockopt(zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES)
-        timeout_ms = round(1e3 * heartbeat_timeout_s)
-        self._control.setsockopt(zmq.HEARTBEAT_IVL, timeout_ms // 3)
-        self._control.setsockopt(zmq.HEARTBEAT_TIMEOUT, timeout_ms)
-        self._control.setsockopt(zmq.HEARTBEAT_TTL, timeout_ms * 4 // 3)
-        self._view.setsockopt(zmq.SNDHWM, VIEW_HIGH_WATER_MARK)
-        self._view.setsockopt(zmq.RCVHWM, VIEW_HIGH_WATER_MARK)
-        self._view.setsockopt(zmq.MAXMSGSIZE, VIEW_LIMIT_BYTES)
-        # Not heartbeats: a viewer may well stay at its mark, and a frame can hold up an answer for long.
-        self._view.setsockopt(zmq.TCP_KEEPALIVE, 1)
-        self._view.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 1)
-        self._view.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 1)
-        self._view.setsockopt(zmq.TCP_KEEPALIVE_CNT, 3)
-        for part in (self._control, self._view):
-            part.setsockopt(zmq.LINGER, 0)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close at once, whatever has not left yet; closing twice does no harm."""
-        self._context.destroy(linger=0)
-
-    def _wait(self, timeout_s: float | None, awaited: Sequence["zmq.Socket[bytes]"]) -> bool:
-        """Whether one of `awaited` has something before the time is up.
-
-        zmq's own poll counts whole milliseconds, hence select on the sockets' descriptors. These signal only
-        changes, and only until EVENTS is read: it has the last word before and after each select.
-        """
-        if timeout_s is not None and not timeout_s >= 0.0:
-            raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
-        descriptors = [part.fileno() for part in awaited]
-        deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
-        while not any(_readable(part) for part in awaited):
-            remaining_s = None
-            if deadline_s is not None:
-                remaining_s = deadline_s - self._clock.now()
-                if remaining_s <= 0.0:
-                    return False
-            select.select(descriptors, [], [], remaining_s)
-        return True
-
-    def _drain(self, part: "zmq.Socket[bytes]", frames: int) -> list[list[bytes]]:
-        """What has arrived, oldest first; messages of another number of frames are rejected and counted."""
-        received: list[list[bytes]] = []
-        for _ in range(MESSAGES_PER_RECEIVE):
-            try:
-                message = part.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
-                break
-            if len(message) == frames:
-                received.append(message)
-            else:
-                self.rejected += 1
-        return received
-
-    def _send(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
-        if len(frames[-1]) > limit_bytes:
-            raise ValueError(f"payload of {len(frames[-1])} bytes; valid: up to {limit_bytes} bytes")
-        for _ in range(2):
-            try:
-                part.send_multipart(frames, zmq.NOBLOCK)
-            except zmq.Again:
-                # The socket may only not have noticed yet what has left: that happens when EVENTS is read.
-                part.getsockopt(zmq.EVENTS)
-            except zmq.ZMQError as error:
-                if error.errno != zmq.EHOSTUNREACH:
-                    raise
-                break
-            else:
-                return True
-        self.dropped += 1
-        return False
+    key: str
+    """Whom it authenticated as; empty without keys."""
+    descriptor: int
+    """The connection's; -1 where it is not known."""
+    received: int = 0
+    """Messages in the present second."""
 
 
-class RobotSockets(_Sockets):
-    """The robot side's end: it binds, and tells its peers apart."""
+class RobotSockets(SocketShell):
+    """The robot side's end: it binds, tells its peers apart, and with keys lets nobody in but who is allowed."""
 
     def __init__(
         self,
@@ -146,64 +44,166 @@ class RobotSockets(_Sockets):
         view_bind: str | None = None,
         *,
         insecure: bool = False,
+        keys: RobotKeys | None = None,
         heartbeat_timeout_s: float = 3.0,
     ) -> None:
         """Bind control to `bind` and view to `view_bind`, by default the port after.
 
         A silent connection ends after `heartbeat_timeout_s`, which must exceed the link's real one-way delay.
         ConfigurationError when an address is malformed, in use, not this machine's, or open to the network
-        without `insecure`, as there are no keys yet.
+        with neither `keys` nor `insecure`.
         """
         control = parse_bind(bind, "--bind")
         view = following(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
-        if not insecure:
-            _refuse_open(control, bind, "--bind")
-            _refuse_open(view, view_bind or bind, "--view-bind")
+        if keys is None and not insecure:
+            refuse_open(control, bind, "--bind")
+            refuse_open(view, view_bind or bind, "--view-bind")
+        self.flooding = 0
+        """Messages of peers that sent more than anybody may."""
+        self.revoked = 0
+        """Messages of peers that were allowed when they connected, and are no more."""
+        self._keys = keys
+        self._told_unreadable: str | None = None
+        self._peers: dict[bytes, _Peer] = {}
+        self._second = 0
+        self._reader = Reader(frames=2)
+        self._view_endpoint: Endpoint | None = None
         super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s)
         try:
+            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
-            # What viewers send, subscriptions, is little, but hitting the mark could end the process.
-            self._view.setsockopt(zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK)
-            _bind(self._control, control, "--bind")
-            _bind(self._view, view, "--view-bind")
+            for part, endpoint, flag in ((self._control, control, "--bind"), (self._view, view, "--view-bind")):
+                if keys is not None:
+                    keys.secure(part)
+                bind_socket(part, endpoint, flag)
+            self.control_endpoint = self._control.getsockopt_string(zmq.LAST_ENDPOINT)
+            """The address that control is bound to, with the port that the system chose."""
+            self.view_endpoint = self._view.getsockopt_string(zmq.LAST_ENDPOINT)
+            """The address that view is bound to, with the port that the system chose."""
         except BaseException:
             self.close()
             raise
 
     @property
-    def control_endpoint(self) -> str:
-        """The address that control is bound to, with the port that the system chose."""
-        return self._control.getsockopt_string(zmq.LAST_ENDPOINT)
+    def refused(self) -> int:
+        """Handshakes with a key that is not allowed."""
+        return 0 if self._authenticator is None else self._authenticator.refused
 
-    @property
-    def view_endpoint(self) -> str:
-        """The address that view is bound to, with the port that the system chose."""
-        return self._view.getsockopt_string(zmq.LAST_ENDPOINT)
+    def key_news(self) -> list[str]:
+        """What a person should know about the keys since the last call, a line each with the command to run."""
+        if self._keys is None or self._authenticator is None:
+            return []
+        allowed = self._keys.allowed
+        news = [
+            f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
+            for key in self._authenticator.unknown_keys()
+        ]
+        if allowed.unreadable != self._told_unreadable:
+            self._told_unreadable = allowed.unreadable
+            if allowed.unreadable is not None:
+                news.append(f"nobody is let in any more: {allowed.unreadable}")
+        return news
+
+    def refresh_keys(self) -> None:
+        """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second.
+
+        Nothing can be sent to some viewers and not to others, so all of them have to shake hands anew.
+        """
+        if self._keys is None:
+            return
+        revoked = self._keys.allowed.refresh()
+        if revoked:
+            for name in [name for name, peer in self._peers.items() if peer.key in revoked]:
+                self._hang_up(name)
+            if self._view_endpoint is None:
+                self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
+            self._view.close(linger=0)
+            self._view = self._open_view(zmq.PUB)
+            self._keys.secure(self._view)
+        self._bind_view_again()
 
     def receive(self) -> list[tuple[bytes, bytes]]:
         """(peer, payload) of every control message that has arrived, oldest first."""
-        return [(peer, payload) for peer, payload in self._drain(self._control, 2)]
+        if self._authenticator is not None:
+            self._authenticator.serve()
+        if (second := int(self._clock.now())) != self._second:
+            self._second = second
+            for peer in self._peers.values():
+                peer.received = 0
+        received = []
+        for name, *frames in self._reader.read(self._control):
+            if not self._admits(name.bytes, frames[-1] if frames else name):
+                continue
+            if len(frames) == 1:
+                received.append((name.bytes, frames[0].bytes))
+            else:
+                self.rejected += 1
+        return received
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """Send to `peer`; False, and counted in `dropped`, when it is gone or does not keep up.
+        """Send to `peer`; False, and counted in `dropped`, when it is gone, revoked, or does not keep up.
 
         ValueError for more than CONTROL_LIMIT_BYTES.
         """
-        return self._send(self._control, [peer, payload], CONTROL_LIMIT_BYTES)
+        if self._keys is not None and (peer not in self._peers or not self._allows(self._peers[peer].key)):
+            self.dropped += 1
+            return False
+        return self.send_frames(self._control, [peer, payload], CONTROL_LIMIT_BYTES)
 
     def publish(self, topic: bytes, payload: bytes) -> None:
         """Send to whoever subscribed to `topic`; a viewer that does not keep up loses it, alone.
 
         ValueError for more than VIEW_LIMIT_BYTES.
         """
-        self._send(self._view, [topic, payload], VIEW_LIMIT_BYTES)
+        self._bind_view_again()
+        self.send_frames(self._view, [topic, payload], VIEW_LIMIT_BYTES)
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self._wait(timeout_s, [self._control])
+        return self.wait_for(timeout_s, [self._control], self._authenticator)
+
+    def _bind_view_again(self) -> None:
+        """After a revocation: the old socket's port is free only when ZeroMQ's own thread has closed it."""
+        if self._view_endpoint is not None:
+            with contextlib.suppress(ConfigurationError):
+                bind_socket(self._view, self._view_endpoint, "--view-bind")
+                self._view_endpoint = None
+
+    def _allows(self, key: str) -> bool:
+        return self._keys is None or key in self._keys.allowed.names
+
+    def _admits(self, name: bytes, frame: zmq.Frame) -> bool:
+        """Whether one message of `name` may be looked into; who sent it stands with each frame."""
+        key = "" if self._keys is None else _property(frame, "User-Id")
+        peer = self._peers.get(name)
+        if peer is None or peer.key != key:
+            if len(self._peers) >= _REMEMBERED_PEERS:
+                del self._peers[next(iter(self._peers))]
+            peer = self._peers[name] = _Peer(key, _descriptor(frame))
+        peer.received += 1
+        if not self._allows(key):
+            self.revoked += 1
+            self._hang_up(name)
+            return False
+        if peer.received > PEER_LIMIT_PER_S:
+            self.flooding += 1
+            self._hang_up(name)
+            return False
+        return True
+
+    def _hang_up(self, name: bytes) -> None:
+        """End the connection of `name`, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
+        peer = self._peers[name]
+        descriptor, peer.descriptor = peer.descriptor, -1
+        # The number may stand for another connection by now: that of the peer which spoke last from there.
+        owners = [other for other, known in self._peers.items() if known.descriptor == descriptor]
+        if descriptor < 0 or owners:
+            return
+        with contextlib.suppress(OSError), socket.fromfd(descriptor, socket.AF_INET, socket.SOCK_STREAM) as connection:
+            connection.shutdown(socket.SHUT_RDWR)
 
 
-class OperatorSockets(_Sockets):
+class OperatorSockets(SocketShell):
     """The operator side's end: it connects, and reconnects by itself."""
 
     def __init__(
@@ -212,6 +212,7 @@ class OperatorSockets(_Sockets):
         view_connect: str | None = None,
         *,
         topics: Sequence[bytes] = (b"",),
+        keys: OperatorKeys | None = None,
         heartbeat_timeout_s: float = 3.0,
     ) -> None:
         """Connect control to `connect` and view to `view_connect`, by default the port after.
@@ -232,62 +233,84 @@ class OperatorSockets(_Sockets):
             self._control.setsockopt(zmq.IMMEDIATE, 1)
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)
-            _connect(self._control, control, "--connect")
-            _connect(self._view, view, "--view-connect")
+            self._reader, self._view_reader = Reader(frames=1), Reader(frames=2)
+            self._watched = []
+            self._next_look_s = 0.0
+            for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
+                if keys is not None:
+                    keys.secure(part)
+                self._watched.append((part, endpoint, HandshakeWatch(part, keys)))
+                connect_socket(part, endpoint, flag)
         except BaseException:
             self.close()
             raise
 
+    @property
+    def trouble(self) -> str | None:
+        """Why the robot side does not let us in, and what to do about it; None as far as we know."""
+        return next((watch.trouble for _, _, watch in self._watched if watch.trouble is not None), None)
+
     def receive(self) -> list[bytes]:
         """Every control message that has arrived, oldest first."""
-        return [payload for (payload,) in self._drain(self._control, 1)]
+        self._look_after_handshakes()
+        return [payload.bytes for (payload,) in self._whole(self._reader.read(self._control), 1)]
 
     def receive_view(self) -> list[tuple[bytes, bytes]]:
         """(topic, payload) of every view message that has arrived, oldest first."""
-        return [(topic, payload) for topic, payload in self._drain(self._view, 2)]
+        messages = self._whole(self._view_reader.read(self._view), 2)
+        return [(topic.bytes, payload.bytes) for topic, payload in messages]
 
     def send(self, payload: bytes) -> bool:
         """Send to the robot side; False, and counted in `dropped`, when it is gone or does not keep up.
 
         ValueError for more than CONTROL_LIMIT_BYTES.
         """
-        return self._send(self._control, [payload], CONTROL_LIMIT_BYTES)
+        return self.send_frames(self._control, [payload], CONTROL_LIMIT_BYTES)
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control or view message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self._wait(timeout_s, [self._control, self._view])
+        return self.wait_for(timeout_s, [self._control, self._view])
+
+    def close(self) -> None:
+        """Close at once, whatever has not left yet; closing twice does no harm."""
+        if not self._context.closed:
+            for _, _, watch in self._watched:
+                watch.close()
+        super().close()
+
+    def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:
+        """The messages of that many frames; others are rejected and counted."""
+        for message in messages:
+            if len(message) == frames:
+                yield message
+            else:
+                self.rejected += 1
+
+    def _look_after_handshakes(self) -> None:
+        """After a refused handshake ZeroMQ gives up; we knock again, for the key may be allowed by then."""
+        now_s = self._clock.now()
+        if now_s < self._next_look_s:
+            return
+        self._next_look_s = now_s + _RETRY_S
+        for part, endpoint, watch in self._watched:
+            watch.look()
+            if watch.failed:
+                watch.failed = False
+                with contextlib.suppress(zmq.ZMQError):
+                    part.disconnect(endpoint.address)
+                part.connect(endpoint.address)
 
 
-def _readable(part: "zmq.Socket[bytes]") -> bool:
-    return bool(int(part.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
-
-
-def _refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
-    if not endpoint.is_loopback():
-        raise ConfigurationError(
-            f"{flag}: {text!r} would be open to anyone on the network, as keys (CURVE) are not supported yet; "
-            "valid: a loopback address such as tcp://127.0.0.1:5555, or --insecure"
-        )
-
-
-def _bind(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    part.setsockopt(zmq.IPV6, endpoint.ipv6)
+def _property(frame: zmq.Frame, name: str) -> str:
+    """What ZeroMQ knows of the connection that `frame` came by; empty where it does not."""
     try:
-        part.bind(endpoint.address)
-    except zmq.ZMQError as error:
-        if error.errno == zmq.EADDRINUSE:
-            other = Endpoint(endpoint.host, endpoint.port + 2 if endpoint.port < 65000 else 5555, endpoint.ipv6)
-            advice = f"the port is in use; valid: another one such as {other.address}"
-        else:
-            advice = f"{os.strerror(error.errno or 0)}; valid: an address of this machine such as tcp://127.0.0.1:5555"
-        raise ConfigurationError(f"{flag}: cannot bind {endpoint.address}: {advice}") from error
+        return str(frame.get(name))
+    except zmq.ZMQError:
+        return ""
 
 
-def _connect(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    part.setsockopt(zmq.IPV6, endpoint.ipv6)
+def _descriptor(frame: zmq.Frame) -> int:
     try:
-        part.connect(endpoint.address)
-    except zmq.ZMQError as error:
-        raise ConfigurationError(
-            f"{flag}: cannot connect to {endpoint.address}: {os.strerror(error.errno or 0)}; valid: tcp://HOST:PORT"
-        ) from error
+        return int(frame.get(zmq.SRCFD))
+    except zmq.ZMQError:
+        return -1

@@ -1,19 +1,20 @@
 """`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
 
 import json
+import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
-from common.command_line import parse_settings
+from common.command_line import given_fields, parse_settings
 from common.run_options import RunOptions
 from common.status import Status, Value
-from common.stop_signal import StopSignal
+from common.stop_signal import StopSignal, ignore_broken_output
 from feelahead.processes import SideFailedError, SideProcess
 from feelahead.summary import merge_summaries
 
@@ -42,6 +43,8 @@ class DemoSettings(RunOptions):
     """Any MJCF arm with actuators instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips, its z axis along the approach."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
     """The browser console. It is not there yet: the status line is all there is to see."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -53,67 +56,89 @@ class DemoSettings(RunOptions):
 def demo(arguments: Sequence[str]) -> int:
     """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
     settings = parse_settings(DemoSettings, "feelahead demo", arguments)
+    given = given_fields(arguments, DemoSettings)
     with (
         tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
         StopSignal() as stop,
         Status(settings.status, "feelahead demo") as status,
     ):
         summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
-        status.note("starting the robot side (the first start compiles its kernels)")
-        with SideProcess("robot_side.main", "robot", _robot_arguments(settings, summaries["robot"])) as robot:
-            status.event("started", side="robot", process_id=robot.process_id)
-            listening = robot.wait_for("listening", _START_TIMEOUT_S)
-            operator_arguments = _operator_arguments(settings, summaries["operator"], listening)
-            with SideProcess("operator_side.main", "operator", operator_arguments) as operator:
-                status.event("started", side="operator", process_id=operator.process_id)
-                errors = _watch(settings, robot, operator, stop, status)
-                # Both at once: neither is to take the other's end for a fault of the link.
-                operator.interrupt()
-                robot.interrupt()
-                operator.stop()
-                robot.stop()
-                for side in (operator, robot):
-                    try:
-                        side.check()
-                    except SideFailedError as failure:
-                        if str(failure) not in errors:
-                            errors.append(str(failure))
-        merged = merge_summaries(_read(summaries["robot"]), _read(summaries["operator"]), errors)
+        try:
+            errors = _run_both(settings, given, summaries, stop, status)
+        except BrokenPipeError:
+            # Whoever read our status has seen enough; the sides have ended in order.
+            ignore_broken_output()
+            errors = []
+        merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+        if settings.summary is not None:
+            settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
     for line in _report(merged):
         status.note(line)
     for error in errors:
-        status.note(f"error: {error}")
-    if settings.summary is not None:
-        settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
+        sys.stderr.write(f"feelahead demo: {error}\n")
     return 1 if errors else 0
 
 
-def _robot_arguments(settings: DemoSettings, summary: Path) -> list[str]:
-    arguments = [*_shared_arguments(settings, summary), "--bind=tcp://127.0.0.1:0"]
+def _run_both(
+    settings: DemoSettings, given: Collection[str], summaries: Mapping[str, Path], stop: StopSignal, status: Status
+) -> list[str]:
+    """Start both sides, watch them, and end them; what went wrong."""
+    status.note("starting the robot side (the first start compiles its kernels)")
+    with SideProcess("robot_side", "robot", _robot_arguments(settings, given, summaries["robot"])) as robot:
+        status.event("started", side="robot", process_id=robot.process_id)
+        listening = robot.wait_unless("listening", _START_TIMEOUT_S, stop)
+        if listening is None:
+            return []
+        operator_arguments = _operator_arguments(settings, given, summaries["operator"], listening)
+        with SideProcess("operator_side", "operator", operator_arguments) as operator:
+            status.event("started", side="operator", process_id=operator.process_id)
+            errors = _watch(settings, robot, operator, stop, status)
+            # Both at once: neither is to take the other's end for a fault of the link.
+            operator.interrupt()
+            robot.interrupt()
+            operator.stop()
+            robot.stop()
+            for side in (operator, robot):
+                try:
+                    side.check()
+                except SideFailedError as failure:
+                    if str(failure) not in errors:
+                        errors.append(str(failure))
+    return errors
+
+
+def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
+    arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     if settings.robot_config is not None:
         arguments.append(f"--config={settings.robot_config}")
-    if settings.model is not None:
-        arguments.append(f"--model={settings.model}")
-    if settings.site is not None:
-        arguments.append(f"--site={settings.site}")
-    return [*arguments, f"--probability={settings.probability}"]
+    for name in ("model", "site", "probability"):
+        if name in given:
+            arguments.append(f"--{name}={getattr(settings, name)}")
+    return arguments
 
 
-def _operator_arguments(settings: DemoSettings, summary: Path, listening: dict[str, Any]) -> list[str]:
-    arguments = [*_shared_arguments(settings, summary), "--device=simulated"]
+def _operator_arguments(
+    settings: DemoSettings, given: Collection[str], summary: Path, listening: dict[str, Any]
+) -> list[str]:
+    arguments = [*_shared_arguments(settings, given, summary), "--device=simulated"]
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
-    return [*arguments, "--haptics" if settings.haptics else "--no-haptics"]
+    if "haptics" in given:
+        arguments.append("--haptics" if settings.haptics else "--no-haptics")
+    return arguments
 
 
-def _shared_arguments(settings: DemoSettings, summary: Path) -> list[str]:
-    return [
-        f"--link={settings.link}",
-        f"--link-model={settings.link_model}",
-        f"--seed={settings.seed}",
-        f"--summary={summary}",
+def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
+    """Only what somebody asked for: the sides' own files are to count where nothing was."""
+    arguments = [
+        f"--{name.replace('_', '-')}={getattr(settings, name)}"
+        for name in ("link", "link_model", "seed")
+        if name in given
     ]
+    if "realtime" in given:
+        arguments.append("--realtime" if settings.realtime else "--no-realtime")
+    return [*arguments, f"--summary={summary}"]
 
 
 def _watch(
@@ -147,7 +172,7 @@ def _watch(
     return []
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_summary(path: Path) -> dict[str, Any]:
     """A side's summary; empty when it did not live to write one, which `errors` then says."""
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))

@@ -12,8 +12,10 @@ from types import TracebackType
 from typing import Any
 
 from common.errors import ConfigurationError, FeelaheadError
+from common.stop_signal import StopSignal
 
 _BAD_INPUT = 2
+_STOP_PERIOD_S = 0.05
 
 
 class SideFailedError(FeelaheadError):
@@ -25,7 +27,7 @@ class SideProcess:
 
     def __init__(self, module: str, name: str, arguments: Sequence[str]) -> None:
         self.name = name
-        self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8")  # noqa: SIM115  # closed by __exit__
+        self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed by __exit__
         # -P: a folder named `common` in the working directory must not shadow the package.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", module, "--status", "json", *arguments],
@@ -72,12 +74,25 @@ class SideProcess:
 
     def wait_for(self, kind: str, timeout_s: float) -> dict[str, Any]:
         """The next event of this kind; SideFailedError when the side ends or says nothing for so long."""
+        event = self.wait_unless(kind, timeout_s, None)
+        assert event is not None  # noqa: S101  # there is nothing to stop it
+        return event
+
+    def wait_unless(self, kind: str, timeout_s: float, stop: StopSignal | None) -> dict[str, Any] | None:
+        """As `wait_for`, but None as soon as `stop` is set."""
+        remaining_s = timeout_s
         while True:
             try:
-                event = self._events.get(timeout=timeout_s)
+                event = self._events.get(timeout=min(remaining_s, _STOP_PERIOD_S))
             except queue.Empty:
+                if stop is not None and stop.is_set:
+                    return None
+                remaining_s -= _STOP_PERIOD_S
+                if remaining_s > 0.0:
+                    continue
                 self.check()
                 raise SideFailedError(f"the {self.name} side said nothing for {timeout_s:g} s") from None
+            remaining_s = timeout_s
             if event["event"] == kind:
                 return event
             if event["event"] == "end":

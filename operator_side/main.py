@@ -3,14 +3,18 @@
 import json
 import secrets
 from collections.abc import Sequence
+from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.curve_authentication import OperatorKeys
 from common.errors import FeelaheadError
+from common.garbage import IdleCollection
 from common.link_model import DelayLine, LinkSpec
-from common.priority import raise_priority
+from common.pacing import Pacer, wait_for_turn
+from common.priority import make_realtime, raise_priority
 from common.sockets import OperatorSockets
-from common.status import Status
+from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.core import OperatorSide
 from operator_side.dualsense.device import HidDualSense
@@ -38,9 +42,10 @@ def command(arguments: Sequence[str]) -> int:
         calibration=settings.calibration,
         seed=settings.seed,
     )
+    keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(settings.connect, settings.view_connect) as sockets,
+        OperatorSockets(settings.connect, settings.view_connect, keys=keys) as sockets,
         StopSignal() as stop,
         Status(settings.status, "operator") as status,
     ):
@@ -52,9 +57,12 @@ def command(arguments: Sequence[str]) -> int:
         else:
             device = HidDualSense()
         raise_priority()
+        for text in make_realtime() if settings.realtime else ():
+            status.note(text)
+        loop = _Loop(settings, core, line, sockets, device, person, status)
         failure: FeelaheadError | None = None
         try:
-            _loop(settings, core, line, sockets, device, person, stop, status)
+            loop.run(stop)
         except BrokenPipeError:
             ignore_broken_output()
         except FeelaheadError as error:
@@ -64,7 +72,7 @@ def command(arguments: Sequence[str]) -> int:
         # A real controller cannot be asked, but closing it raises when the release cannot be written.
         released = device.released if isinstance(device, SimulatedDualSense) else True
         errors = [] if failure is None else [str(failure)]
-        summary = core.summary() | {"triggers_released": released, "errors": errors}
+        summary = core.summary() | loop.summary() | {"triggers_released": released, "errors": errors}
         if settings.summary is not None:
             settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         if failure is not None:
@@ -72,44 +80,79 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _loop(
-    settings: OperatorSettings,
-    core: OperatorSide,
-    line: DelayLine[bytes],
-    sockets: OperatorSockets,
-    device: Device,
-    person: SimulatedOperator | None,
-    stop: StopSignal,
-    status: Status,
-) -> None:
-    clock = MonotonicClock()
-    start_s = next_motion_s = clock.now()
-    while not stop.is_set:
-        now_s = clock.now()
-        if settings.duration is not None and now_s - start_s >= settings.duration:
-            break
-        for payload in sockets.receive():
-            core.receive(payload, now_s)
-        for _, payload in sockets.receive_view():
-            core.receive_view(payload, now_s)
-        if (output := core.output_report(now_s)) is not None:
-            device.write(output, now_s)
-        if now_s >= next_motion_s:
-            # A late loop skips what it missed: the newest motion is all that counts.
-            next_motion_s = max(next_motion_s + MOTION_PERIOD_S, now_s)
-            if person is not None:
-                person.tick(now_s, core.screen, core.link.round_trip.mean or 0.0)
-            if (report := device.read(now_s)) is not None:
-                core.read_report(report, now_s)
-            for payload in core.motion(now_s):
-                line.push(now_s, payload)
-            if status.due(now_s):
-                status.show(now_s, core.status(now_s) | ({"person": person.phase} if person else {}))
-        for payload in line.pop(clock.now()):
-            sockets.send(payload)
-        due_s = line.next_due()
-        wake_s = next_motion_s if due_s is None else min(next_motion_s, due_s)
-        sockets.wait(max(0.0, wake_s - clock.now()))
+class _Loop:
+    """Motion at absolute deadlines, messages and effects as they come."""
+
+    def __init__(
+        self,
+        settings: OperatorSettings,
+        core: OperatorSide,
+        line: DelayLine[bytes],
+        sockets: OperatorSockets,
+        device: Device,
+        person: SimulatedOperator | None,
+        status: Status,
+    ) -> None:
+        self._duration_s = settings.duration
+        self._core = core
+        self._line = line
+        self._sockets = sockets
+        self._device = device
+        self._person = person
+        self._status = status
+        self._clock = MonotonicClock()
+        self._collection = IdleCollection(self._clock)
+        self._start_s = self._clock.now()
+        self._pacer = Pacer(MOTION_PERIOD_S, self._start_s, settings.seed)
+
+    def run(self, stop: StopSignal) -> None:
+        """Go on until `stop` or --duration."""
+        with self._collection:
+            self._start_s = self._clock.now()
+            self._pacer.restart(self._start_s)
+            while not stop.is_set:
+                now_s = self._clock.now()
+                if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
+                    break
+                for payload in self._sockets.receive():
+                    self._core.receive(payload, now_s)
+                for _, payload in self._sockets.receive_view():
+                    self._core.receive_view(payload, now_s)
+                if (output := self._core.output_report(now_s)) is not None:
+                    self._device.write(output, now_s)
+                moved = self._pacer.due(now_s)
+                if moved:
+                    self._move(now_s)
+                for payload in self._line.pop(self._clock.now()):
+                    self._sockets.send(payload)
+                if moved:
+                    self._use_idle_time(self._clock.now())
+                wait_for_turn(self._pacer, self._clock, self._sockets.wait, self._line.next_due())
+
+    def summary(self) -> dict[str, Any]:
+        """The process's part of the run's figures."""
+        return {"pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}}}
+
+    def _move(self, now_s: float) -> None:
+        self._pacer.begin(now_s)
+        if self._person is not None:
+            self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
+        if (report := self._device.read(now_s)) is not None:
+            self._core.read_report(report, now_s)
+        for payload in self._core.motion(now_s):
+            self._line.push(now_s, payload)
+
+    def _use_idle_time(self, now_s: float) -> None:
+        """What no message should wait for."""
+        if self._status.due(now_s):
+            values: dict[str, Value] = dict(self._core.status(now_s))
+            if self._sockets.trouble is not None and values.get("link") != "up":
+                values["link"] = self._sockets.trouble
+            if self._person is not None:
+                values["person"] = self._person.phase
+            self._status.show(now_s, values | {"motion_overruns": self._pacer.overruns})
+        stiffness = self._core.stiffness
+        self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 
 
 if __name__ == "__main__":

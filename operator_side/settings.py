@@ -1,6 +1,7 @@
 """Everything about the operator side that a person may set, on the command line or in a TOML file."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
@@ -24,6 +25,13 @@ class OperatorSettings(RunOptions):
     """Where the robot side listens."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Where it publishes what the screen shows; the port after the control port unless given."""
+    keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """Prove who we are with the operator's key in FOLDER, made by: feelahead keys make operator. The robot side lets
+    it in after: feelahead keys allow NAME KEY."""
+    robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
+    """With --keys: the robot side's public key, as shown on its machine by: feelahead keys show robot."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     device: Literal["hid", "simulated"] = "hid"
     """A real controller, or a simulated one with a scripted person."""
     haptics: bool = True
@@ -32,3 +40,8 @@ class OperatorSettings(RunOptions):
     """Which part of the triggers' travel counts."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.robot_key is not None and self.keys is None:
+            raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")

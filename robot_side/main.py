@@ -3,13 +3,19 @@
 import json
 import secrets
 import time
+from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
+from common.admission import Admission
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.curve_authentication import RobotKeys
 from common.errors import FeelaheadError
+from common.garbage import IdleCollection
 from common.link_model import DelayLine, LinkSpec
-from common.priority import raise_priority
+from common.pacing import Pacer, wait_for_turn
+from common.priority import make_realtime, raise_descriptor_limit, raise_priority
 from common.sockets import RobotSockets
 from common.statistics import RunningStatistics
 from common.status import Status
@@ -21,6 +27,8 @@ from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
+KEYS_PERIOD_S = 0.2
+"""How often the allow-list is looked at, so that a revoked operator is out within a second."""
 
 
 def main() -> None:
@@ -32,78 +40,155 @@ def command(arguments: Sequence[str]) -> int:
     """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    keys = None if settings.keys is None else RobotKeys.load(settings.keys)
+    raise_descriptor_limit()
     # The sockets first: a port that is taken is found out before the kernels are compiled.
     with (
-        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure) as sockets,
-        StopSignal() as stop,
+        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
         for text in core.notes:
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
-        status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
-        status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-        raise_priority()
-        tick_time = RunningStatistics(settings.seed)
-        clock = MonotonicClock()
-        start_s = clock.now()
-        failure: FeelaheadError | None = None
-        try:
-            _loop(settings, core, link, sockets, stop, status, tick_time)
-        except BrokenPipeError:
-            ignore_broken_output()
-        except FeelaheadError as error:
-            failure = error
-        summary = {"duration_s": clock.now() - start_s, "tick_us": tick_microseconds(tick_time)} | core.summary()
-        # A run that failed has figures, too.
-        summary["errors"] = [] if failure is None else [str(failure)]
-        if settings.summary is not None:
-            settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        # Until here a signal ends the process at once, for a compilation cannot be asked to stop.
+        with StopSignal() as stop:
+            status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
+            for text in _admission_notes(settings, keys):
+                status.note(text)
+            status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
+            raise_priority()
+            for text in make_realtime() if settings.realtime else ():
+                status.note(text)
+            loop = _Loop(settings, core, link, sockets, status)
+            failure: FeelaheadError | None = None
+            try:
+                loop.run(stop)
+            except BrokenPipeError:
+                ignore_broken_output()
+            except FeelaheadError as error:
+                failure = error
+            # A run that failed has figures, too.
+            summary = loop.summary() | core.summary() | {"errors": [] if failure is None else [str(failure)]}
+            if settings.summary is not None:
+                settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         if failure is not None:
             raise failure
     return 0
 
 
-def _loop(
-    settings: RobotSettings,
-    core: RobotSide,
-    link: LinkSpec,
-    sockets: RobotSockets,
-    stop: StopSignal,
-    status: Status,
-    tick_time: RunningStatistics,
-) -> None:
-    clock = MonotonicClock()
-    lines: dict[str, DelayLine[Outgoing]] = {
-        stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
-    }
-    start_s = next_tick_s = clock.now()
-    while not stop.is_set:
-        now_s = clock.now()
-        if settings.duration is not None and now_s - start_s >= settings.duration:
-            break
-        for peer, payload in sockets.receive():
-            core.receive(peer, payload, now_s)
-        if now_s >= next_tick_s:
-            # A late loop skips the ticks that it missed: the newest state is all that counts.
-            next_tick_s = max(next_tick_s + TICK_PERIOD_S, now_s)
-            began_s = time.perf_counter()
-            outgoing = core.tick(now_s)
-            tick_time.add(time.perf_counter() - began_s)
-            for message in outgoing:
-                lines[message.stream].push(now_s, message)
-            if status.due(now_s):
-                status.show(now_s, core.status(now_s))
-        due_s = clock.now()
-        for line in lines.values():
+def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[str]:
+    """What a person should know about who may come in."""
+    if keys is None:
+        return ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
+    names = ", ".join(sorted(keys.allowed.names.values()))
+    if names:
+        return [f"keys: lets in {names}"]
+    return [f"keys: nobody is let in yet; to change that: {keys.allowed.folder.command('allow NAME OPERATOR-KEY')}"]
+
+
+class _Loop:
+    """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
+
+    def __init__(
+        self, settings: RobotSettings, core: RobotSide, link: LinkSpec, sockets: RobotSockets, status: Status
+    ) -> None:
+        self._duration_s = settings.duration
+        self._core = core
+        self._sockets = sockets
+        self._status = status
+        self._clock = MonotonicClock()
+        self._admission = Admission()
+        self._tick_time = RunningStatistics(settings.seed)
+        self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
+        self._lines: dict[str, DelayLine[Outgoing]] = {
+            stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
+        }
+        self._collection = IdleCollection(self._clock)
+        self._start_s = self._clock.now()
+        self._pacer = Pacer(TICK_PERIOD_S, self._start_s, settings.seed)
+        self._next_keys_s = self._start_s
+
+    def run(self, stop: StopSignal) -> None:
+        """Go on until `stop` or --duration."""
+        with self._collection:
+            self._start_s = self._clock.now()
+            self._pacer.restart(self._start_s)
+            while not stop.is_set:
+                now_s = self._clock.now()
+                if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
+                    break
+                operator = self._core.session.operator(now_s)
+                for peer, payload in self._admission.admitted(self._sockets.receive(), operator):
+                    self._core.receive(peer, payload, now_s)
+                ticked = self._pacer.due(now_s)
+                if ticked:
+                    self._tick(now_s)
+                self._send()
+                if ticked:
+                    self._use_idle_time(self._clock.now())
+                dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
+                wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))
+
+    def summary(self) -> dict[str, Any]:
+        """The process's part of the run's figures."""
+        sockets = self._sockets
+        paced = self._pacer.summary()
+        return {
+            "duration_s": self._clock.now() - self._start_s,
+            "tick_us": tick_microseconds(self._tick_time),
+            **paced,
+            "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
+            "strangers": {
+                "refused": sockets.refused,
+                "revoked": sockets.revoked,
+                "flooding": sockets.flooding,
+                "malformed": sockets.rejected,
+                "unread": self._admission.unread,
+            },
+        }
+
+    def _tick(self, now_s: float) -> None:
+        self._pacer.begin(now_s)
+        self._admission.begin_tick()
+        began_s = time.perf_counter()
+        outgoing = self._core.tick(now_s)
+        took_s = time.perf_counter() - began_s
+        self._tick_time.add(took_s)
+        self._latest_tick_times_s.append(took_s)
+        for message in outgoing:
+            self._lines[message.stream].push(now_s, message)
+
+    def _send(self) -> None:
+        due_s = self._clock.now()
+        for line in self._lines.values():
             for message in line.pop(due_s):
                 if message.stream == "haptics":
-                    sockets.send(message.peer, message.payload)
+                    self._sockets.send(message.peer, message.payload)
                 else:
-                    sockets.publish(b"telemetry", message.payload)
-        wakes_s = [next_tick_s, *(due for line in lines.values() if (due := line.next_due()) is not None)]
-        sockets.wait(max(0.0, min(wakes_s) - clock.now()))
+                    self._sockets.publish(b"telemetry", message.payload)
+
+    def _paced(self) -> dict[str, float | int]:
+        """The ticks since this was last asked for."""
+        latest_s = sorted(self._latest_tick_times_s) or [0.0]
+        self._latest_tick_times_s.clear()
+        return {
+            "tick_us": 1e6 * latest_s[len(latest_s) // 2],
+            "tick_p99_us": 1e6 * latest_s[len(latest_s) * 99 // 100],
+            "overruns": self._pacer.overruns,
+            "late_us": 1e6 * self._pacer.take_latest_s(),
+        }
+
+    def _use_idle_time(self, now_s: float) -> None:
+        """What no tick should wait for."""
+        if self._status.due(now_s):
+            self._status.show(now_s, self._core.status(now_s) | self._paced())
+        if now_s >= self._next_keys_s:
+            self._next_keys_s = now_s + KEYS_PERIOD_S
+            self._sockets.refresh_keys()
+            for text in self._sockets.key_news():
+                self._status.note(text)
+        self._collection.idle(now_s, resting=self._core.session.safety.arming.state != "armed")
 
 
 if __name__ == "__main__":

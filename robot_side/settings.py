@@ -78,8 +78,13 @@ class RobotSettings(RunOptions):
     """Where to listen for the operator side; port 0 takes any free one."""
     view_bind: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Where to publish what the screen shows; the port after the control port unless given."""
+    keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """Let in only operators whose keys FOLDER allows, and encrypt everything; needed beyond this machine. Made by:
+    feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
     insecure: bool = False
     """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
     """Any MJCF arm with actuators instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
@@ -103,6 +108,8 @@ class RobotSettings(RunOptions):
         super().__post_init__()
         if not 1 <= self.spheres <= 1000:
             raise ValueError(f"--spheres {self.spheres}: valid: 1 to 1000")
+        if self.keys is not None and self.insecure:
+            raise ValueError("--insecure with --keys: valid: one of them, as keys already say who may come in")
         _require("assumed_delay_s", self.assumed_delay_s, 0.001, 60.0)
         self.enlargement_settings()
 

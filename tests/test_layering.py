@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "feelahead": set(PACKAGES),
 }
 IO_ROOMS = {
-    "zmq": {"common/sockets.py"},
+    "zmq": {"common/sockets.py", "common/socket_shell.py", "common/curve_authentication.py"},
     "hid": {"operator_side/dualsense/device.py"},
     "hidraw": {"operator_side/dualsense/device.py"},
     "mujoco": {
@@ -28,6 +28,8 @@ IO_ROOMS = {
 }
 CLOCK_READERS = {
     "common/clock.py",  # the clock
+    "feelahead/benchmarks/wake_error.py",  # measures a clock's loop
+    "feelahead/experiments/hostile_input.py",  # drives two real processes
     "feelahead/demo.py",  # shows two real processes to a person
     "robot_side/main.py",  # times its own ticks
     "feelahead/loopback.py",  # likewise

@@ -1,14 +1,55 @@
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
-CODE = (
-    "from common.priority import raise_priority; import os; print(raise_priority(), os.getpriority(os.PRIO_PROCESS, 0))"
-)
+import pytest
+
+from common import priority
+
+
+def run(code: str) -> str:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def test_it_says_whether_the_priority_was_granted() -> None:
-    ended = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)
-    granted, niceness = ended.stdout.split()
+    granted, niceness = run(
+        "from common.priority import raise_priority; import os;"
+        "print(raise_priority(), os.getpriority(os.PRIO_PROCESS, 0))"
+    ).split()
     assert granted == str(int(niceness) <= -10)
     assert int(niceness) <= os.getpriority(os.PRIO_PROCESS, 0)
+
+
+def test_every_thread_is_raised_not_only_the_one_that_asks() -> None:
+    said = run(
+        "import os, threading, time\nfrom common.priority import raise_priority\n"
+        "threading.Thread(target=time.sleep, args=(0.5,)).start()\n"
+        "granted = raise_priority()\n"
+        "levels = {os.getpriority(os.PRIO_PROCESS, int(thread)) for thread in os.listdir('/proc/self/task')}\n"
+        "print(granted, len(os.listdir('/proc/self/task')), len(levels))"
+    )
+    assert said.endswith("2 1")
+
+
+def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
+    said = run(
+        "import os\nfrom common.priority import make_realtime\n"
+        "notes = make_realtime()\nprint(os.sched_getscheduler(0) == os.SCHED_FIFO)\nprint(*notes, sep='\\n')"
+    ).splitlines()
+    granted, notes = said[0] == "True", said[1:]
+    assert granted != any("real-time scheduling" in note for note in notes)
+    assert all(re.search(r"--realtime: .* not permitted; to permit it: .*(sudo|docker)", note) for note in notes)
+
+
+def test_what_is_not_permitted_is_noted_and_nothing_else_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(priority, "_lock_memory", lambda: False)
+    notes = priority.make_realtime()
+    assert len(notes) == 2
+    assert all("\n" not in note for note in notes)
+    assert "rtprio" in notes[0] or Path("/.dockerenv").exists()

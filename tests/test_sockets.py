@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 import pytest
 import zmq
 
-from common import sockets
+from common import socket_shell
 from common.errors import ConfigurationError
-from common.sockets import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, OperatorSockets, RobotSockets
+from common.socket_shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
+from common.sockets import OperatorSockets, RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
@@ -158,7 +159,7 @@ def test_one_call_receives_a_bounded_number(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     greet(robot, operator)
-    monkeypatch.setattr(sockets, "MESSAGES_PER_RECEIVE", 3)
+    monkeypatch.setattr(socket_shell, "MESSAGES_PER_RECEIVE", 3)
     for number in range(8):
         send_until_connected(operator, b"%d" % number)
     batches: list[list[bytes]] = []

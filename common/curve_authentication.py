@@ -1,0 +1,171 @@
+"""Who may connect: CURVE key pairs, and the answers to ZeroMQ's question whether a handshake may succeed.
+
+ZeroMQ asks over a socket of its own (ZAP, rfc.zeromq.org/spec/27). It is served by whoever waits for messages, so
+that there is no thread that could die unnoticed: while nobody serves, nobody gets in.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import zmq
+from zmq.utils import z85
+from zmq.utils.monitor import parse_monitor_message
+
+from common.errors import ConfigurationError
+from common.keys import AllowList, KeyFolder, read_public_key
+
+_ZAP_ENDPOINT = "inproc://zeromq.zap.01"
+_ZAP_DOMAIN = b"feelahead"
+_ANSWERS_PER_CALL = 4
+"""So that a storm of handshakes cannot hold the caller."""
+_EVENTS_PER_CALL = 16
+_REMEMBERED_REFUSALS = 64
+
+
+def make_key_pair() -> tuple[str, str]:
+    """A new (public, secret) pair of keys, as hexadecimal digits."""
+    public, secret = zmq.curve_keypair()
+    return z85.decode(public).hex(), z85.decode(secret).hex()
+
+
+def public_part(secret: str) -> str:
+    """The public key that belongs to `secret`."""
+    return z85.decode(zmq.curve_public(z85.encode(bytes.fromhex(secret)))).hex()
+
+
+@dataclass(frozen=True)
+class RobotKeys:
+    """What the robot side needs: its own secret key, and whom it lets in."""
+
+    secret: str
+    allowed: AllowList
+
+    @classmethod
+    def load(cls, folder: Path) -> "RobotKeys":
+        """From a folder of keys; ConfigurationError with the command that mends it."""
+        keys = KeyFolder(folder)
+        secret = keys.secret("robot")
+        allowed = AllowList(keys)
+        allowed.refresh()
+        if allowed.unreadable is not None:
+            raise ConfigurationError(f"--keys {folder}: {allowed.unreadable}")
+        return cls(secret, allowed)
+
+    def secure(self, part: "zmq.Socket[bytes]") -> None:
+        """Let nobody into `part` but who has an allowed key; before it is bound."""
+        part.setsockopt(zmq.CURVE_SERVER, 1)
+        part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
+        part.setsockopt(zmq.ZAP_DOMAIN, _ZAP_DOMAIN)
+        part.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)
+
+
+@dataclass(frozen=True)
+class OperatorKeys:
+    """What the operator side needs: its own secret key, and the robot side's public one."""
+
+    secret: str
+    robot: str
+
+    @classmethod
+    def load(cls, folder: Path, robot_key: str | None) -> "OperatorKeys":
+        """From a folder of keys and the robot side's public key; ConfigurationError with the command that mends it."""
+        secret = KeyFolder(folder).secret("operator")
+        if robot_key is None:
+            raise ConfigurationError(
+                f"--keys {folder}: whose robot side it is must be known, too; valid: --robot-key KEY, "
+                "where KEY is what `feelahead keys show robot` prints on the robot's machine"
+            )
+        return cls(secret, read_public_key(robot_key, "--robot-key"))
+
+    def secure(self, part: "zmq.Socket[bytes]") -> None:
+        """Let `part` talk to nobody but the owner of the robot side's key; before it is connected."""
+        part.setsockopt(zmq.CURVE_SERVERKEY, bytes.fromhex(self.robot))
+        part.setsockopt(zmq.CURVE_PUBLICKEY, bytes.fromhex(public_part(self.secret)))
+        part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
+
+
+class Authenticator:
+    """Answers the handshakes of one context from an allow-list; it must exist before any socket is bound."""
+
+    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", allowed: AllowList) -> None:
+        self.refused = 0
+        """Handshakes with a key that is not allowed."""
+        self._allowed = allowed
+        self._refused_keys: dict[str, bool] = {}
+        self._questions = context.socket(zmq.REP)
+        self._questions.setsockopt(zmq.LINGER, 0)
+        self._questions.bind(_ZAP_ENDPOINT)
+
+    def fileno(self) -> int:
+        """A descriptor that becomes readable when there is something to serve."""
+        return self._questions.fileno()
+
+    def serve(self) -> bool:
+        """Answer what was asked since the last call, a few at most; whether more may wait. Never blocks."""
+        for _ in range(_ANSWERS_PER_CALL):
+            try:
+                question = self._questions.recv_multipart(zmq.NOBLOCK)
+            except zmq.Again:
+                return False
+            self._questions.send_multipart(self._answer(question))
+        return True
+
+    def unknown_keys(self) -> list[str]:
+        """The keys refused for the first time since the last call, for somebody who may want to allow them."""
+        new = [key for key, is_new in self._refused_keys.items() if is_new]
+        self._refused_keys.update(dict.fromkeys(new, False))
+        return new
+
+    def _answer(self, question: list[bytes]) -> list[bytes]:
+        # version, request, domain, address, identity, mechanism, and for CURVE the client's public key
+        request = question[1] if len(question) > 1 else b""
+        is_curve = len(question) == 7 and question[5] == b"CURVE" and question[2] == _ZAP_DOMAIN
+        key = question[6].hex() if is_curve else ""
+        if key in self._allowed.names:
+            return [b"1.0", request, b"200", b"", key.encode(), b""]
+        self.refused += 1
+        if is_curve and key not in self._refused_keys and len(self._refused_keys) < _REMEMBERED_REFUSALS:
+            self._refused_keys[key] = True
+        return [b"1.0", request, b"400", b"not allowed", b"", b""]
+
+
+class HandshakeWatch:
+    """Sees how the handshakes of a connecting socket end, and says in words why one failed."""
+
+    def __init__(self, part: "zmq.Socket[bytes]", keys: OperatorKeys | None) -> None:
+        self.trouble: str | None = None
+        """Why the newest handshake failed, with what to do about it; None after one that succeeded."""
+        self.failed = False
+        """Whether one has failed since the caller last cleared this: ZeroMQ does not try again by itself."""
+        self._keys = keys
+        self._events = part.get_monitor_socket(
+            zmq.EVENT_HANDSHAKE_SUCCEEDED
+            | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+            | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+            | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+        )
+
+    def look(self) -> None:
+        """Take note of what has happened since the last call; never blocks."""
+        for _ in range(_EVENTS_PER_CALL):
+            try:
+                event = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))["event"]
+            except zmq.Again:
+                return
+            self.failed = event != zmq.EVENT_HANDSHAKE_SUCCEEDED
+            self.trouble = self._reason(event) if self.failed else None
+
+    def close(self) -> None:
+        """Look no more; before the socket itself is closed."""
+        self._events.close(linger=0)
+
+    def _reason(self, event: int) -> str:
+        if self._keys is None:
+            return "the robot side asks for keys; valid: --keys FOLDER --robot-key KEY (feelahead keys --help)"
+        if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+            key = public_part(self._keys.secret)
+            return f"the robot side does not let this key in; to be run there: feelahead keys allow NAME {key}"
+        return (
+            "the robot side has no keys, or another key than --robot-key; "
+            "its own is shown there by: feelahead keys show robot"
+        )

@@ -1,0 +1,243 @@
+"""Keys as files that people can read: this side's own pair, and the peers that it lets in.
+
+    FOLDER/robot.secret        the robot side's own key, for nobody else's eyes (mode 0600)
+    FOLDER/robot.public        its public part, to be given to the operators
+    FOLDER/allowed/NAME.public the public key of a peer that is let in; deleting the file revokes it
+
+A key is 64 hexadecimal digits (32 bytes, Curve25519), so that no shell needs quotes around it. Lines that begin
+with # are for people.
+"""
+
+import os
+import re
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from common.errors import ConfigurationError
+
+Side = Literal["robot", "operator"]
+
+DEFAULT_FOLDER = Path("~/.config/feelahead/keys")
+PEER_LIMIT = 256
+"""Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
+_FILE_LIMIT_BYTES = 4096
+_KEY = re.compile(r"[0-9a-f]{64}")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
+
+
+def checked_key(text: str, what: str) -> str:
+    """`text` as a key in lower case; ConfigurationError names `what`."""
+    key = text.strip().lower()
+    if _KEY.fullmatch(key) is None:
+        raise ConfigurationError(f"{what}: {text.strip()[:80]!r} is no key; valid: 64 hexadecimal digits")
+    return key
+
+
+def checked_name(name: str) -> str:
+    """`name` as a peer's name, and hence a file's; ConfigurationError when it could be anything else."""
+    if _NAME.fullmatch(name) is None:
+        raise ConfigurationError(
+            f"name {name[:80]!r}: valid: 1 to 32 letters, digits, - and _, the first a letter or digit"
+        )
+    return name
+
+
+def read_public_key(key_or_file: str, what: str) -> str:
+    """A public key given as such or as the path of a file that holds one; ConfigurationError names `what`."""
+    if _KEY.fullmatch(key_or_file.strip().lower()):
+        return key_or_file.strip().lower()
+    path = Path(key_or_file).expanduser()
+    if path.suffix == ".secret":
+        raise ConfigurationError(
+            f"{what}: {path} is a secret key, which stays where it was made; valid: the .public file"
+        )
+    if not path.is_file():
+        raise ConfigurationError(
+            f"{what}: {key_or_file[:80]!r} is neither a key nor a file; valid: 64 hexadecimal digits, or a .public file"
+        )
+    return _read_key(path, what)
+
+
+@dataclass(frozen=True)
+class KeyFolder:
+    """One folder of keys; nothing is kept in memory."""
+
+    path: Path = DEFAULT_FOLDER
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", self.path.expanduser())
+
+    def secret_path(self, side: Side) -> Path:
+        """Where the side's own secret key stands."""
+        return self.path / f"{side}.secret"
+
+    def public_path(self, side: Side) -> Path:
+        """Where its public part stands."""
+        return self.path / f"{side}.public"
+
+    @property
+    def allowed_path(self) -> Path:
+        """The folder of the peers that are let in."""
+        return self.path / "allowed"
+
+    def write_pair(self, side: Side, public: str, secret: str, *, replace: bool = False) -> None:
+        """Write a side's own pair; ConfigurationError when there is one already and `replace` is not said."""
+        path = self.secret_path(side)
+        if path.exists() and not replace:
+            raise ConfigurationError(
+                f"{path}: there is a key already; valid: `{self.command(f'show {side}')}` for its public part, "
+                "or --replace, after which every peer needs the new one"
+            )
+        self._make_folder(self.path)
+        whose = f"this {side} side"
+        _write(
+            path,
+            f"# The secret key of {whose}: whoever reads it can pass for it. It never leaves this machine.\n{secret}\n",
+        )
+        _write(
+            self.public_path(side), f"# The public key of {whose}, to be given to its peers.\n{public}\n", mode=0o644
+        )
+
+    def secret(self, side: Side) -> str:
+        """The side's own secret key; ConfigurationError with the command that mends it."""
+        path = self.secret_path(side)
+        if not path.is_file():
+            raise ConfigurationError(
+                f"--keys {self.path}: there is no {path.name}; valid: a folder with one, "
+                f"made by `{self.command(f'make {side}')}`"
+            )
+        mode = stat.S_IMODE(path.stat().st_mode)
+        if mode & 0o077:
+            raise ConfigurationError(
+                f"--keys {self.path}: others may read {path.name} (mode {mode:04o}); valid: mode 0600, "
+                f"set by `chmod 600 {path}`"
+            )
+        return _read_key(path, "--keys")
+
+    def allow(self, name: str, public: str) -> None:
+        """Let a peer in; ConfigurationError when the name, the key, or the folder's last place is taken."""
+        peers = self.allowed()
+        if peers.get(public, name) != name:
+            raise ConfigurationError(f"this key is allowed already, as {peers[public]!r}")
+        if name in peers.values() and public not in peers:
+            raise ConfigurationError(
+                f"name {name!r}: stands for another key; valid: another name, "
+                f"or `{self.command(f'revoke {name}')}` first"
+            )
+        if len(peers) >= PEER_LIMIT:
+            raise ConfigurationError(f"{len(peers)} peers are allowed already; valid: up to {PEER_LIMIT}")
+        self._make_folder(self.path)
+        self._make_folder(self.allowed_path)
+        _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
+
+    def revoke(self, name: str) -> None:
+        """Let a peer in no more; ConfigurationError when there is none of that name."""
+        path = self.peer_path(name)
+        if not path.is_file():
+            names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
+            raise ConfigurationError(f"name {name!r}: no such peer in {self.allowed_path}; valid: {names}")
+        path.unlink()
+
+    def allowed(self) -> dict[str, str]:
+        """The name of each key that is let in; ConfigurationError for a file without one or an open folder."""
+        return {_read_key(path, "allowed"): path.stem for path in self._peer_files()}
+
+    def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
+        """What changes whenever the peers do: each file's name, time of change and number, without reading any."""
+        try:
+            return tuple(
+                sorted((path.name, (found := path.stat()).st_mtime_ns, found.st_ino) for path in self._peer_files())
+            )
+        except (OSError, ConfigurationError):
+            return ()
+
+    def command(self, rest: str) -> str:
+        """The command line that does `rest` to this folder."""
+        folder = "" if self.path == DEFAULT_FOLDER.expanduser() else f" --folder {self.path}"
+        return f"feelahead keys {rest}{folder}"
+
+    def peer_path(self, name: str) -> Path:
+        """Where the public key of the peer of that name stands; ConfigurationError for what is no name."""
+        return self.allowed_path / f"{checked_name(name)}.public"
+
+    def _peer_files(self) -> list[Path]:
+        if not self.allowed_path.is_dir():
+            return []
+        _refuse_writable(self.allowed_path)
+        files = [path for path in self.allowed_path.glob("*.public") if _NAME.fullmatch(path.stem)]
+        if len(files) > PEER_LIMIT:
+            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
+        return files
+
+    @staticmethod
+    def _make_folder(path: Path) -> None:
+        try:
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigurationError(f"--folder {path}: cannot be made: {error.strerror}") from error
+
+
+@dataclass
+class AllowList:
+    """Whom a running side lets in: the folder's peers, read again whenever the folder has changed."""
+
+    folder: KeyFolder
+    names: dict[str, str] = field(default_factory=dict)
+    """The name of each key."""
+    unreadable: str | None = None
+    """Why nobody is let in at the moment; None while the folder can be read."""
+    _fingerprint: tuple[tuple[str, int, int], ...] | None = None
+
+    def refresh(self) -> set[str]:
+        """Look at the folder, a few stat calls; the keys that were let in before and are no more.
+
+        What cannot be read lets nobody in: a half of the list is no list.
+        """
+        fingerprint = self.folder.fingerprint()
+        if fingerprint == self._fingerprint:
+            return set()
+        before = set(self.names)
+        try:
+            self.names, self.unreadable, self._fingerprint = self.folder.allowed(), None, fingerprint
+        except (ConfigurationError, OSError) as error:
+            # Without a fingerprint the next look reads again.
+            self.names, self.unreadable, self._fingerprint = {}, str(error), None
+        return before - set(self.names)
+
+
+def _read_key(path: Path, what: str) -> str:
+    try:
+        with path.open(encoding="ascii") as file:
+            content = file.read(_FILE_LIMIT_BYTES)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"{what}: {path} cannot be read: {getattr(error, 'strerror', 'no ASCII text')}; valid: a key file"
+        ) from error
+    lines = [line for line in content.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) != 1:
+        raise ConfigurationError(f"{what}: {path} holds {len(lines)} lines; valid: one key of 64 hexadecimal digits")
+    return checked_key(lines[0], f"{what}: {path}")
+
+
+def _refuse_writable(path: Path) -> None:
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & 0o022:
+        raise ConfigurationError(
+            f"{path}: others may write there (mode {mode:04o}) and let anyone in; valid: mode 0700, "
+            f"set by `chmod 700 {path}`"
+        )
+
+
+def _write(path: Path, content: str, mode: int = 0o600) -> None:
+    """Whole or not at all: a side that runs must never read half a key."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+        with os.fdopen(descriptor, "w", encoding="ascii") as file:
+            file.write(content)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise ConfigurationError(f"{path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,72 @@
+"""The first moments of a command, before anything large is imported: signals, output, and what is not installed.
+
+Only the standard library is imported here, so that a Ctrl-C right after the start meets a handler.
+"""
+
+import importlib.metadata
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+
+Command = Callable[[Sequence[str]], int]
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_OURS = ("common", "robot_side", "operator_side", "feelahead")
+_BAD_INPUT = 2
+
+
+def launch(program: str, load: Callable[[], Command], extra: str | None = None) -> None:
+    """Import the command with `load`, run it with this process's arguments, and exit.
+
+    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built. A module
+    that is not installed becomes one line that names `extra`, the optional dependencies to install. `--version`
+    needs no import at all.
+    """
+    for number in _SIGNALS:
+        signal.signal(number, _leave_at_once)
+    _write_in_any_locale()
+    if sys.argv[1:] == ["--version"]:
+        sys.stdout.write(f"{program} {importlib.metadata.version('feelahead')}\n")
+        sys.exit(0)
+    try:
+        command = load()
+        from common.command_line import run_command  # noqa: PLC0415  # large, hence not before the handlers
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing in _OURS:
+            raise
+        wanted = "feelahead" if extra is None else f"feelahead[{extra}]"
+        sys.stderr.write(f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}'\n")
+        sys.exit(_BAD_INPUT)
+    for number in _SIGNALS:
+        signal.signal(number, _interrupt)
+    run_command(program, command)
+
+
+def single_threaded_algebra() -> None:
+    """One thread for NumPy's linear algebra, unless somebody said otherwise; before NumPy is imported.
+
+    A tick's matrices are tiny: the other threads would only wait for work, on processors that others could use.
+    """
+    for library in ("OPENBLAS", "MKL", "OMP"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def _write_in_any_locale() -> None:
+    """A character that the terminal's encoding does not have becomes a question mark instead of a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def _leave_at_once(number: int, frame: FrameType | None) -> None:
+    # An exception could be caught, or lost, by a module that is half imported; there is nothing to clean up yet.
+    del number, frame
+    os._exit(0)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    raise KeyboardInterrupt

@@ -1,0 +1,200 @@
+"""What both processes' sockets have in common: their options, waiting, reading without being held up, closing."""
+
+import os
+import select
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Self
+
+import zmq
+
+from common.clock import MonotonicClock
+from common.curve_authentication import Authenticator
+from common.endpoints import Endpoint
+from common.errors import ConfigurationError
+
+CONTROL_HIGH_WATER_MARK = 16
+"""Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.
+
+With 2, half of a burst of five was lost, and a peer that stood still got no fewer stale ones: those wait in
+the kernel's buffers, until the heartbeat ends the connection.
+"""
+VIEW_HIGH_WATER_MARK = 8
+"""View messages that wait on either side: both cameras' frames, telemetry, and as many again."""
+RECEIVE_HIGH_WATER_MARK = 100_000
+"""Control messages that wait to be received: out of reach for whoever drains once per tick.
+
+A low mark would not keep them fresh (the kernel's buffers hold thousands more, and a drain would end at the
+mark instead of at the newest), and libzmq up to 4.3.5 aborts the process when a socket at its mark finds a
+heartbeat before the end of the connection (libzmq issues 3937, 4364 and 4767).
+"""
+CONTROL_LIMIT_BYTES = 4096
+"""The codec looks into nothing larger."""
+VIEW_LIMIT_BYTES = 4 * 1024 * 1024
+MESSAGES_PER_RECEIVE = 64
+"""At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
+HANDSHAKE_LIMIT_S = 10.0
+"""A connection that has not introduced itself by then ends; a CURVE handshake takes three round trips."""
+
+
+class SocketShell:
+    """A context with a control and a view socket; no call but `wait_for` blocks."""
+
+    def __init__(self, control_type: int, view_type: int, heartbeat_timeout_s: float) -> None:
+        if not 0.03 <= heartbeat_timeout_s <= 60.0:
+            raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
+        self.dropped = 0
+        """Messages that could not leave at once: the peer is gone, or does not keep up."""
+        self.rejected = 0
+        """Messages received with a wrong number of frames."""
+        self._clock = MonotonicClock()
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
+        self._control = self._open_control(control_type)
+        self._view = self._open_view(view_type)
+
+    def _open_control(self, control_type: int) -> "zmq.Socket[bytes]":
+        part = self._context.socket(control_type)
+        for option, value in (
+            (zmq.SNDHWM, CONTROL_HIGH_WATER_MARK),
+            (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK),
+            (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES),
+            (zmq.HEARTBEAT_IVL, self._heartbeat_ms // 3),
+            (zmq.HEARTBEAT_TIMEOUT, self._heartbeat_ms),
+            (zmq.HEARTBEAT_TTL, self._heartbeat_ms * 4 // 3),
+            (zmq.HANDSHAKE_IVL, round(1e3 * HANDSHAKE_LIMIT_S)),
+            (zmq.LINGER, 0),
+        ):
+            part.setsockopt(option, value)
+        return part
+
+    def _open_view(self, view_type: int) -> "zmq.Socket[bytes]":
+        part = self._context.socket(view_type)
+        publishes = view_type == zmq.PUB
+        for option, value in (
+            (zmq.SNDHWM, VIEW_HIGH_WATER_MARK),
+            # What viewers send, subscriptions, is little, but hitting the mark could end the process.
+            (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK if publishes else VIEW_HIGH_WATER_MARK),
+            (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES if publishes else VIEW_LIMIT_BYTES),
+            # Not heartbeats: a viewer may well stay at its mark, and a frame can hold up an answer for long.
+            (zmq.TCP_KEEPALIVE, 1),
+            (zmq.TCP_KEEPALIVE_IDLE, 1),
+            (zmq.TCP_KEEPALIVE_INTVL, 1),
+            (zmq.TCP_KEEPALIVE_CNT, 3),
+            (zmq.HANDSHAKE_IVL, round(1e3 * HANDSHAKE_LIMIT_S)),
+            (zmq.LINGER, 0),
+        ):
+            part.setsockopt(option, value)
+        return part
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close at once, whatever has not left yet; closing twice does no harm."""
+        self._context.destroy(linger=0)
+
+    def wait_for(
+        self,
+        timeout_s: float | None,
+        awaited: Sequence["zmq.Socket[bytes]"],
+        served: Authenticator | None = None,
+    ) -> bool:
+        """Whether one of `awaited` has something before the time is up; `served` gets its answers meanwhile.
+
+        zmq's own poll counts whole milliseconds, hence select on the sockets' descriptors. These signal only
+        changes, and only until EVENTS is read: it has the last word before and after each select.
+        """
+        if timeout_s is not None and not timeout_s >= 0.0:
+            raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
+        descriptors = [part.fileno() for part in awaited]
+        if served is not None:
+            descriptors.append(served.fileno())
+        deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
+        while True:
+            pending = served is not None and served.serve()
+            if any(_readable(part) for part in awaited):
+                return True
+            remaining_s = None
+            if deadline_s is not None:
+                remaining_s = deadline_s - self._clock.now()
+                if remaining_s <= 0.0:
+                    return False
+            select.select(descriptors, [], [], 0.0 if pending else remaining_s)
+
+    def send_frames(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
+        """Send without waiting; False, and counted in `dropped`, when it cannot leave; ValueError when too long."""
+        if len(frames[-1]) > limit_bytes:
+            raise ValueError(f"payload of {len(frames[-1])} bytes; valid: up to {limit_bytes} bytes")
+        for _ in range(2):
+            try:
+                part.send_multipart(frames, zmq.NOBLOCK)
+            except zmq.Again:
+                # The socket may only not have noticed yet what has left: that happens when EVENTS is read.
+                part.getsockopt(zmq.EVENTS)
+            except zmq.ZMQError as error:
+                if error.errno != zmq.EHOSTUNREACH:
+                    raise
+                break
+            else:
+                return True
+        self.dropped += 1
+        return False
+
+
+class Reader:
+    """The messages of one socket, read frame by frame: one of a million frames must not hold the caller either."""
+
+    def __init__(self, frames: int) -> None:
+        self._frames = frames
+        self._begun: list[zmq.Frame] = []
+
+    def read(self, part: "zmq.Socket[bytes]") -> Iterator[list[zmq.Frame]]:
+        """What has arrived, oldest first, each at most one frame longer than it should be."""
+        for _ in range(MESSAGES_PER_RECEIVE * self._frames):
+            try:
+                frame = part.recv(zmq.NOBLOCK, copy=False)
+            except zmq.Again:
+                return
+            if len(self._begun) <= self._frames:
+                self._begun.append(frame)
+            if not frame.more:
+                message, self._begun = self._begun, []
+                yield message
+
+
+def _readable(part: "zmq.Socket[bytes]") -> bool:
+    return bool(int(part.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+
+
+def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
+    """Bind, or say in one line of `flag` why that cannot be (ConfigurationError)."""
+    part.setsockopt(zmq.IPV6, endpoint.ipv6)
+    try:
+        part.bind(endpoint.address)
+    except zmq.ZMQError as error:
+        if error.errno == zmq.EADDRINUSE:
+            other = Endpoint(endpoint.host, endpoint.port + 2 if endpoint.port < 65000 else 5555, endpoint.ipv6)
+            advice = f"the port is in use; valid: another one such as {other.address}"
+        else:
+            advice = f"{os.strerror(error.errno or 0)}; valid: an address of this machine such as tcp://127.0.0.1:5555"
+        raise ConfigurationError(f"{flag}: cannot bind {endpoint.address}: {advice}") from error
+
+
+def connect_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
+    """Connect, now or when the other side is there; ConfigurationError, in one line of `flag`, when it never can."""
+    part.setsockopt(zmq.IPV6, endpoint.ipv6)
+    try:
+        part.connect(endpoint.address)
+    except zmq.ZMQError as error:
+        raise ConfigurationError(
+            f"{flag}: cannot connect to {endpoint.address}: {os.strerror(error.errno or 0)}; valid: tcp://HOST:PORT"
+        ) from error

@@ -1,0 +1,18 @@
+"""The console script `feelahead`, also `python -m feelahead`."""
+
+from common.launch import Command, launch
+
+
+def main() -> None:
+    """Run the command."""
+    launch("feelahead", _load)
+
+
+def _load() -> Command:
+    from feelahead.main import command  # noqa: PLC0415  # large: a signal must find its handler before
+
+    return command
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""ZMTP 3.0 by hand over a plain TCP connection (rfc.zeromq.org/spec/23), so that it can be spoken wrongly."""
+
+import socket
+import struct
+
+GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
+"""Signature, version 3.0, mechanism NULL, not a server, filler: 64 bytes."""
+_MORE, _LONG, _COMMAND = 1, 2, 4
+_TIMEOUT_S = 5.0
+
+
+def ready(socket_type: bytes) -> bytes:
+    """The command that ends the handshake of the NULL mechanism."""
+    name, value = b"Socket-Type", socket_type
+    body = b"\x05READY" + bytes([len(name)]) + name + struct.pack(">I", len(value)) + value
+    return bytes([_COMMAND, len(body)]) + body
+
+
+def frame(body: bytes, *, more: bool = False, claimed_bytes: int | None = None) -> bytes:
+    """One frame of a message; `claimed_bytes` lies about its length."""
+    length = len(body) if claimed_bytes is None else claimed_bytes
+    flags = _MORE if more else 0
+    if length < 256:
+        return bytes([flags, length]) + body
+    return bytes([flags | _LONG]) + struct.pack(">Q", length) + body
+
+
+def message(*bodies: bytes) -> bytes:
+    """One message of these frames."""
+    return b"".join(frame(body, more=position < len(bodies) - 1) for position, body in enumerate(bodies))
+
+
+def port_of(endpoint: str) -> int:
+    """The port of tcp://HOST:PORT."""
+    return int(endpoint.rsplit(":", 1)[1])
+
+
+class RawConnection:
+    """A TCP connection to a port of this machine that never blocks for long, and that the other side may end."""
+
+    def __init__(self, port: int, sends: bytes = b"") -> None:
+        self.open = True
+        """False once the other side has ended it."""
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=_TIMEOUT_S)
+        self._socket.sendall(sends)
+
+    @classmethod
+    def introduced(cls, port: int, socket_type: bytes = b"DEALER") -> "RawConnection":
+        """One that has gone through the handshake as a well-behaved peer would; OSError when it is refused."""
+        connection = cls(port, GREETING + ready(socket_type))
+        connection._await(b"\x05READY")
+        return connection
+
+    def send(self, content: bytes) -> None:
+        """Send all of `content`, unless the other side has ended the connection or does not read."""
+        if not self.open:
+            return
+        try:
+            self._socket.sendall(content)
+            self._read_away()
+        except OSError:
+            self.close()
+
+    def ended(self) -> bool:
+        """Whether the other side has ended it by now; waits up to a few seconds for that."""
+        if not self.open:
+            return True
+        self._socket.settimeout(_TIMEOUT_S)
+        try:
+            while self._socket.recv(65536):
+                pass
+        except TimeoutError:
+            return False
+        except OSError:
+            pass
+        self.close()
+        return True
+
+    def close(self) -> None:
+        """Hang up."""
+        self.open = False
+        self._socket.close()
+
+    def _await(self, expected: bytes) -> None:
+        """Read until that has come: a message that overtakes the other side's half of the handshake ends it."""
+        received = b""
+        while self.open and expected not in received:
+            content = self._socket.recv(65536)
+            if not content:
+                self.close()
+            received += content
+
+    def _read_away(self) -> None:
+        """What comes back is of no interest, but must not fill the buffers. An end of the stream closes."""
+        self._socket.settimeout(0.0)
+        try:
+            while content := self._socket.recv(65536):
+                del content
+            self.close()
+        except BlockingIOError:
+            self._socket.settimeout(_TIMEOUT_S)

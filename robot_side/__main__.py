@@ -1,0 +1,19 @@
+"""The console script `feelahead-robot`, also `python -m robot_side`."""
+
+from common.launch import Command, launch, single_threaded_algebra
+
+
+def main() -> None:
+    """Run the process."""
+    single_threaded_algebra()
+    launch("feelahead-robot", _load, extra="robot")
+
+
+def _load() -> Command:
+    from robot_side.main import command  # noqa: PLC0415  # large: a signal must find its handler before
+
+    return command
+
+
+if __name__ == "__main__":
+    main()

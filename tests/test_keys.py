@@ -1,0 +1,198 @@
+"""The folder of keys: what is written, who may read it, and what is refused in one line."""
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from common import keys
+from common.curve_authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.errors import ConfigurationError
+from common.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
+
+KEY, OTHER = "ab" * 32, "cd" * 32
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> KeyFolder:
+    return KeyFolder(tmp_path / "keys")
+
+
+def complaint(call: Callable[[], object]) -> str:
+    with pytest.raises(ConfigurationError) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert "valid: " in str(caught.value) or "already" in str(caught.value)
+    return str(caught.value)
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def test_a_pair_belongs_together() -> None:
+    public, secret = make_key_pair()
+    assert public_part(secret) == public
+    assert public != secret
+    assert make_key_pair()[1] != secret
+
+
+def test_the_secret_is_for_its_owner_alone_whatever_the_umask(folder: KeyFolder) -> None:
+    before = os.umask(0)
+    try:
+        folder.write_pair("robot", KEY, OTHER)
+        folder.allow("anna", KEY)
+    finally:
+        os.umask(before)
+    assert mode(folder.secret_path("robot")) == 0o600
+    assert mode(folder.path) == mode(folder.allowed_path) == 0o700
+    assert folder.secret("robot") == OTHER
+    assert read_public_key(str(folder.public_path("robot")), "key") == KEY
+
+
+@pytest.mark.parametrize("wrong", [0o640, 0o604, 0o660, 0o644])
+def test_a_secret_that_others_may_read_is_refused_with_the_command_that_mends_it(folder: KeyFolder, wrong: int) -> None:
+    folder.write_pair("robot", KEY, OTHER)
+    path = folder.secret_path("robot")
+    path.chmod(wrong)
+    text = complaint(lambda: folder.secret("robot"))
+    assert f"chmod 600 {path}" in text
+    assert f"{wrong:04o}" in text
+    path.chmod(0o600)
+    assert folder.secret("robot") == OTHER
+
+
+def test_a_key_is_never_replaced_by_accident(folder: KeyFolder) -> None:
+    folder.write_pair("robot", KEY, OTHER)
+    assert "--replace" in complaint(lambda: folder.write_pair("robot", OTHER, KEY))
+    assert folder.secret("robot") == OTHER
+    folder.write_pair("robot", OTHER, KEY, replace=True)
+    assert folder.secret("robot") == KEY
+
+
+def test_peers_come_and_go(folder: KeyFolder) -> None:
+    assert folder.allowed() == {}
+    folder.allow("anna", KEY)
+    folder.allow("anna", KEY)
+    folder.allow("ben", OTHER)
+    assert folder.allowed() == {KEY: "anna", OTHER: "ben"}
+    folder.revoke("anna")
+    assert folder.allowed() == {OTHER: "ben"}
+    assert "anna" in complaint(lambda: folder.revoke("anna"))
+
+
+def test_a_name_stands_for_one_key_and_a_key_for_one_name(folder: KeyFolder) -> None:
+    folder.allow("anna", KEY)
+    assert "'anna'" in complaint(lambda: folder.allow("anna", OTHER))
+    assert "'anna'" in complaint(lambda: folder.allow("ben", KEY))
+    assert folder.allowed() == {KEY: "anna"}
+
+
+@pytest.mark.parametrize("name", ["", "a" * 33, "../robot", "a/b", ".hidden", "-rf", "a b", "ä", "a\n", "a.b"])
+def test_names_cannot_leave_the_folder(folder: KeyFolder, name: str) -> None:
+    assert repr(name)[:20] in complaint(lambda: checked_name(name))
+    with pytest.raises(ConfigurationError):
+        folder.revoke(name)
+
+
+@pytest.mark.parametrize("text", ["", "ab" * 31, "ab" * 33, "zz" * 32, KEY + KEY, "x" * 10_000])
+def test_what_is_no_key_is_refused(text: str) -> None:
+    said = complaint(lambda: checked_key(text, "--robot-key"))
+    assert said.startswith("--robot-key: ")
+    assert len(said) < 200
+
+
+def test_a_key_may_be_given_in_capitals_or_as_a_file(tmp_path: Path) -> None:
+    assert read_public_key(KEY.upper(), "key") == KEY
+    path = tmp_path / "anna.public"
+    path.write_text(f"# somebody's\n\n{KEY}\n")
+    assert read_public_key(str(path), "key") == KEY
+    for content in ("", f"{KEY}\n{OTHER}\n", "nothing", "é" * 64):
+        path.write_text(content)
+        assert str(path) in complaint(lambda: read_public_key(str(path), "key"))
+    assert "neither a key nor a file" in complaint(lambda: read_public_key("nowhere", "key"))
+
+
+def test_a_secret_key_is_not_given_away(folder: KeyFolder) -> None:
+    folder.write_pair("operator", KEY, OTHER)
+    text = complaint(lambda: read_public_key(str(folder.secret_path("operator")), "key"))
+    assert "secret" in text
+    assert OTHER not in text
+
+
+def test_the_number_of_peers_is_bounded(folder: KeyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keys, "PEER_LIMIT", 3)
+    for number in range(3):
+        folder.allow(f"peer{number}", f"{number:064x}")
+    assert "up to 3" in complaint(lambda: folder.allow("more", KEY))
+
+
+def test_the_next_command_is_named_where_a_key_is_missing(folder: KeyFolder) -> None:
+    assert f"feelahead keys make robot --folder {folder.path}" in complaint(lambda: RobotKeys.load(folder.path))
+    assert f"feelahead keys make operator --folder {folder.path}" in complaint(
+        lambda: OperatorKeys.load(folder.path, KEY)
+    )
+    folder.write_pair("operator", KEY, OTHER)
+    assert "feelahead keys show robot" in complaint(lambda: OperatorKeys.load(folder.path, None))
+    assert OperatorKeys.load(folder.path, KEY).robot == KEY
+
+
+# The list while it is in use
+
+
+def test_a_running_side_notices_who_came_and_who_went(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    assert allowed.refresh() == set()
+    folder.allow("anna", KEY)
+    folder.allow("ben", OTHER)
+    assert allowed.refresh() == set()
+    assert allowed.names == {KEY: "anna", OTHER: "ben"}
+    folder.revoke("anna")
+    assert allowed.refresh() == {KEY}
+    assert allowed.refresh() == set()
+    assert allowed.names == {OTHER: "ben"}
+
+
+def test_a_peer_whose_file_changed_to_another_key_is_revoked(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    allowed.refresh()
+    folder.revoke("anna")
+    folder.allow("anna", OTHER)
+    assert allowed.refresh() == {KEY}
+
+
+def test_an_unreadable_list_lets_nobody_in_until_it_is_mended(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    allowed.refresh()
+    broken = folder.allowed_path / "ben.public"
+    broken.write_text("half a k")
+    assert allowed.refresh() == {KEY}
+    assert allowed.names == {}
+    assert "ben.public" in str(allowed.unreadable)
+    broken.unlink()
+    allowed.refresh()
+    assert allowed.names == {KEY: "anna"}
+    assert allowed.unreadable is None
+
+
+def test_a_list_that_others_may_write_lets_nobody_in(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    folder.allowed_path.chmod(0o777)
+    allowed.refresh()
+    assert allowed.names == {}
+    assert "chmod 700" in str(allowed.unreadable)
+    assert "chmod 700" in complaint(folder.allowed)
+
+
+def test_a_folder_that_vanished_lets_nobody_in(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    allowed.refresh()
+    folder.allowed_path.rename(folder.path / "elsewhere")
+    assert allowed.refresh() == {KEY}
+    assert allowed.names == {}

@@ -1,0 +1,201 @@
+"""CURVE over real sockets on loopback: who gets in, who does not, and who is thrown out while running."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from common.clock import MonotonicClock
+from common.curve_authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.keys import AllowList, KeyFolder
+from common.sockets import OperatorSockets, RobotSockets
+
+EPHEMERAL = "tcp://127.0.0.1:0"
+PATIENT_S = 20.0
+LIMIT_S = 10.0
+REFUSAL_S = 0.5
+"""Long for a handshake on loopback: who has said nothing by then was not let in."""
+
+
+@dataclass
+class Robot:
+    folder: KeyFolder
+    public: str
+    sockets: RobotSockets
+
+    def operator(self, name: str, *, allowed: bool = True) -> OperatorSockets:
+        public, secret = make_key_pair()
+        if allowed:
+            self.folder.allow(name, public)
+            self.sockets.refresh_keys()
+        return self.connect(OperatorKeys(secret, self.public))
+
+    def connect(self, keys: OperatorKeys | None) -> OperatorSockets:
+        return OperatorSockets(
+            self.sockets.control_endpoint, self.sockets.view_endpoint, keys=keys, heartbeat_timeout_s=PATIENT_S
+        )
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[Robot]:
+    folder = KeyFolder(tmp_path)
+    public, secret = make_key_pair()
+    keys = RobotKeys(secret, AllowList(folder))
+    with RobotSockets(EPHEMERAL, keys=keys, heartbeat_timeout_s=PATIENT_S) as sockets:
+        yield Robot(folder, public, sockets)
+
+
+@dataclass
+class Seen:
+    """What came through within some time."""
+
+    at_robot: list[tuple[bytes, bytes]]
+    control: list[bytes]
+    view: list[tuple[bytes, bytes]]
+
+
+def exchange(robot: Robot, operator: OperatorSockets, limit_s: float, *, until_both: bool) -> Seen:
+    """Both send and receive for `limit_s`, or until control and view have come through."""
+    clock = MonotonicClock()
+    end_s = clock.now() + limit_s
+    seen = Seen([], [], [])
+    while clock.now() < end_s and not (until_both and seen.at_robot and seen.control and seen.view):
+        operator.send(b"motion")
+        robot.sockets.wait(0.002)
+        for peer, payload in robot.sockets.receive():
+            seen.at_robot.append((peer, payload))
+            robot.sockets.send(peer, b"stiffness")
+        robot.sockets.publish(b"telemetry", b"state")
+        operator.wait(0.002)
+        seen.control += operator.receive()
+        seen.view += operator.receive_view()
+    return seen
+
+
+def gets_in(robot: Robot, operator: OperatorSockets) -> bool:
+    seen = exchange(robot, operator, LIMIT_S, until_both=True)
+    return bool(seen.at_robot and seen.control and seen.view)
+
+
+def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = REFUSAL_S) -> bool:
+    return exchange(robot, operator, limit_s, until_both=False) == Seen([], [], [])
+
+
+def test_an_allowed_key_goes_both_ways_on_both_ports(robot: Robot) -> None:
+    with robot.operator("anna") as anna:
+        assert gets_in(robot, anna)
+        assert anna.trouble is None
+    assert robot.sockets.refused == 0
+
+
+def test_operators_with_keys_of_their_own_are_told_apart(robot: Robot) -> None:
+    with robot.operator("anna") as anna, robot.operator("ben") as ben:
+        assert gets_in(robot, anna)
+        assert gets_in(robot, ben)
+        assert len(robot.sockets._peers) == 2
+
+
+def test_an_unknown_key_gets_nothing_and_both_sides_say_what_to_do(robot: Robot) -> None:
+    public, secret = make_key_pair()
+    with robot.connect(OperatorKeys(secret, robot.public)) as stranger:
+        assert stays_out(robot, stranger, 1.2)
+        assert f"feelahead keys allow NAME {public}" in str(stranger.trouble)
+    assert robot.sockets.refused > 0
+    [told] = robot.sockets.key_news()
+    assert f"feelahead keys allow NAME {public} --folder {robot.folder.path}" in told
+    assert robot.sockets.key_news() == []
+
+
+def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> None:
+    public, secret = make_key_pair()
+    with robot.connect(OperatorKeys(secret, robot.public)) as late:
+        assert stays_out(robot, late)
+        robot.folder.allow("late", public)
+        robot.sockets.refresh_keys()
+        assert gets_in(robot, late)
+        exchange(robot, late, 1.2, until_both=False)
+        assert late.trouble is None
+
+
+def test_no_key_gets_nothing(robot: Robot) -> None:
+    with robot.connect(None) as bare:
+        assert stays_out(robot, bare, 1.2)
+        assert "--keys" in str(bare.trouble)
+
+
+def test_a_wrong_robot_key_gets_nothing(robot: Robot) -> None:
+    public, secret = make_key_pair()
+    robot.folder.allow("anna", public)
+    robot.sockets.refresh_keys()
+    with robot.connect(OperatorKeys(secret, public_part("01" * 32))) as misled:
+        assert stays_out(robot, misled, 1.2)
+        assert "--robot-key" in str(misled.trouble)
+
+
+def test_a_robot_without_keys_is_not_trusted(tmp_path: Path) -> None:
+    with RobotSockets(EPHEMERAL) as sockets:
+        bare = Robot(KeyFolder(tmp_path), "ab" * 32, sockets)
+        with bare.connect(OperatorKeys(make_key_pair()[1], make_key_pair()[0])) as operator:
+            assert stays_out(bare, operator, 1.2)
+            assert "has no keys" in str(operator.trouble)
+        with bare.connect(None) as operator:
+            assert gets_in(bare, operator)
+
+
+def test_nobody_gets_in_while_nobody_serves_the_handshakes(robot: Robot) -> None:
+    with robot.operator("anna") as anna:
+        assert not any(anna.send(b"motion") or anna.wait(0.01) for _ in range(30))
+        assert gets_in(robot, anna)
+
+
+def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_lose_under_a_second(robot: Robot) -> None:
+    with robot.operator("anna") as anna, robot.operator("ben") as ben:
+        assert gets_in(robot, anna)
+        assert gets_in(robot, ben)
+        [anna_peer] = [peer for peer, _ in exchange(robot, anna, 0.05, until_both=False).at_robot][:1]
+        robot.folder.revoke("anna")
+        robot.sockets.refresh_keys()
+        # What was on its way before the revocation may still stand in her own buffers.
+        anna.receive(), anna.receive_view()
+        clock = MonotonicClock()
+        began_s = clock.now()
+        ben_seen_s = None
+        after = Seen([], [], [])
+        while clock.now() - began_s < 1.5:
+            robot.sockets.refresh_keys()
+            after.at_robot += exchange(robot, anna, 0.01, until_both=False).at_robot
+            assert not robot.sockets.send(anna_peer, b"stiffness")
+            ben.wait(0.0)
+            if ben.receive_view() and ben_seen_s is None:
+                ben_seen_s = clock.now() - began_s
+        assert after.at_robot == []
+        assert stays_out(robot, anna, 0.3)
+        assert ben_seen_s is not None
+        assert ben_seen_s < 1.0
+        assert gets_in(robot, ben)
+        assert "feelahead keys allow" in str(anna.trouble)
+
+
+def test_a_revoked_peer_that_keeps_its_connection_is_dropped_message_by_message(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RobotSockets, "_hang_up", lambda *_: None)
+    with robot.operator("anna") as anna:
+        assert gets_in(robot, anna)
+        robot.folder.revoke("anna")
+        robot.sockets.refresh_keys()
+        exchange(robot, anna, 0.05, until_both=False)
+        assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
+        assert robot.sockets.revoked > 0
+
+
+def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
+    with robot.operator("anna") as anna:
+        assert gets_in(robot, anna)
+        robot.folder.allowed_path.chmod(0o777)
+        robot.sockets.refresh_keys()
+        exchange(robot, anna, 0.05, until_both=False)
+        assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
+        assert any("nobody is let in" in text and "chmod 700" in text for text in robot.sockets.key_news())
+        assert robot.sockets.key_news() == []

@@ -1,0 +1,127 @@
+"""Deadlines in virtual time: nothing here sleeps or reads a real clock."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.clock import VirtualClock
+from common.pacing import Pacer, wait_for_turn
+
+PERIOD_S = 1e-3
+
+
+def test_turns_in_time_follow_the_grid_without_drift() -> None:
+    pacer = Pacer(PERIOD_S, 17.0)
+    for turn in range(100_000):
+        assert pacer.deadline_s == 17.0 + turn * PERIOD_S
+        pacer.begin(pacer.deadline_s + 20e-6)
+    assert (pacer.turns, pacer.overruns) == (100_000, 0)
+    assert pacer.wake_error.maximum == pytest.approx(20e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(("late_s", "missed"), [(0.0, 0), (0.9e-3, 0), (1.1e-3, 1), (5.5e-3, 5), (2.0, 2000)])
+def test_a_late_turn_skips_what_it_missed_and_returns_to_the_grid(late_s: float, missed: int) -> None:
+    pacer = Pacer(PERIOD_S, 0.0)
+    pacer.begin(late_s)
+    assert pacer.overruns == missed
+    assert pacer.deadline_s == pytest.approx((missed + 1) * PERIOD_S)
+    pacer.begin(pacer.deadline_s)
+    assert (pacer.turns, pacer.overruns) == (2, missed)
+
+
+@given(st.lists(st.floats(0.0, 0.02), min_size=1, max_size=200), st.floats(1e-4, 0.1), st.floats(-1e3, 1e6))
+@settings(derandomize=True, deadline=None)
+def test_every_deadline_is_taken_or_counted_once(late_s: list[float], period_s: float, start_s: float) -> None:
+    pacer = Pacer(period_s, start_s)
+    for late in late_s:
+        before_s = pacer.deadline_s
+        now_s = before_s + late
+        pacer.begin(now_s)
+        assert pacer.deadline_s > now_s
+        assert pacer.deadline_s <= now_s + period_s * (1 + 1e-6) + 1e-9
+    taken = round((pacer.deadline_s - start_s) / period_s)
+    assert pacer.turns + pacer.overruns == taken
+
+
+def test_refuses_to_begin_before_its_time_and_odd_periods() -> None:
+    pacer = Pacer(PERIOD_S, 1.0)
+    assert not pacer.due(0.999)
+    assert pacer.due(1.0)
+    for early_s in (0.999, math.nan):
+        with pytest.raises(ValueError, match="deadline"):
+            pacer.begin(early_s)
+    for period_s in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(ValueError, match="period_s"):
+            Pacer(period_s, 0.0)
+
+
+def test_the_summary_says_none_before_the_first_turn_and_microseconds_after() -> None:
+    pacer = Pacer(PERIOD_S, 0.0)
+    assert pacer.summary() == {"overruns": 0, "wake_error_us": {"p50": None, "p99": None, "max": None}}
+    pacer.begin(30e-6)
+    assert pacer.summary()["wake_error_us"]["max"] == pytest.approx(30.0)
+
+
+def test_the_latest_is_told_once() -> None:
+    pacer = Pacer(PERIOD_S, 0.0)
+    pacer.begin(50e-6)
+    pacer.begin(pacer.deadline_s + 20e-6)
+    assert pacer.take_latest_s() == pytest.approx(50e-6)
+    assert pacer.take_latest_s() == 0.0
+
+
+def test_a_restart_begins_a_new_grid_and_keeps_the_counts() -> None:
+    pacer = Pacer(PERIOD_S, 0.0)
+    pacer.begin(5.5e-3)
+    pacer.restart(100.0)
+    assert (pacer.deadline_s, pacer.overruns) == (100.0, 5)
+
+
+class Waiting:
+    """`wait` of sockets whose sleeps end late, in virtual time, and where a message may come."""
+
+    def __init__(self, clock: VirtualClock, late_s: float = 0.0, message_s: float = math.inf) -> None:
+        self.slept_s: list[float] = []
+        self._clock, self._late_s, self._message_s = clock, late_s, message_s
+
+    def wait(self, timeout_s: float) -> bool:
+        if timeout_s > 0.0:
+            self.slept_s.append(timeout_s)
+            self._clock.advance_to(min(self._clock.now() + timeout_s + self._late_s, self._message_s))
+        else:
+            self._clock.advance_to(self._clock.now() + 1e-6)
+        return self._clock.now() >= self._message_s
+
+
+def test_a_sleep_that_ends_late_does_not_delay_the_turn() -> None:
+    clock = VirtualClock()
+    waiting = Waiting(clock, late_s=150e-6)
+    pacer = Pacer(PERIOD_S, PERIOD_S)
+    wait_for_turn(pacer, clock, waiting.wait)
+    assert waiting.slept_s == [pytest.approx(PERIOD_S - 200e-6)]
+    assert 0.0 <= clock.now() - pacer.deadline_s <= 2e-6
+
+
+@pytest.mark.parametrize("message_s", [300e-6, 900e-6])
+def test_a_message_ends_the_sleep_and_the_spin(message_s: float) -> None:
+    clock = VirtualClock()
+    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, Waiting(clock, message_s=message_s).wait)
+    assert clock.now() == pytest.approx(message_s, abs=2e-6)
+
+
+@pytest.mark.parametrize("other_s", [300e-6, 950e-6, 5e-3])
+def test_what_is_due_earlier_ends_the_wait_too(other_s: float) -> None:
+    clock = VirtualClock()
+    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, Waiting(clock).wait, other_s)
+    assert clock.now() == pytest.approx(min(other_s, PERIOD_S), abs=2e-6)
+
+
+def test_what_is_overdue_does_not_wait() -> None:
+    clock = VirtualClock(1.0)
+    waiting = Waiting(clock)
+    wait_for_turn(Pacer(PERIOD_S, 0.5), clock, waiting.wait, 0.4)
+    wait_for_turn(Pacer(PERIOD_S, 2.0), clock, waiting.wait, 0.4)
+    assert waiting.slept_s == []
+    assert clock.now() <= 1.0 + 2e-6
