@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import tyro
 
 from common.command_line import parse_settings
+from common.link_figures import report_lines
+from common.link_model import Direction, Stream, unused_clauses
 from common.run_options import RunOptions
 from common.status import Status, Value
 from common.stop_signal import StopSignal
@@ -20,6 +22,12 @@ from feelahead.summary import merge_summaries
 _START_TIMEOUT_S = 90.0
 """The first start compiles the overlap kernels."""
 _LINK_TIMEOUT_S = 15.0
+_SENT: tuple[tuple[Direction, Stream], ...] = (
+    ("to_robot", "haptics"),
+    ("to_operator", "haptics"),
+    ("to_operator", "telemetry"),
+)
+"""What the two sides send to each other."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,8 @@ def demo(arguments: Sequence[str]) -> int:
         StopSignal() as stop,
         Status(settings.status, "feelahead demo") as status,
     ):
+        for text in unused_clauses(settings.link_spec(), _SENT):
+            status.note(text)
         summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
         status.note("starting the robot side (the first start compiles its kernels)")
         with SideProcess("robot_side.main", "robot", _robot_arguments(settings, summaries["robot"])) as robot:
@@ -79,7 +89,7 @@ def demo(arguments: Sequence[str]) -> int:
                         if str(failure) not in errors:
                             errors.append(str(failure))
         merged = merge_summaries(_read(summaries["robot"]), _read(summaries["operator"]), errors)
-    for line in _report(merged):
+    for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
         status.note(line)
     for error in errors:
         status.note(f"error: {error}")
@@ -111,6 +121,7 @@ def _shared_arguments(settings: DemoSettings, summary: Path) -> list[str]:
     return [
         f"--link={settings.link}",
         f"--link-model={settings.link_model}",
+        f"--link-correlation={settings.link_correlation}",
         f"--seed={settings.seed}",
         f"--summary={summary}",
     ]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
-from common.link_model import DelayLine, LinkSpec
+from common.link_model import DelayLine, link_summary, unused_clauses
 from common.priority import raise_priority
 from common.sockets import OperatorSockets
 from common.status import Status
@@ -30,7 +30,7 @@ def main() -> None:
 def command(arguments: Sequence[str]) -> int:
     """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out."""
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
-    link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    link = settings.link_spec()
     core = OperatorSide(
         secrets.randbits(53),
         clock_domain(),
@@ -44,6 +44,8 @@ def command(arguments: Sequence[str]) -> int:
         StopSignal() as stop,
         Status(settings.status, "operator") as status,
     ):
+        for text in unused_clauses(link, [("to_robot", "haptics")]):
+            status.note(text)
         device: Device
         person: SimulatedOperator | None = None
         if settings.device == "simulated":
@@ -65,6 +67,7 @@ def command(arguments: Sequence[str]) -> int:
         released = device.released if isinstance(device, SimulatedDualSense) else True
         errors = [] if failure is None else [str(failure)]
         summary = core.summary() | {"triggers_released": released, "errors": errors}
+        summary["link"] = link_summary("to_robot", {"haptics": line})
         if settings.summary is not None:
             settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         if failure is not None:

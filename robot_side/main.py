@@ -1,14 +1,15 @@
 """The process `feelahead-robot`: sockets, clock, core; nothing else."""
 
+import dataclasses
 import json
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
-from common.link_model import DelayLine, LinkSpec
+from common.link_model import BitFlip, DelayLine, Stream, link_summary, unused_clauses
 from common.priority import raise_priority
 from common.sockets import RobotSockets
 from common.statistics import RunningStatistics
@@ -21,6 +22,7 @@ from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
+SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
 
 
 def main() -> None:
@@ -31,7 +33,10 @@ def main() -> None:
 def command(arguments: Sequence[str]) -> int:
     """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
-    link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    link = settings.link_spec()
+    lines: dict[Stream, DelayLine[Outgoing]] = {
+        stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
+    }
     # The sockets first: a port that is taken is found out before the kernels are compiled.
     with (
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure) as sockets,
@@ -39,7 +44,7 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
-        for text in core.notes:
+        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
@@ -50,12 +55,13 @@ def command(arguments: Sequence[str]) -> int:
         start_s = clock.now()
         failure: FeelaheadError | None = None
         try:
-            _loop(settings, core, link, sockets, stop, status, tick_time)
+            _loop(settings, core, lines, sockets, stop, status, tick_time)
         except BrokenPipeError:
             ignore_broken_output()
         except FeelaheadError as error:
             failure = error
         summary = {"duration_s": clock.now() - start_s, "tick_us": tick_microseconds(tick_time)} | core.summary()
+        summary["link"] = link_summary("to_operator", lines)
         # A run that failed has figures, too.
         summary["errors"] = [] if failure is None else [str(failure)]
         if settings.summary is not None:
@@ -65,19 +71,20 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
+def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
+    return dataclasses.replace(message, payload=flip(message.payload))
+
+
 def _loop(
     settings: RobotSettings,
     core: RobotSide,
-    link: LinkSpec,
+    lines: Mapping[Stream, DelayLine[Outgoing]],
     sockets: RobotSockets,
     stop: StopSignal,
     status: Status,
     tick_time: RunningStatistics,
 ) -> None:
     clock = MonotonicClock()
-    lines: dict[str, DelayLine[Outgoing]] = {
-        stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
-    }
     start_s = next_tick_s = clock.now()
     while not stop.is_set:
         now_s = clock.now()
@@ -92,7 +99,7 @@ def _loop(
             outgoing = core.tick(now_s)
             tick_time.add(time.perf_counter() - began_s)
             for message in outgoing:
-                lines[message.stream].push(now_s, message)
+                lines[message.stream].push(now_s, message, len(message.payload))
             if status.due(now_s):
                 status.show(now_s, core.status(now_s))
         due_s = clock.now()
