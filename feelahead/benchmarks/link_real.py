@@ -1,0 +1,203 @@
+"""The emulated link in real time: two processes on loopback, each of which sends, delays and receives.
+
+Messages are paced by absolute deadlines in a loop of its own: sleep in the sockets until the next one is due to be
+sent or released, or something arrives.
+"""
+
+import ctypes
+import multiprocessing
+import resource
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+import numpy as np
+
+from common.clock import MonotonicClock
+from common.link_model import DelayLine, Direction, LinkSpec
+from common.sockets import OperatorSockets, RobotSockets
+from feelahead.benchmarks.link_samples import LinkSample
+
+HEADER = struct.Struct("<qd")
+"""Number and time of sending; the number −1 says hello, −2 that nothing more will come."""
+_HELLO, _END = -1, -2
+_START_DELAY_S = 0.3
+_PATIENCE_S = 10.0
+_PR_SET_TIMERSLACK = 29
+
+
+class Link(Protocol):
+    """One end's sockets, reduced to what a measurement needs."""
+
+    def receive(self) -> list[bytes]:
+        """Everything that has arrived."""
+        ...
+
+    def send(self, payload: bytes) -> object:
+        """Send to the other end."""
+        ...
+
+    def wait(self, timeout_s: float) -> object:
+        """Wait for something to arrive."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What both ends do."""
+
+    link: LinkSpec
+    count: int
+    """Messages in each direction."""
+    period_s: float
+    size_bytes: int
+    """Of a message as the link counts it."""
+
+
+@dataclass(frozen=True)
+class EndResult:
+    """What one end did and saw."""
+
+    sent_s: np.ndarray
+    """(n,) when each message entered the delay line here."""
+    received_s: np.ndarray
+    """(n,) when each of the other end's messages came out here; NaN: never."""
+    line: dict[str, Any]
+    """The delay line's summary."""
+    cpu_share: float
+    """Of one core, from the first message to the last."""
+
+
+@dataclass(frozen=True)
+class RealRun:
+    """Both ends of a run."""
+
+    robot: EndResult
+    operator: EndResult
+
+    def sample(self, direction: Direction) -> LinkSample:
+        """The messages of one direction."""
+        sender, receiver = (self.robot, self.operator) if direction == "to_operator" else (self.operator, self.robot)
+        return LinkSample(sender.sent_s, receiver.received_s - sender.sent_s)
+
+
+class _RobotLink:
+    def __init__(self, sockets: RobotSockets) -> None:
+        self._sockets = sockets
+        self._peer = b""
+
+    def receive(self) -> list[bytes]:
+        received = self._sockets.receive()
+        if received:
+            self._peer = received[-1][0]
+        return [payload for _, payload in received]
+
+    def send(self, payload: bytes) -> object:
+        return self._sockets.send(self._peer, payload)
+
+    def wait(self, timeout_s: float) -> object:
+        return self._sockets.wait(timeout_s)
+
+
+def run_real(plan: Plan, advance: Callable[[int], object]) -> RealRun:
+    """Run both ends, the operator's in a process of its own; `advance` hears how many messages were sent."""
+    context = multiprocessing.get_context("spawn")
+    with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
+        ours, theirs = context.Pipe()
+        addresses = (sockets.control_endpoint, sockets.view_endpoint)
+        child = context.Process(target=_operator_process, args=(plan, addresses, theirs), daemon=True)
+        child.start()
+        try:
+            robot = _run_end(plan, "to_operator", _RobotLink(sockets), advance)
+            if not ours.poll(_PATIENCE_S):
+                raise TimeoutError("the other end of the link did not report")
+            operator: EndResult = ours.recv()
+        finally:
+            child.join(timeout=_PATIENCE_S)
+            if child.is_alive():
+                child.kill()
+            ours.close()
+    return RealRun(robot, operator)
+
+
+def _operator_process(plan: Plan, addresses: tuple[str, str], results: Connection) -> None:
+    with OperatorSockets(*addresses) as sockets:
+        results.send(_run_end(plan, "to_robot", sockets, lambda _: None))
+        # The other end may still wait for our last words.
+        sockets.wait(0.2)
+
+
+def _run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[int], object]) -> EndResult:
+    clock = MonotonicClock()
+    # The kernel may wake a sleeper up to 50 us late to save wake-ups, unless it is asked not to.
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_TIMERSLACK, 1)
+    start_s = _meet(direction, link, clock)
+    line: DelayLine[bytes] = DelayLine(plan.link.profile(direction))
+    sent_s = np.full(plan.count, np.nan)
+    received_s = np.full(plan.count, np.nan)
+    padding = bytes(max(0, plan.size_bytes - HEADER.size))
+    before_s = _cpu_s()
+    number = 0
+    next_send_s = start_s
+    last_s = start_s + plan.count * plan.period_s + _PATIENCE_S
+    peer_ended = ended = False
+    while not (peer_ended and ended):
+        now_s = clock.now()
+        if now_s > last_s:
+            break
+        for payload in link.receive():
+            place, _ = HEADER.unpack_from(payload)
+            if place == _END:
+                peer_ended = True
+            elif 0 <= place < plan.count and np.isnan(received_s[place]):
+                received_s[place] = now_s
+        if number < plan.count and now_s >= next_send_s:
+            sent_s[number] = now_s
+            line.push(now_s, HEADER.pack(number, now_s) + padding, plan.size_bytes)
+            number += 1
+            next_send_s = start_s + number * plan.period_s
+            if number % 100 == 0:
+                advance(100)
+        now_s = clock.now()
+        for message in line.pop(now_s):
+            link.send(message)
+        due_s = line.next_due()
+        if due_s is None and number == plan.count and not ended:
+            ended = True
+            busy_s = clock.now() - start_s
+            cpu_share = (_cpu_s() - before_s) / busy_s
+            # Thrice, because a datagram socket owes us nothing; the first to arrive counts.
+            for _ in range(3):
+                link.send(HEADER.pack(_END, now_s))
+            last_s = now_s + _PATIENCE_S
+        wake_s = min(
+            due_s if due_s is not None else last_s, next_send_s if number < plan.count else last_s, now_s + 0.1
+        )
+        link.wait(max(0.0, wake_s - clock.now()))
+    return EndResult(sent_s, received_s, line.summary(), cpu_share if ended else float("nan"))
+
+
+def _meet(direction: Direction, link: Link, clock: MonotonicClock) -> float:
+    """Say hello until both ends are there; when to begin, on the clock that both read."""
+    give_up_s = clock.now() + 3.0 * _PATIENCE_S
+    while clock.now() < give_up_s:
+        if direction == "to_robot":
+            link.send(HEADER.pack(_HELLO, 0.0))
+        link.wait(0.05)
+        for payload in link.receive():
+            place, start_s = HEADER.unpack_from(payload)
+            if place == _HELLO:
+                if direction == "to_robot":
+                    return float(start_s)
+                start_s = clock.now() + _START_DELAY_S
+                link.send(HEADER.pack(_HELLO, start_s))
+                return float(start_s)
+    raise TimeoutError("the other end of the link did not appear")
+
+
+def _cpu_s() -> float:
+    """Processor time of this process with all its threads, in seconds."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
