@@ -5,7 +5,9 @@ sent or released, or something arrives.
 """
 
 import ctypes
+import math
 import multiprocessing
+import os
 import resource
 import struct
 from collections.abc import Callable
@@ -17,6 +19,7 @@ import numpy as np
 
 from common.clock import MonotonicClock
 from common.link_model import DelayLine, Direction, LinkSpec
+from common.priority import raise_priority
 from common.sockets import OperatorSockets, RobotSockets
 from feelahead.benchmarks.link_samples import LinkSample
 
@@ -35,12 +38,12 @@ class Link(Protocol):
         """Everything that has arrived."""
         ...
 
-    def send(self, payload: bytes) -> object:
-        """Send to the other end."""
+    def send(self, payload: bytes) -> bool:
+        """Send to the other end; whether that could be done at once."""
         ...
 
-    def wait(self, timeout_s: float) -> object:
-        """Wait for something to arrive."""
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for something to arrive; whether it has."""
         ...
 
 
@@ -54,6 +57,8 @@ class Plan:
     period_s: float
     size_bytes: int
     """Of a message as the link counts it."""
+    realtime: bool = False
+    """Whether both ends ask for SCHED_FIFO."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,8 @@ class EndResult:
     """(n,) when each of the other end's messages came out here; NaN: never."""
     line: dict[str, Any]
     """The delay line's summary."""
+    unsent: int
+    """Messages that the socket refused, because too many left at once."""
     cpu_share: float
     """Of one core, from the first message to the last."""
 
@@ -76,6 +83,11 @@ class RealRun:
 
     robot: EndResult
     operator: EndResult
+
+    @property
+    def cpu_share(self) -> float:
+        """Of one core, both ends together."""
+        return self.robot.cpu_share + self.operator.cpu_share
 
     def sample(self, direction: Direction) -> LinkSample:
         """The messages of one direction."""
@@ -94,15 +106,19 @@ class _RobotLink:
             self._peer = received[-1][0]
         return [payload for _, payload in received]
 
-    def send(self, payload: bytes) -> object:
+    def send(self, payload: bytes) -> bool:
         return self._sockets.send(self._peer, payload)
 
-    def wait(self, timeout_s: float) -> object:
+    def wait(self, timeout_s: float) -> bool:
         return self._sockets.wait(timeout_s)
 
 
 def run_real(plan: Plan, advance: Callable[[int], object]) -> RealRun:
-    """Run both ends, the operator's in a process of its own; `advance` hears how many messages were sent."""
+    """Run both ends, the operator's in a process of its own; `advance` hears how many messages were sent.
+
+    TimeoutError when an end does not appear or report, PermissionError when SCHED_FIFO is asked for and refused.
+    """
+    policy = os.sched_getscheduler(0), os.sched_getparam(0)
     context = multiprocessing.get_context("spawn")
     with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
         ours, theirs = context.Pipe()
@@ -110,11 +126,13 @@ def run_real(plan: Plan, advance: Callable[[int], object]) -> RealRun:
         child = context.Process(target=_operator_process, args=(plan, addresses, theirs), daemon=True)
         child.start()
         try:
-            robot = _run_end(plan, "to_operator", _RobotLink(sockets), advance)
+            robot = run_end(plan, "to_operator", _RobotLink(sockets), advance)
             if not ours.poll(_PATIENCE_S):
                 raise TimeoutError("the other end of the link did not report")
             operator: EndResult = ours.recv()
         finally:
+            # The caller is none of the measurement: it need not go first for ever.
+            os.sched_setscheduler(0, *policy)
             child.join(timeout=_PATIENCE_S)
             if child.is_alive():
                 child.kill()
@@ -124,34 +142,40 @@ def run_real(plan: Plan, advance: Callable[[int], object]) -> RealRun:
 
 def _operator_process(plan: Plan, addresses: tuple[str, str], results: Connection) -> None:
     with OperatorSockets(*addresses) as sockets:
-        results.send(_run_end(plan, "to_robot", sockets, lambda _: None))
+        results.send(run_end(plan, "to_robot", sockets, lambda _: None))
         # The other end may still wait for our last words.
         sockets.wait(0.2)
 
 
-def _run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[int], object]) -> EndResult:
+def run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[int], object]) -> EndResult:
+    """Send `direction`'s messages through a delay line, and note what comes the other way, until both are through.
+
+    TimeoutError when the other end does not appear.
+    """
     clock = MonotonicClock()
-    # The kernel may wake a sleeper up to 50 us late to save wake-ups, unless it is asked not to.
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_TIMERSLACK, 1)
+    _go_first(realtime=plan.realtime)
     start_s = _meet(direction, link, clock)
     line: DelayLine[bytes] = DelayLine(plan.link.profile(direction))
-    sent_s = np.full(plan.count, np.nan)
-    received_s = np.full(plan.count, np.nan)
+    sent_s = [math.nan] * plan.count
+    received_s = [math.nan] * plan.count
     padding = bytes(max(0, plan.size_bytes - HEADER.size))
     before_s = _cpu_s()
     number = 0
     next_send_s = start_s
     last_s = start_s + plan.count * plan.period_s + _PATIENCE_S
+    unsent = 0
+    arrived = True
     peer_ended = ended = False
     while not (peer_ended and ended):
         now_s = clock.now()
         if now_s > last_s:
             break
-        for payload in link.receive():
+        # A drain costs more than all else, and is in vain when a deadline woke us.
+        for payload in link.receive() if arrived else ():
             place, _ = HEADER.unpack_from(payload)
             if place == _END:
                 peer_ended = True
-            elif 0 <= place < plan.count and np.isnan(received_s[place]):
+            elif 0 <= place < plan.count and math.isnan(received_s[place]):
                 received_s[place] = now_s
         if number < plan.count and now_s >= next_send_s:
             sent_s[number] = now_s
@@ -162,7 +186,7 @@ def _run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[in
                 advance(100)
         now_s = clock.now()
         for message in line.pop(now_s):
-            link.send(message)
+            unsent += not link.send(message)
         due_s = line.next_due()
         if due_s is None and number == plan.count and not ended:
             ended = True
@@ -175,8 +199,8 @@ def _run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[in
         wake_s = min(
             due_s if due_s is not None else last_s, next_send_s if number < plan.count else last_s, now_s + 0.1
         )
-        link.wait(max(0.0, wake_s - clock.now()))
-    return EndResult(sent_s, received_s, line.summary(), cpu_share if ended else float("nan"))
+        arrived = link.wait(max(0.0, wake_s - clock.now()))
+    return EndResult(np.array(sent_s), np.array(received_s), line.summary(), unsent, cpu_share if ended else math.nan)
 
 
 def _meet(direction: Direction, link: Link, clock: MonotonicClock) -> float:
@@ -195,6 +219,15 @@ def _meet(direction: Direction, link: Link, clock: MonotonicClock) -> float:
                 link.send(HEADER.pack(_HELLO, start_s))
                 return float(start_s)
     raise TimeoutError("the other end of the link did not appear")
+
+
+def _go_first(*, realtime: bool) -> None:
+    """Before other work on the machine, as the sides themselves go; PermissionError where SCHED_FIFO is refused."""
+    # The kernel may wake a sleeper up to 50 us late to save wake-ups, unless it is asked not to.
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_TIMERSLACK, 1)
+    raise_priority()
+    if realtime:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
 
 def _cpu_s() -> float:
