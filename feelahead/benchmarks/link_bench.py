@@ -163,10 +163,10 @@ def _real(
 ) -> LinkSample:
     plan = Plan(settings.spec, settings.count, 1.0 / settings.rate, settings.bytes, settings.realtime)
     without = dataclasses.replace(plan, link=LinkSpec(), count=min(settings.count, _BASELINE))
-    bar = progress.add_task("messages", total=plan.count + without.count)
+    bar = progress.add_task("messages", total=(plan.count + without.count) * plan.period_s)
     try:
-        run = run_real(plan, lambda sent: progress.advance(bar, sent))
-        baseline = run_real(without, lambda sent: progress.advance(bar, sent))
+        run = run_real(plan, lambda passed_s: progress.advance(bar, passed_s))
+        baseline = run_real(without, lambda passed_s: progress.advance(bar, passed_s))
     except TimeoutError as error:
         raise FeelaheadError(f"{error}; is the machine too busy?") from error
     except PermissionError as error:

@@ -13,6 +13,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
 import numpy as np
@@ -28,6 +29,7 @@ HEADER = struct.Struct("<qd")
 _HELLO, _END = -1, -2
 _START_DELAY_S = 0.3
 _PATIENCE_S = 10.0
+_GLANCE_S = 0.2
 _PR_SET_TIMERSLACK = 29
 
 
@@ -113,41 +115,72 @@ class _RobotLink:
         return self._sockets.wait(timeout_s)
 
 
-def run_real(plan: Plan, advance: Callable[[int], object]) -> RealRun:
-    """Run both ends, the operator's in a process of its own; `advance` hears how many messages were sent.
+def run_real(plan: Plan, waiting: Callable[[float], object]) -> RealRun:
+    """Run both ends, each in a process of its own; `waiting` hears every so many seconds that have passed.
 
     TimeoutError when an end does not appear or report, PermissionError when SCHED_FIFO is asked for and refused.
     """
-    policy = os.sched_getscheduler(0), os.sched_getparam(0)
     context = multiprocessing.get_context("spawn")
-    with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
-        ours, theirs = context.Pipe()
-        addresses = (sockets.control_endpoint, sockets.view_endpoint)
-        child = context.Process(target=_operator_process, args=(plan, addresses, theirs), daemon=True)
-        child.start()
-        try:
-            robot = run_end(plan, "to_operator", _RobotLink(sockets), advance)
-            if not ours.poll(_PATIENCE_S):
-                raise TimeoutError("the other end of the link did not report")
-            operator: EndResult = ours.recv()
-        finally:
-            # The caller is none of the measurement: it need not go first for ever.
-            os.sched_setscheduler(0, *policy)
-            child.join(timeout=_PATIENCE_S)
+    pipes = [context.Pipe() for _ in range(2)]
+    robot = context.Process(target=_robot_process, args=(plan, pipes[0][1]), daemon=True)
+    children = [robot]
+    robot.start()
+    try:
+        addresses = _next(pipes[0][0], robot, waiting, _PATIENCE_S)
+        operator = context.Process(target=_operator_process, args=(plan, addresses, pipes[1][1]), daemon=True)
+        children.append(operator)
+        operator.start()
+        patience_s = plan.count * plan.period_s + 6.0 * _PATIENCE_S
+        results = [_next(pipes[side][0], child, waiting, patience_s) for side, child in enumerate(children)]
+    finally:
+        for child in children:
+            child.join(timeout=1.0)
             if child.is_alive():
                 child.kill()
-            ours.close()
-    return RealRun(robot, operator)
+        for pipe in pipes:
+            for end in pipe:
+                end.close()
+    return RealRun(*results)
+
+
+def _next(pipe: Connection, child: BaseProcess, waiting: Callable[[float], object], patience_s: float) -> Any:
+    """What the child says next; the error that it says, too, is raised here."""
+    clock = MonotonicClock()
+    start_s = clock.now()
+    while not pipe.poll(_GLANCE_S):
+        waiting(_GLANCE_S)
+        if not child.is_alive() or clock.now() - start_s > patience_s:
+            raise TimeoutError("one end of the link did not report")
+    said = pipe.recv()
+    if isinstance(said, Exception):
+        raise said
+    return said
+
+
+def _robot_process(plan: Plan, results: Connection) -> None:
+    with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
+        results.send((sockets.control_endpoint, sockets.view_endpoint))
+        link = _RobotLink(sockets)
+        _report(results, lambda: run_end(plan, "to_operator", link))
+        # The other end may still wait for our last words.
+        link.wait(_GLANCE_S)
 
 
 def _operator_process(plan: Plan, addresses: tuple[str, str], results: Connection) -> None:
     with OperatorSockets(*addresses) as sockets:
-        results.send(run_end(plan, "to_robot", sockets, lambda _: None))
-        # The other end may still wait for our last words.
-        sockets.wait(0.2)
+        _report(results, lambda: run_end(plan, "to_robot", sockets))
+        sockets.wait(_GLANCE_S)
 
 
-def run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[int], object]) -> EndResult:
+def _report(results: Connection, run: Callable[[], EndResult]) -> None:
+    try:
+        results.send(run())
+    except OSError as error:
+        # What stands in the way of a measurement: no permission, nobody at the other end.
+        results.send(error)
+
+
+def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
     """Send `direction`'s messages through a delay line, and note what comes the other way, until both are through.
 
     TimeoutError when the other end does not appear.
@@ -182,8 +215,6 @@ def run_end(plan: Plan, direction: Direction, link: Link, advance: Callable[[int
             line.push(now_s, HEADER.pack(number, now_s) + padding, plan.size_bytes)
             number += 1
             next_send_s = start_s + number * plan.period_s
-            if number % 100 == 0:
-                advance(100)
         now_s = clock.now()
         for message in line.pop(now_s):
             unsent += not link.send(message)
