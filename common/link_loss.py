@@ -110,7 +110,7 @@ class StateLoss:
 
     def words(self) -> str:
         """As LossModel has it."""
-        return "loss state " + " ".join(format_share(getattr(self, part.name)) for part in fields(self))
+        return f"loss state {_shares(self)}"
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,15 @@ class GilbertElliott:
 
     def words(self) -> str:
         """As LossModel has it."""
-        return "loss gemodel " + " ".join(format_share(getattr(self, part.name)) for part in fields(self))
+        return f"loss gemodel {_shares(self)}"
+
+
+def _shares(loss: StateLoss | GilbertElliott) -> str:
+    """In order, without those at the end that have their defaults."""
+    parts = list(fields(loss))
+    while getattr(loss, parts[-1].name) == parts[-1].default:
+        parts.pop()
+    return " ".join(format_share(getattr(loss, part.name)) for part in parts)
 
 
 def _long_run(steps: FloatArray) -> FloatArray:

@@ -185,6 +185,7 @@ def _real(
         f"the same messages without a link: {baseline.cpu_share:.3f}"
     )
     goals.append(Goal("share of one core, both ends together", run.cpu_share, _CPU_LIMIT, detail=detail))
+    goals.append(Goal("share of one core that the emulation adds", run.cpu_share - baseline.cpu_share, _CPU_LIMIT))
     sample = run.sample("to_operator")
     if reference is not None:
         kept, stalls = reference.without_stalls(profile)

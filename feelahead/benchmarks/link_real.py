@@ -4,11 +4,13 @@ Messages are paced by absolute deadlines in a loop of its own: sleep in the sock
 sent or released, or something arrives.
 """
 
+import contextlib
 import ctypes
 import math
 import multiprocessing
 import os
 import resource
+import signal
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -133,13 +135,14 @@ def run_real(plan: Plan, waiting: Callable[[float], object]) -> RealRun:
         patience_s = plan.count * plan.period_s + 6.0 * _PATIENCE_S
         results = [_next(pipes[side][0], child, waiting, patience_s) for side, child in enumerate(children)]
     finally:
+        # Which tells the children that they may go.
+        for pipe in pipes:
+            for end in pipe:
+                end.close()
         for child in children:
             child.join(timeout=1.0)
             if child.is_alive():
                 child.kill()
-        for pipe in pipes:
-            for end in pipe:
-                end.close()
     return RealRun(*results)
 
 
@@ -158,26 +161,39 @@ def _next(pipe: Connection, child: BaseProcess, waiting: Callable[[float], objec
 
 
 def _robot_process(plan: Plan, results: Connection) -> None:
-    with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
-        results.send((sockets.control_endpoint, sockets.view_endpoint))
-        link = _RobotLink(sockets)
-        _report(results, lambda: run_end(plan, "to_operator", link))
-        # The other end may still wait for our last words.
-        link.wait(_GLANCE_S)
+    def run() -> None:
+        with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
+            results.send((sockets.control_endpoint, sockets.view_endpoint))
+            _run_and_stay(plan, "to_operator", _RobotLink(sockets), results)
+
+    _guarded(plan, run, results)
 
 
 def _operator_process(plan: Plan, addresses: tuple[str, str], results: Connection) -> None:
-    with OperatorSockets(*addresses) as sockets:
-        _report(results, lambda: run_end(plan, "to_robot", sockets))
-        sockets.wait(_GLANCE_S)
+    def run() -> None:
+        with OperatorSockets(*addresses) as sockets:
+            _run_and_stay(plan, "to_robot", sockets, results)
+
+    _guarded(plan, run, results)
 
 
-def _report(results: Connection, run: Callable[[], EndResult]) -> None:
+def _guarded(plan: Plan, run: Callable[[], None], results: Connection) -> None:
+    """`run`, with what stands in the way told to the caller: no permission, nobody at the other end."""
+    # Ctrl-C is for the caller, who ends us.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        results.send(run())
+        # Before there are sockets, so that their threads inherit it.
+        _go_first(realtime=plan.realtime)
+        run()
     except OSError as error:
-        # What stands in the way of a measurement: no permission, nobody at the other end.
-        results.send(error)
+        with contextlib.suppress(OSError):
+            results.send(error)
+
+
+def _run_and_stay(plan: Plan, direction: Direction, link: Link, results: Connection) -> None:
+    results.send(run_end(plan, direction, link))
+    # The other end may still wait for our last words: the sockets stay open until the caller has both reports.
+    results.poll(_PATIENCE_S)
 
 
 def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
@@ -186,7 +202,6 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
     TimeoutError when the other end does not appear.
     """
     clock = MonotonicClock()
-    _go_first(realtime=plan.realtime)
     start_s = _meet(direction, link, clock)
     line: DelayLine[bytes] = DelayLine(plan.link.profile(direction))
     sent_s = [math.nan] * plan.count
@@ -204,12 +219,14 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
         if now_s > last_s:
             break
         # A drain costs more than all else, and is in vain when a deadline woke us.
-        for payload in link.receive() if arrived else ():
+        received = link.receive() if arrived else ()
+        received_now_s = clock.now()
+        for payload in received:
             place, _ = HEADER.unpack_from(payload)
             if place == _END:
                 peer_ended = True
             elif 0 <= place < plan.count and math.isnan(received_s[place]):
-                received_s[place] = now_s
+                received_s[place] = received_now_s
         if number < plan.count and now_s >= next_send_s:
             sent_s[number] = now_s
             line.push(now_s, HEADER.pack(number, now_s) + padding, plan.size_bytes)
@@ -223,9 +240,11 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
             ended = True
             busy_s = clock.now() - start_s
             cpu_share = (_cpu_s() - before_s) / busy_s
-            # Thrice, because a datagram socket owes us nothing; the first to arrive counts.
-            for _ in range(3):
-                link.send(HEADER.pack(_END, now_s))
+            # A socket that is full of our messages refuses at first.
+            for _ in range(100):
+                if link.send(HEADER.pack(_END, now_s)):
+                    break
+                link.wait(0.01)
             last_s = now_s + _PATIENCE_S
         wake_s = min(
             due_s if due_s is not None else last_s, next_send_s if number < plan.count else last_s, now_s + 0.1
