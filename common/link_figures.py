@@ -99,17 +99,24 @@ class LinkFigures:
 
 def report_lines(link: dict[str, Any]) -> list[str]:
     """A line of text for each line of a summary's `link`: what was asked, and what was achieved."""
-    return [
-        f"link {name}: asked {one['asked'] or 'nothing'}; {_achieved(one['achieved'])}" for name, one in link.items()
-    ]
+    return [f"link {name}: asked {_asked(one)}; {_achieved(one['achieved'])}" for name, one in link.items()]
+
+
+def _asked(one: dict[str, Any]) -> str:
+    delay_ms, loss_share = one["expected"]["delay_ms"], one["expected"]["loss_share"]
+    known = []
+    if delay_ms["mean"] is not None:
+        known.append(f"{delay_ms['mean']:.2f} ± {delay_ms['sd']:.2f} ms, p99 {delay_ms['p99']:.1f} ms")
+    if loss_share:
+        known.append(f"{100.0 * loss_share:.2f} % lost")
+    return (one["asked"] or "no delay") + (f" ({', '.join(known)})" if known else "")
 
 
 def _achieved(achieved: dict[str, Any]) -> str:
     delay_ms = achieved["delay_ms"]
     if delay_ms["mean"] is None:
         return f"nothing of {achieved['sent']} delivered"
-    spread = "" if delay_ms["sd"] is None else f" ± {delay_ms['sd']:.2f}"
-    said = [f"achieved {delay_ms['mean']:.2f}{spread} ms", f"p99 {delay_ms['p99']:.1f} ms"]
+    said = [f"achieved {delay_ms['mean']:.2f} ± {delay_ms['sd'] or 0.0:.2f} ms", f"p99 {delay_ms['p99']:.1f} ms"]
     said += [
         f"{100.0 * achieved[f'{name}_share']:.2f} % {word}"
         for name, word in (("loss", "lost"), ("duplicate", "doubled"), ("late", "reordered"))

@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from common.delay_distribution import cells, delays_at
+from common.link_expectation import expected
 from common.link_figures import LinkFigures
 from common.link_profile import QUEUE_LIMIT, Chance, LinkModel, LinkProfile, Slot
 from common.link_randomness import CorrelationModel, decisions, uniform_blocks
@@ -141,12 +142,13 @@ class DelayLine(Generic[Item]):
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """`asked`, in the grammar's words, with model, correlation and seed, and what was `achieved`."""
+        """`asked`, in the grammar's words, with model, correlation and seed, what is `expected` and was `achieved`."""
         return {
             "asked": self.profile.words(),
             "model": self.profile.model,
             "correlation": self.profile.correlation_model,
             "seed": self.profile.seed,
+            "expected": expected(self.profile),
             "achieved": self.figures.achieved() | {"waiting": self.waiting},
         }
 
