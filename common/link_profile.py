@@ -197,7 +197,8 @@ class LinkProfile:
         `retransmit_s`; without it 5/4 of the round trip, at least 1 ms. That is recovery as RACK does it
         (RFC 8985): the acknowledgement of a later message tells that one is missing, a quarter of the least
         round trip is granted for reordering, and lost retransmissions are found alike. It takes a steady
-        flow: the last message before a silence would wait for a time-out, on Linux 200 ms or more.
+        flow: the last message before a silence would wait for a time-out, on Linux 200 ms or more. Nor is
+        congestion control in it: bursts of loss shrink TCP's window and delay it more than this.
         """
         if self.retransmit_s is not None:
             return self.retransmit_s

@@ -366,6 +366,12 @@ def test_a_stream_sends_what_was_lost_again() -> None:
     assert set(np.round(run.delays_s, 6)) <= set(np.round(np.arange(50, 176, 0.5) / 1e3, 6))
 
 
+def test_what_is_sent_again_may_be_lost_again() -> None:
+    run = Run("delay 5ms loss 30% retransmit 10ms", 20_000, model="stream")
+    # Each sending fails with 0.3, so that 0.3 + 0.3² + ... = 3 / 7 of a message are repeated on average.
+    assert run.line.figures.retransmitted / 20_000 == pytest.approx(3.0 / 7.0, abs=0.03)
+
+
 def test_a_stream_recovers_within_a_round_trip_and_a_quarter() -> None:
     profile = LinkProfile.parse("delay 50ms loss 1%", model="stream")
     assert profile.recovery_s() == pytest.approx(1.25 * 0.100)
