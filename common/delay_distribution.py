@@ -1,52 +1,151 @@
-"""How netem draws a delay: mean + jitter × a standard shape, from uniform random numbers."""
+"""The shapes of netem's random delays: mean + jitter × a quantile of a standard shape, from tables and closed forms.
+
+netem's tables hold quantiles in steps of 1/8192 jitter, as 16-bit integers, so that no delay lies more than
+4 jitters from its mean. Ours are worked out from the distributions' definitions.
+"""
 
 import functools
-from typing import Literal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.special import ndtri
 
 from common.arrays import FloatArray
+from common.errors import ConfigurationError
 
-Distribution = Literal["uniform", "normal"]
+Distribution = Literal["uniform", "normal", "pareto", "paretonormal", "exponential"]
 
-_TABLE_SIZE = 4096
-_STEPS_PER_SIGMA = 8192
-_LOWEST_ENTRY = -(2**15)
+STEPS_PER_JITTER = 8192
+TABLE_SIZE = 4096
+"""Entries of the tables that are built in, one for each 1/4096 of probability."""
+_LARGEST_TABLE = 16384
+"""The most entries that the kernel takes."""
+_LOWEST_ENTRY, _HIGHEST_ENTRY = -(2**15), 2**15 - 1
+_PARETO_SHAPE = 3.0
+_PARETO_MEAN = _PARETO_SHAPE / (_PARETO_SHAPE - 1.0)
+
+
+@dataclass(frozen=True)
+class DelayTable:
+    """A table of one's own, in netem's format: quantiles in steps of 1/8192 of the jitter."""
+
+    name: str
+    """The file that it came from."""
+    steps: tuple[int, ...]
+    """In ascending order; netem draws from any order alike."""
+
+    @classmethod
+    def read(cls, path: Path, field: str) -> "DelayTable":
+        """Read whitespace-separated whole numbers, `#` beginning a comment, as in iproute2's `*.dist` files.
+
+        ConfigurationError, in one line that begins with `field`, for a file that cannot be read or holds
+        anything else.
+        """
+        try:
+            # Not open to devices and pipes, whose end may never come.
+            text = path.read_text(encoding="utf-8") if path.is_file() or not path.exists() else ""
+        except (OSError, UnicodeDecodeError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "is no text"
+            raise ConfigurationError(
+                f"{field}: {str(path)!r} is no distribution and cannot be read as a table ({reason}); "
+                f"valid: {', '.join(get_args(Distribution))}, or a table's file"
+            ) from error
+        words = [word for line in text.splitlines() for word in line.partition("#")[0].split()]
+        if not 0 < len(words) <= _LARGEST_TABLE:
+            raise ConfigurationError(f"{field}: table {path} has {len(words)} entries; valid: 1 to {_LARGEST_TABLE}")
+        steps = []
+        for word in words:
+            sign, digits = (word[0], word[1:]) if word[0] in "+-" else ("", word)
+            value = int(sign + digits) if digits.isascii() and digits.isdigit() and len(digits) < 9 else None
+            if value is None or not _LOWEST_ENTRY <= value <= _HIGHEST_ENTRY:
+                raise ConfigurationError(
+                    f"{field}: table {path} holds {word[:40]!r}; "
+                    f"valid: whole numbers from {_LOWEST_ENTRY} to {_HIGHEST_ENTRY}, in 1/{STEPS_PER_JITTER} jitter"
+                )
+            steps.append(value)
+        return cls(str(path), tuple(sorted(steps)))
 
 
 @functools.cache
-def normal_table() -> FloatArray:
-    """The standard normal distribution as netem sees it: (4096,) quantiles in ascending order, read-only.
-
-    netem's tables hold 16-bit integers in steps of 1/8192 sigma: the normal one begins at the least of them,
-    −4.0, and ends at +3.52. Entry k is the quantile of (4 k + 1/2) / 16384 at that resolution, which yields
-    exactly that span.
-    """
-    probabilities = (4.0 * np.arange(_TABLE_SIZE) + 0.5) / (4.0 * _TABLE_SIZE)
-    steps = np.maximum(np.rint(_STEPS_PER_SIGMA * ndtri(probabilities)), _LOWEST_ENTRY)
-    table: FloatArray = steps / _STEPS_PER_SIGMA
-    table.setflags(write=False)
-    return table
-
-
-def draw_delays(
-    generator: np.random.Generator,
-    count: int,
-    mean_s: float,
-    jitter_s: float,
-    distribution: Distribution,
-) -> FloatArray:
-    """Draw (count,) independent delays in seconds.
-
-    `uniform` is mean ± jitter, netem's shape where none is named; for `normal` the jitter is the standard
-    deviation. What would be negative is 0: such a packet leaves at once.
-    """
-    if jitter_s == 0.0:
-        return np.full(count, mean_s)
-    if distribution == "uniform":
-        delays_s = generator.uniform(mean_s - jitter_s, mean_s + jitter_s, count)
+def table(shape: Distribution | DelayTable) -> FloatArray | None:
+    """Quantiles of `shape` in jitters, (n,) in ascending order and read-only; None for shapes in closed form."""
+    if isinstance(shape, DelayTable):
+        steps = np.array(shape.steps, dtype=np.float64)
+    elif shape == "normal":
+        steps = _normal_steps()
+    elif shape == "pareto":
+        steps = _pareto_steps()
+    elif shape == "paretonormal":
+        # A quarter of the normal quantile and three quarters of the Pareto one, as NISTnet defined it; cut to
+        # whole steps towards zero.
+        steps = np.trunc((_normal_steps(lowest=-np.inf) + 3.0 * _pareto_steps()) / 4.0)
     else:
-        table = normal_table()
-        delays_s = mean_s + jitter_s * table[generator.integers(table.size, size=count)]
-    return np.maximum(delays_s, 0.0)
+        return None
+    quantiles: FloatArray = steps / STEPS_PER_JITTER
+    quantiles.setflags(write=False)
+    return quantiles
+
+
+def _normal_steps(lowest: float = _LOWEST_ENTRY) -> FloatArray:
+    """From −4.0 to +3.52: entry k is the quantile of (4 k + 1/2) / 16384, at the tables' resolution."""
+    probabilities = (4.0 * np.arange(TABLE_SIZE) + 0.5) / (4.0 * TABLE_SIZE)
+    steps: FloatArray = np.maximum(np.rint(STEPS_PER_JITTER * ndtri(probabilities)), lowest)
+    return steps
+
+
+def _pareto_steps() -> FloatArray:
+    """The Pareto distribution of shape 3 and least value 1, less its mean 3/2, divided by its variance 3/4.
+
+    By its variance, not its standard deviation: so netem has it. From −0.67 to the limit at +4, which leaves a
+    mean of −0.033 and a standard deviation of 0.820 jitters.
+    """
+    survival = 1.0 - np.arange(TABLE_SIZE) / TABLE_SIZE
+    variance = _PARETO_SHAPE / ((_PARETO_SHAPE - 1.0) ** 2 * (_PARETO_SHAPE - 2.0))
+    steps: FloatArray = np.rint(STEPS_PER_JITTER * (survival ** (-1.0 / _PARETO_SHAPE) - _PARETO_MEAN) / variance)
+    return np.minimum(steps, _HIGHEST_ENTRY)
+
+
+def cells(shape: Distribution | DelayTable, jitter_s: float) -> int:
+    """How many different delays netem knows for `shape`, which it picks by a random word's remainder."""
+    quantiles = table(shape)
+    if quantiles is not None:
+        return quantiles.size
+    # Without a table, every nanosecond from −jitter up to +jitter; for our own exponential, as a table has.
+    return max(1, round(2e9 * jitter_s)) if shape == "uniform" else TABLE_SIZE
+
+
+def delays_at(
+    probabilities: FloatArray, mean_s: float, jitter_s: float, shape: Distribution | DelayTable
+) -> FloatArray:
+    """The delays in seconds at `probabilities` (n,) in [0, 1).
+
+    `uniform`: mean ± jitter, netem's shape where none is named. `normal` and netem's other tables: mean plus
+    jitter × table entry. `exponential`, which netem lacks: never below the mean given, plus an exponential of
+    mean `jitter_s`, so that a floor with a queue's tail has the mean `mean_s + jitter_s`. What would be
+    negative is 0: such a packet leaves at once.
+    """
+    quantiles = table(shape)
+    if quantiles is not None:
+        in_jitters = quantiles[(probabilities * quantiles.size).astype(np.intp)]
+    elif shape == "uniform":
+        in_jitters = 2.0 * probabilities - 1.0
+    else:
+        in_jitters = -np.log1p(-probabilities)
+    return np.maximum(mean_s + jitter_s * in_jitters, 0.0)
+
+
+def moments(mean_s: float, jitter_s: float, shape: Distribution | DelayTable) -> tuple[float, float, float]:
+    """Mean, standard deviation and greatest value, in seconds, of the delays; of whole tables exactly.
+
+    For closed forms as for tables with very fine steps; the exponential has no greatest value (infinity).
+    """
+    quantiles = table(shape)
+    if quantiles is None:
+        quantiles = np.zeros(1) if jitter_s == 0.0 else None
+    if quantiles is not None:
+        delays_s = np.maximum(mean_s + jitter_s * quantiles, 0.0)
+        return float(delays_s.mean()), float(delays_s.std()), float(delays_s.max())
+    fine_s = delays_at((np.arange(200_000) + 0.5) / 200_000, mean_s, jitter_s, shape)
+    return float(fine_s.mean()), float(fine_s.std()), mean_s + jitter_s if shape == "uniform" else float("inf")

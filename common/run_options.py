@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from common.link_model import LinkModel, LinkSpec
+from common.link_model import CorrelationModel, LinkModel, LinkSpec
 from common.status import StatusMode
 
 
@@ -17,10 +17,16 @@ class RunOptions:
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Settings from a file, under these flags; every flag's name is a key."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = ""
-    """Emulated link for what this side sends, in netem's words: "delay 50ms 10ms distribution normal", or per
-    direction: "to_robot: delay 20ms; to_operator: delay 50ms 10ms"."""
+    """Emulated link for what this side sends, in netem's words: "delay 50ms 10ms distribution normal loss 1%", with
+    duplicate, corrupt, reorder, rate, limit and slot, and "trace FILE.csv" or "outage 2s at 10s every 30s" (after the
+    first message); or per direction and stream: "to_robot: delay 20ms; to_operator: delay 50ms 10ms; video: rate
+    2mbit; to_operator.telemetry: loss 5%"."""
     link_model: LinkModel = "datagram"
-    """datagram lets jitter reorder messages, stream keeps them in order as TCP does."""
+    """datagram loses and reorders messages as UDP does; stream keeps them in order as TCP does, and loss becomes
+    delay."""
+    link_correlation: CorrelationModel = "netem"
+    """What a correlation in the link means: netem's own, which makes loss rarer and leaves delays independent, or a
+    proper one, which keeps shares and distributions."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after this long; without it, at Ctrl-C."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
@@ -31,7 +37,7 @@ class RunOptions:
     """A live line for people, JSON lines for programs, or nothing."""
 
     def __post_init__(self) -> None:
-        LinkSpec.parse(self.link, 0, self.link_model)
+        self.link_spec()
         if self.duration is not None and not 0.0 < self.duration < 1e6:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
@@ -40,3 +46,7 @@ class RunOptions:
             raise ValueError(f"--summary {self.summary}: is a folder; valid: a file's path")
         if self.summary is not None and not self.summary.absolute().parent.is_dir():
             raise ValueError(f"--summary {self.summary}: there is no folder {self.summary.absolute().parent}")
+
+    def link_spec(self) -> LinkSpec:
+        """The emulated link, with this run's seed; ConfigurationError for a bad one."""
+        return LinkSpec.parse(self.link, max(0, self.seed), self.link_model, self.link_correlation)

@@ -65,8 +65,10 @@ class Status:
             sys.stdout.flush()
 
     def note(self, text: str) -> None:
-        """A line that stays, for people."""
-        if self._mode == "line":
+        """A line that stays, for people; an event of its own in the JSON mode."""
+        if self._mode == "json":
+            self.event("note", text=text)
+        elif self._mode == "line":
             self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=True)
 
 

@@ -1,12 +1,30 @@
-"""Human units at the edge (`50ms`, `10mbit`), SI inside."""
+"""Human units at the edge (`50ms`, `10mbit`, `1%`), SI inside."""
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 
 from common.errors import ConfigurationError
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "usec": 1e-6, "msec": 1e-3, "sec": 1.0}
+_PER_SECOND = {"us": 1e6, "ms": 1e3, "s": 1.0, "usec": 1e6, "msec": 1e3, "sec": 1.0}
+"""Divisors, because 800 / 1e6 is rounded once, as 0.0008 is, and 800 × 1e-6 twice."""
+_BITS_PER_SECOND = {
+    f"{prefix}{unit}": factor * bits
+    for prefix, factor in {
+        "": 1.0,
+        "k": 1e3,
+        "m": 1e6,
+        "g": 1e9,
+        "t": 1e12,
+        "ki": 2.0**10,
+        "mi": 2.0**20,
+        "gi": 2.0**30,
+        "ti": 2.0**40,
+    }.items()
+    for unit, bits in {"bit": 1.0, "bps": 8.0}.items()
+}
+"""As tc has them: `bit` counts bits, `bps` bytes; k is 1000, ki 1024."""
 
 
 def parse_duration(text: str, field: str) -> float:
@@ -16,9 +34,62 @@ def parse_duration(text: str, field: str) -> float:
     milliseconds. ConfigurationError names `field` and `text`.
     """
     match = re.fullmatch(rf"({_NUMBER})([a-z]+)", text.strip())
-    if match is None or match[2] not in _SECONDS:
+    if match is None or match[2] not in _PER_SECOND:
         raise ConfigurationError(f"{field}: {text!r} is no duration; valid: a number with us, ms or s, such as 50ms")
-    seconds = float(match[1]) * _SECONDS[match[2]]
+    seconds = float(match[1]) / _PER_SECOND[match[2]]
     if not math.isfinite(seconds) or seconds < 0.0:
         raise ConfigurationError(f"{field}: {text!r} is negative or not finite; valid: 0s or longer")
     return seconds
+
+
+def parse_rate(text: str, field: str) -> float:
+    """Read a rate such as `10mbit`, `500kbit` or `2mbps` (bytes, as tc has it); bits per second.
+
+    ConfigurationError names `field` and `text`; a bare number is refused.
+    """
+    match = re.fullmatch(rf"({_NUMBER})([a-zA-Z]+)", text.strip())
+    if match is None or match[2].lower() not in _BITS_PER_SECOND:
+        raise ConfigurationError(
+            f"{field}: {text!r} is no rate; valid: a number with bit, kbit, mbit, gbit or, in bytes, bps, kbps, mbps, "
+            "gbps, such as 10mbit"
+        )
+    bits_per_second = float(match[1]) * _BITS_PER_SECOND[match[2].lower()]
+    if not math.isfinite(bits_per_second) or bits_per_second <= 0.0:
+        raise ConfigurationError(f"{field}: {text!r} is not above 0 or not finite; valid: more than 0bit")
+    return bits_per_second
+
+
+def parse_share(text: str, field: str) -> float:
+    """Read a percentage from `0%` to `100%`; a share from 0 to 1. ConfigurationError names `field` and `text`."""
+    match = re.fullmatch(rf"({_NUMBER})%", text.strip())
+    share = float(match[1]) / 100.0 if match is not None else math.nan
+    if not 0.0 <= share <= 1.0:
+        raise ConfigurationError(f"{field}: {text!r} is no percentage; valid: 0% to 100%")
+    return share
+
+
+def format_duration(seconds: float) -> str:
+    """The shortest text that `parse_duration` reads as the same number of seconds."""
+    return "0ms" if seconds == 0.0 else _shortest(seconds, _PER_SECOND, ("s", "ms", "us"), "s")
+
+
+def format_rate(bits_per_second: float) -> str:
+    """The shortest text that `parse_rate` reads as the same rate."""
+    per_bit_per_second = {unit: 1.0 / _BITS_PER_SECOND[unit] for unit in ("gbit", "mbit", "kbit")}
+    return _shortest(bits_per_second, per_bit_per_second, tuple(per_bit_per_second), "bit")
+
+
+def format_share(share: float) -> str:
+    """The shortest text that `parse_share` reads as the same share, up to a rounding."""
+    short = f"{100.0 * share:.12g}"
+    return f"{short if float(short) / 100.0 == share else repr(100.0 * share)}%"
+
+
+def _shortest(value: float, per_unit: Mapping[str, float], units: Sequence[str], plain: str) -> str:
+    exact = [
+        f"{number}{unit}"
+        for unit in units
+        if "e" not in (number := f"{value * per_unit[unit]:.12g}") and float(number) / per_unit[unit] == value
+    ]
+    # In the plain unit nothing is rounded, so that every digit survives.
+    return min(exact, key=len, default=f"{value!r}{plain}")

@@ -1,20 +1,42 @@
 """`feelahead bench NAME`: the benchmarks, each of which prints its goals as met or missed."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from common.errors import ConfigurationError
 
-_BENCHMARKS = {
-    "overlap": "run time against error of the exact overlaps and of what is used in their place",
+
+def _overlap(arguments: Sequence[str]) -> int:
+    from feelahead.benchmarks.overlap_bench import bench_overlap  # noqa: PLC0415
+
+    return bench_overlap(arguments)
+
+
+def _link(arguments: Sequence[str]) -> int:
+    from feelahead.benchmarks.link_bench import bench_link  # noqa: PLC0415
+
+    return bench_link(arguments)
+
+
+_BENCHMARKS: dict[str, tuple[Callable[[Sequence[str]], int], str, str]] = {
+    "overlap": (
+        _overlap,
+        "run time against error of the exact overlaps and of what is used in their place",
+        "pip install 'feelahead[robot,bench]'",
+    ),
+    "link": (
+        _link,
+        "the emulated link beside what was asked, and beside recordings of the kernel's netem",
+        "pip install feelahead",
+    ),
 }
-"""Each name with what it measures; its module is imported only when it is asked for."""
+"""Each name with what it runs, what that measures, and what brings it; imported only when it is asked for."""
 
 
 def bench(arguments: Sequence[str]) -> int:
     """Run the benchmark that the first argument names."""
     if not arguments or arguments[0] in ("-h", "--help"):
-        lines = [f"  {name:<12}{text}" for name, text in _BENCHMARKS.items()]
+        lines = [f"  {name:<12}{text}" for name, (_, text, _) in _BENCHMARKS.items()]
         sys.stdout.write(
             "usage: feelahead bench NAME [OPTIONS]\n\n" + "\n".join(lines) + "\n\nEach has its own --help.\n"
         )
@@ -22,10 +44,8 @@ def bench(arguments: Sequence[str]) -> int:
     name, *rest = arguments
     if name not in _BENCHMARKS:
         raise ConfigurationError(f"bench {name!r}: no such benchmark; valid: {', '.join(_BENCHMARKS)}")
+    run, _, remedy = _BENCHMARKS[name]
     try:
-        from feelahead.benchmarks.overlap_bench import bench_overlap  # noqa: PLC0415
+        return run(rest)
     except ModuleNotFoundError as error:
-        raise ConfigurationError(
-            f"bench {name}: {error.name} is not installed; pip install 'feelahead[robot,bench]'"
-        ) from error
-    return bench_overlap(rest)
+        raise ConfigurationError(f"bench {name}: {error.name} is not installed; {remedy}") from error

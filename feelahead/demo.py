@@ -12,6 +12,8 @@ from typing import Annotated, Any
 import tyro
 
 from common.command_line import given_fields, parse_settings
+from common.link_figures import report_lines
+from common.link_model import Direction, Stream, unused_clauses
 from common.run_options import RunOptions
 from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
@@ -20,7 +22,13 @@ from feelahead.summary import merge_summaries
 
 _START_TIMEOUT_S = 90.0
 """The first start compiles the overlap kernels."""
-_LINK_TIMEOUT_S = 15.0
+_LINK_TIMEOUT_S = 30.0
+_SENT: tuple[tuple[Direction, Stream], ...] = (
+    ("to_robot", "haptics"),
+    ("to_operator", "haptics"),
+    ("to_operator", "telemetry"),
+)
+"""What the two sides send to each other."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,8 @@ def demo(arguments: Sequence[str]) -> int:
         StopSignal() as stop,
         Status(settings.status, "feelahead demo") as status,
     ):
+        for text in unused_clauses(settings.link_spec(), _SENT):
+            status.note(text)
         summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
         try:
             errors = _run_both(settings, given, summaries, stop, status)
@@ -72,7 +82,7 @@ def demo(arguments: Sequence[str]) -> int:
         merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
         if settings.summary is not None:
             settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
-    for line in _report(merged):
+    for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
         status.note(line)
     for error in errors:
         sys.stderr.write(f"feelahead demo: {error}\n")
@@ -133,7 +143,7 @@ def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: P
     """Only what somebody asked for: the sides' own files are to count where nothing was."""
     arguments = [
         f"--{name.replace('_', '-')}={getattr(settings, name)}"
-        for name in ("link", "link_model", "seed")
+        for name in ("link", "link_model", "link_correlation", "seed")
         if name in given
     ]
     if "realtime" in given:
@@ -154,6 +164,8 @@ def _watch(
             for event in side.events():
                 if event["event"] == "status":
                     values |= {name: value for name, value in event.items() if name != "event"}
+                elif event["event"] == "note":
+                    status.note(f"{side.name}: {event['text']}")
             if not side.running:
                 try:
                     side.check()

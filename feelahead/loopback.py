@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from common.clock import VirtualClock
-from common.link_model import DelayLine, LinkSpec
+from common.link_model import DelayLine, Stream, link_summary
 from common.statistics import RunningStatistics
 from feelahead.summary import merge_summaries
 from operator_side.core import OperatorSide
@@ -18,8 +18,8 @@ from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import SimulatedOperator
 from robot_side.assembly import build_robot_side
-from robot_side.core import OutgoingStream, RobotSide
-from robot_side.main import TICK_PERIOD_S
+from robot_side.core import RobotSide
+from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
 from robot_side.overlap.kernels import warm_up
 from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
@@ -56,12 +56,10 @@ class Loopback:
             self.device, settings.operator.person, settings.operator.seed, settings.operator.calibration
         )
         self.tick_time = RunningStatistics(settings.robot.seed)
-        there = LinkSpec.parse(settings.operator.link, settings.operator.seed, settings.operator.link_model)
-        back = LinkSpec.parse(settings.robot.link, settings.robot.seed, settings.robot.link_model)
+        there, back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(there.profile("to_robot"))
-        self._to_operator: dict[OutgoingStream, DelayLine[bytes]] = {
-            "haptics": DelayLine(back.profile("to_operator", "haptics")),
-            "telemetry": DelayLine(back.profile("to_operator", "telemetry")),
+        self._to_operator: dict[Stream, DelayLine[bytes]] = {
+            stream: DelayLine(back.profile("to_operator", stream)) for stream in SENT_STREAMS
         }
         self._ticks = 0
         self._motions = 0
@@ -87,6 +85,9 @@ class Loopback:
         merged = merge_summaries(self.robot.summary(), self.operator.summary(), [])
         merged["duration_s"] = self.clock.now()
         merged["tick_us"] = tick_microseconds(self.tick_time)
+        merged["link"] = link_summary("to_robot", {"haptics": self._to_robot}) | link_summary(
+            "to_operator", self._to_operator
+        )
         return merged
 
     def _next_event(self) -> float:

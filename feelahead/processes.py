@@ -40,6 +40,7 @@ class SideProcess:
         )
         self._interrupted = False
         self._events: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=1000)
+        self._passed_over: list[dict[str, Any]] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -67,7 +68,7 @@ class SideProcess:
 
     def events(self) -> list[dict[str, Any]]:
         """What it has said since the last call."""
-        said = []
+        said, self._passed_over = self._passed_over, []
         while not self._events.empty():
             said.append(self._events.get_nowait())
         return said
@@ -99,6 +100,7 @@ class SideProcess:
                 self._process.wait(timeout=10.0)
                 self.check()
                 raise SideFailedError(f"the {self.name} side ended early")
+            self._passed_over.append(event)
 
     def check(self) -> None:
         """SideFailedError when it has ended with an error, in its own words; ConfigurationError for bad input."""

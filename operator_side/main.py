@@ -10,7 +10,7 @@ from common.command_line import parse_settings, run_command
 from common.curve_authentication import OperatorKeys
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
-from common.link_model import DelayLine, LinkSpec
+from common.link_model import DelayLine, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_priority
 from common.sockets import OperatorSockets
@@ -34,7 +34,7 @@ def main() -> None:
 def command(arguments: Sequence[str]) -> int:
     """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out."""
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
-    link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    link = settings.link_spec()
     core = OperatorSide(
         secrets.randbits(53),
         clock_domain(),
@@ -49,6 +49,8 @@ def command(arguments: Sequence[str]) -> int:
         StopSignal() as stop,
         Status(settings.status, "operator") as status,
     ):
+        for text in unused_clauses(link, [("to_robot", "haptics")]):
+            status.note(text)
         device: Device
         person: SimulatedOperator | None = None
         if settings.device == "simulated":
@@ -131,7 +133,10 @@ class _Loop:
 
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
-        return {"pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}}}
+        return {
+            "pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}},
+            "link": link_summary("to_robot", {"haptics": self._line}),
+        }
 
     def _move(self, now_s: float) -> None:
         self._pacer.begin(now_s)

@@ -1,5 +1,6 @@
 """The process `feelahead-robot`: sockets, clock, core; nothing else."""
 
+import dataclasses
 import json
 import secrets
 import time
@@ -13,7 +14,7 @@ from common.command_line import parse_settings, run_command
 from common.curve_authentication import RobotKeys
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
-from common.link_model import DelayLine, LinkSpec
+from common.link_model import BitFlip, DelayLine, LinkSpec, Stream, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_descriptor_limit, raise_priority
 from common.sockets import RobotSockets
@@ -30,6 +31,8 @@ TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2
 """How often the allow-list is looked at, so that a revoked operator is out within a second."""
 
+SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
+
 
 def main() -> None:
     """The console script."""
@@ -39,7 +42,7 @@ def main() -> None:
 def command(arguments: Sequence[str]) -> int:
     """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
-    link = LinkSpec.parse(settings.link, settings.seed, settings.link_model)
+    link = settings.link_spec()
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
     # The sockets first: a port that is taken is found out before the kernels are compiled.
@@ -48,7 +51,7 @@ def command(arguments: Sequence[str]) -> int:
         Status(settings.status, "robot") as status,
     ):
         core = build_robot_side(settings, secrets.randbits(53), clock_domain())
-        for text in core.notes:
+        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         # Until here a signal ends the process at once, for a compilation cannot be asked to stop.
@@ -87,6 +90,10 @@ def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[st
     return [f"keys: nobody is let in yet; to change that: {keys.allowed.folder.command('allow NAME OPERATOR-KEY')}"]
 
 
+def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
+    return dataclasses.replace(message, payload=flip(message.payload))
+
+
 class _Loop:
     """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
 
@@ -101,8 +108,8 @@ class _Loop:
         self._admission = Admission()
         self._tick_time = RunningStatistics(settings.seed)
         self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
-        self._lines: dict[str, DelayLine[Outgoing]] = {
-            stream: DelayLine(link.profile("to_operator", stream)) for stream in ("haptics", "telemetry")
+        self._lines: dict[Stream, DelayLine[Outgoing]] = {
+            stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
         }
         self._collection = IdleCollection(self._clock)
         self._start_s = self._clock.now()
@@ -138,6 +145,7 @@ class _Loop:
             "duration_s": self._clock.now() - self._start_s,
             "tick_us": tick_microseconds(self._tick_time),
             **paced,
+            "link": link_summary("to_operator", self._lines),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {
                 "refused": sockets.refused,
@@ -157,7 +165,7 @@ class _Loop:
         self._tick_time.add(took_s)
         self._latest_tick_times_s.append(took_s)
         for message in outgoing:
-            self._lines[message.stream].push(now_s, message)
+            self._lines[message.stream].push(now_s, message, len(message.payload))
 
     def _send(self) -> None:
         due_s = self._clock.now()

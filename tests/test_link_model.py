@@ -7,9 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.delay_distribution import draw_delays, normal_table
 from common.errors import ConfigurationError
-from common.link_model import QUEUE_LIMIT, DelayLine, Direction, LinkModel, LinkProfile, LinkSpec, Stream
+from common.link_model import (
+    QUEUE_LIMIT,
+    DelayLine,
+    Direction,
+    LinkModel,
+    LinkProfile,
+    LinkSpec,
+    Stream,
+    unused_clauses,
+)
 
 repeatable = settings(derandomize=True, deadline=None)
 
@@ -29,136 +37,6 @@ def given_delays_s(profile: LinkProfile, count: int) -> list[float]:
         delays_s.append(due_s - number)
         assert line.pop(due_s) == [number]
     return delays_s
-
-
-# Profiles
-
-
-@pytest.mark.parametrize(
-    ("spec", "expected"),
-    [
-        ("", LinkProfile()),
-        ("  ", LinkProfile()),
-        ("delay 50ms", LinkProfile(0.050)),
-        ("delay 0ms", LinkProfile()),
-        ("delay 50ms 10ms", LinkProfile(0.050, 0.010, "uniform")),
-        ("delay 50ms 10ms distribution uniform", LinkProfile(0.050, 0.010, "uniform")),
-        (" delay  0.2s 1500us   distribution normal ", LinkProfile(0.2, 0.0015, "normal")),
-    ],
-)
-def test_reads_netem(spec: str, expected: LinkProfile) -> None:
-    assert LinkProfile.parse(spec) == expected
-
-
-def test_keeps_seed_and_model() -> None:
-    profile = LinkProfile.parse("delay 1ms", seed=7, model="stream")
-    assert (profile.seed, profile.model) == (7, "stream")
-
-
-@pytest.mark.parametrize(
-    ("spec", "named", "valid"),
-    [
-        ("loss 1%", "'loss'", "delay TIME"),
-        ("delay 50ms loss 1%", "'loss'", "delay TIME"),
-        ("delay 50ms 10ms distribution normal rate 10mbit", "'rate'", "delay TIME"),
-        ("delay 50ms 10ms 25%", "'25%'", "delay TIME"),
-        ("delay 50ms 25%", "'25%'", "delay TIME"),
-        ("delay 50ms delay 60ms", "'delay'", "delay TIME"),
-        ("delay 50ms normal", "'normal'", "delay TIME"),
-        ("50ms", "'50ms'", "delay TIME"),
-        ("delay", "'delay'", "delay TIME"),
-        ("delay 50", "'50'", "50ms"),
-        ("delay 50ms 10", "'10'", "50ms"),
-        ("delay 50m", "'50m'", "50ms"),
-        ("delay -50ms", "'-50ms'", "0s or longer"),
-        ("delay 50ms -10ms", "'-10ms'", "0s or longer"),
-        ("delay nanms", "'nanms'", "50ms"),
-        ("delay 1e999s", "'1e999s'", "0s or longer"),
-        ("delay 50ms distribution normal", "'distribution'", "delay TIME"),
-        ("delay 50ms 10ms distribution pareto", "'pareto'", "uniform, normal"),
-        ("delay 50ms 10ms distribution", "''", "uniform, normal"),
-        ("delay 50ms\nloss 1%", "'loss'", "delay TIME"),
-        ("to_robot: delay 50ms", "'to_robot:'", "delay TIME"),
-    ],
-)
-def test_refuses_a_bad_profile_in_one_line(spec: str, named: str, valid: str) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
-        LinkProfile.parse(spec)
-    text = str(refusal.value)
-    assert "\n" not in text
-    assert repr(spec) in text
-    assert named in text.replace(repr(spec), "", 1)
-    assert valid in text
-
-
-def test_refuses_unknown_models_and_negative_seeds() -> None:
-    for parse in (LinkProfile.parse, LinkSpec.parse):
-        with pytest.raises(ConfigurationError, match="'tcp' is unknown; valid: datagram, stream"):
-            parse("", model="tcp")  # type: ignore[arg-type]
-        with pytest.raises(ConfigurationError, match="seed = -1"):
-            parse("", seed=-1)
-
-
-@pytest.mark.parametrize(
-    "fields", [{"delay_s": -1e-3}, {"delay_s": math.inf}, {"jitter_s": -1.0}, {"jitter_s": math.nan}]
-)
-def test_a_profile_is_validated_at_construction(fields: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(fields))} = "):
-        LinkProfile(**fields)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="distribution = 'pareto'"):
-        LinkProfile(distribution="pareto")  # type: ignore[arg-type]
-
-
-# Distributions
-
-
-def test_the_normal_table_spans_what_netems_does() -> None:
-    table = normal_table()
-    assert table.shape == (4096,)
-    assert table[0] == -4.0
-    assert table[-1] == pytest.approx(3.52, abs=0.005)
-    assert np.all(np.diff(table) >= 0.0)
-    assert np.array_equal(table * 8192, np.rint(table * 8192))
-
-
-def test_the_normal_table_holds_normal_quantiles() -> None:
-    normal = statistics.NormalDist()
-    for entry, quantile in list(enumerate(normal_table().tolist()))[1:]:
-        assert normal.cdf(quantile) == pytest.approx((entry + 0.125) / 4096, abs=normal.pdf(quantile) / 16000)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_normal_delays_have_the_mean_and_deviation_asked_for(seed: int) -> None:
-    delays_s = given_delays_s(LinkProfile.parse("delay 50ms 10ms distribution normal", seed), 20_000)
-    assert statistics.fmean(delays_s) == pytest.approx(0.050, abs=0.3e-3)
-    assert statistics.stdev(delays_s) == pytest.approx(0.010, abs=0.2e-3)
-    assert min(delays_s) >= 0.050 - 0.040 - 1e-9
-    assert max(delays_s) <= 0.050 + 0.0353 + 1e-9
-    share_within_1_sd = sum(abs(delay_s - 0.050) < 0.010 for delay_s in delays_s) / len(delays_s)
-    assert share_within_1_sd == pytest.approx(0.6827, abs=0.012)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_uniform_delays_fill_their_range_evenly(seed: int) -> None:
-    delays_s = given_delays_s(LinkProfile.parse("delay 50ms 10ms", seed), 20_000)
-    assert statistics.fmean(delays_s) == pytest.approx(0.050, abs=0.15e-3)
-    assert statistics.stdev(delays_s) == pytest.approx(0.010 / math.sqrt(3.0), abs=0.08e-3)
-    assert min(delays_s) >= 0.040 - 1e-9
-    assert max(delays_s) <= 0.060 + 1e-9
-    share_within_half = sum(abs(delay_s - 0.050) < 0.005 for delay_s in delays_s) / len(delays_s)
-    assert share_within_half == pytest.approx(0.5, abs=0.012)
-
-
-def test_a_negative_delay_sends_at_once() -> None:
-    delays_s = given_delays_s(LinkProfile.parse("delay 5ms 10ms", seed=2), 10_000)
-    assert min(delays_s) == 0.0
-    assert sum(delay_s == 0.0 for delay_s in delays_s) / len(delays_s) == pytest.approx(0.25, abs=0.015)
-
-
-def test_a_constant_delay_is_drawn_without_randomness() -> None:
-    generator = np.random.default_rng(0)
-    assert draw_delays(generator, 3, 0.02, 0.0, "normal").tolist() == [0.02] * 3
-    assert generator.random() == np.random.default_rng(0).random()
 
 
 # Delay line
@@ -231,11 +109,11 @@ def test_a_full_queue_drops_the_newest_and_counts_it() -> None:
     line: DelayLine[int] = DelayLine(LinkProfile.parse("delay 10s"))
     for number in range(QUEUE_LIMIT + 5):
         line.push(0.0, number)
-    assert line.dropped == 5
-    assert line.achieved()["count"] == QUEUE_LIMIT
+    assert line.figures.dropped == 5
+    assert line.waiting == QUEUE_LIMIT
     assert line.pop(10.0) == list(range(QUEUE_LIMIT))
     line.push(11.0, -1)
-    assert line.dropped == 5
+    assert line.figures.dropped == 5
     assert line.pop(21.0) == [-1]
 
 
@@ -245,16 +123,36 @@ def test_the_seed_decides_everything() -> None:
     assert given_delays_s(LinkProfile.parse(spec, 1), 600) != given_delays_s(LinkProfile.parse(spec, 2), 600)
 
 
-def test_reports_what_was_achieved() -> None:
-    line: DelayLine[int] = DelayLine(LinkProfile.parse("delay 50ms 10ms", seed=3))
-    assert line.achieved() == {"count": 0, "mean_s": None, "sd_s": None}
+def test_reports_what_was_asked_and_achieved() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse("delay 50ms 10ms loss 10%", seed=3))
+    empty = line.summary()
+    assert empty["asked"] == "delay 50ms 10ms loss 10%"
+    assert empty["achieved"]["delay_ms"]["mean"] is None
+    assert empty["achieved"]["loss_share"] is None
+    delays_s = []
     for number in range(900):
-        line.push(float(number), number)
-    delays_s = given_delays_s(LinkProfile.parse("delay 50ms 10ms", seed=3), 900)
-    achieved = line.achieved()
-    assert achieved["count"] == 900
-    assert achieved["mean_s"] == pytest.approx(statistics.fmean(delays_s), rel=1e-9)
-    assert achieved["sd_s"] == pytest.approx(statistics.stdev(delays_s), rel=1e-9)
+        line.push(float(number), number, 125)
+        if (due_s := line.next_due()) is not None:
+            assert line.pop(due_s) == [number]
+            delays_s.append(due_s - number)
+    achieved = line.summary()["achieved"]
+    assert (achieved["sent"], achieved["delivered"], achieved["waiting"]) == (900, len(delays_s), 0)
+    assert achieved["loss_share"] == pytest.approx(1.0 - len(delays_s) / 900)
+    assert achieved["delay_ms"]["mean"] == pytest.approx(1e3 * statistics.fmean(delays_s), rel=1e-9)
+    assert achieved["delay_ms"]["sd"] == pytest.approx(1e3 * statistics.stdev(delays_s), rel=1e-9)
+    assert achieved["delay_ms"]["p50"] == pytest.approx(1e3 * statistics.median(delays_s), rel=1e-9)
+    assert achieved["rate_bit_s"] == pytest.approx(1000.0 * len(delays_s) / 900, rel=0.01)
+    assert achieved["late_share"] == achieved["duplicate_share"] == 0.0
+    assert achieved["release_error_us"]["max"] == 0.0
+
+
+def test_a_late_process_shows_in_the_release_error() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse("delay 50ms"))
+    line.push(0.0, 1)
+    line.pop(0.0503)
+    achieved = line.summary()["achieved"]
+    assert achieved["release_error_us"]["max"] == pytest.approx(300.0)
+    assert achieved["delay_ms"]["mean"] == pytest.approx(50.3)
 
 
 def test_items_are_never_compared() -> None:
@@ -270,6 +168,8 @@ def test_refuses_times_that_are_none(now_s: float) -> None:
     line: DelayLine[int] = DelayLine(LinkProfile())
     with pytest.raises(ValueError, match="now_s = "):
         line.push(now_s, 1)
+    with pytest.raises(ValueError, match="now_s = "):
+        line.pop(now_s)
     assert line.next_due() is None
 
 
@@ -302,6 +202,30 @@ def test_a_stream_wins_over_a_direction_over_the_bare_profile() -> None:
     assert spec.profile("to_operator").distribution == "normal"
 
 
+def test_a_stream_in_a_direction_wins_over_both() -> None:
+    spec = LinkSpec.parse("to_operator.haptics: delay 7ms; haptics: delay 5ms; to_operator: delay 3ms; delay 1ms")
+    delays_ms = {key: round(1e3 * spec.profile(*key).delay_s) for key in EVERY_STREAM}
+    assert [delays_ms["to_operator", stream] for stream in ("haptics", "telemetry", "video")] == [7, 3, 3]
+    assert [delays_ms["to_robot", stream] for stream in ("haptics", "telemetry", "video")] == [5, 1, 1]
+
+
+def test_clauses_that_apply_to_nothing_are_told() -> None:
+    sent: list[tuple[Direction, Stream]] = [("to_operator", "haptics"), ("to_operator", "telemetry")]
+    spec = LinkSpec.parse("to_robot: delay 20ms; to_operator: delay 50ms; video: rate 2mbit")
+    assert spec.unused(sent) == ["to_robot", "video"]
+    assert len(unused_clauses(spec, sent)) == 2
+    assert "'to_robot'" in unused_clauses(spec, sent)[0]
+    overridden = LinkSpec.parse("delay 1ms; haptics: delay 2ms; telemetry: delay 3ms")
+    assert unused_clauses(overridden, sent) == ["link: the profile without a name applies to nothing that is sent here"]
+    assert LinkSpec.parse("delay 1ms").unused(sent) == []
+
+
+def test_a_round_trip_counts_both_directions() -> None:
+    spec = LinkSpec.parse("to_robot: delay 20ms; to_operator: delay 50ms", model="stream")
+    assert spec.profile("to_robot").round_trip_s == pytest.approx(0.070)
+    assert spec.profile("to_operator").recovery_s() == pytest.approx(1.25 * 0.070)
+
+
 def test_what_no_clause_names_is_not_delayed() -> None:
     spec = LinkSpec.parse("to_robot: delay 20ms; video:")
     assert spec.profile("to_robot").delay_s == 0.020
@@ -328,6 +252,8 @@ def test_streams_are_repeatable_by_seed() -> None:
         ("to_mars: delay 20ms", "'to_mars'"),
         (": delay 20ms", "''"),
         ("Video: delay 20ms", "'Video'"),
+        ("video.to_robot: delay 20ms", "'video.to_robot'"),
+        ("to_robot.haptics: delay 1ms; to_robot.haptics: delay 1ms", "'to_robot.haptics'"),
         ("video: delay 1ms; video: delay 2ms", "'video'"),
         ("delay 1ms; delay 2ms", "a profile without a name"),
     ],
@@ -339,12 +265,12 @@ def test_refuses_bad_names_and_lists_the_valid_ones(spec: str, named: str) -> No
     assert "\n" not in text
     assert repr(spec) in text
     assert named in text
-    assert re.search("valid: .*to_robot, to_operator, haptics, telemetry, video", text)
+    assert re.search("valid: .*to_robot, to_operator, haptics, telemetry, video, or both as to_robot.haptics", text)
 
 
 def test_a_bad_clause_is_reported_with_the_whole_specification() -> None:
-    spec = "to_robot: delay 20ms; video: rate 2mbit"
-    with pytest.raises(ConfigurationError, match="'rate'") as refusal:
+    spec = "to_robot: delay 20ms; video: raet 2mbit"
+    with pytest.raises(ConfigurationError, match="'raet'") as refusal:
         LinkSpec.parse(spec)
     assert repr(spec) in str(refusal.value)
 

@@ -1,0 +1,125 @@
+"""What an emulated link achieved, to stand beside what was asked."""
+
+from typing import Any
+
+from common.statistics import RunningStatistics
+
+
+class LinkFigures:
+    """Counts and statistics of one line, message by message."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.sent = 0
+        """Messages taken in."""
+        self.delivered = 0
+        """Messages given out, copies included."""
+        self.lost = 0
+        """By the loss model, or by the trace."""
+        self.outage = 0
+        """Lost because of an outage."""
+        self.held = 0
+        """In a stream, held back by an outage until its end."""
+        self.dropped = 0
+        """Because too many were waiting."""
+        self.duplicated = 0
+        """Copies made."""
+        self.corrupted = 0
+        """Messages with a bit turned over; in a stream, found corrupt and sent again."""
+        self.retransmitted = 0
+        """In a stream, sendings on top of the first."""
+        self.late = 0
+        """Messages overtaken by a later one (RFC 4737, type-P-reordered)."""
+        self._delay = RunningStatistics(seed)
+        self._release_error = RunningStatistics(seed)
+        self._delivered_bytes = 0
+        self._last_bytes = 0
+        self._newest = -1
+        self._originals = 0
+        self._first_delivered_s = 0.0
+        self._last_delivered_s = 0.0
+
+    def add_delivered(
+        self, now_s: float, sent_s: float, due_s: float, number: int, size_bytes: int, *, copy: bool
+    ) -> None:
+        """A message that entered as number `number` at `sent_s` leaves at `now_s`, having been due at `due_s`."""
+        self._delay.add(now_s - sent_s)
+        self._release_error.add(now_s - due_s)
+        if not self.delivered:
+            self._first_delivered_s = now_s
+        self.delivered += 1
+        self._delivered_bytes += size_bytes
+        self._last_bytes = size_bytes
+        self._last_delivered_s = now_s
+        if copy:
+            return
+        self._originals += 1
+        if number < self._newest:
+            self.late += 1
+        else:
+            self._newest = number
+
+    def achieved(self) -> dict[str, Any]:
+        """The figures by name, in the units of their names; None where there is nothing to tell yet.
+
+        `delay_ms` and the rate are of what was delivered, as the receiver's end of the link saw it, and so
+        include how late the process released it: `release_error_us`. `loss_share` is of all that was sent and
+        copied, the other shares are of what was delivered.
+        """
+        span_s = self._last_delivered_s - self._first_delivered_s
+        # The first message opens the span, and its bits came before it.
+        bits = 8.0 * (self._delivered_bytes - self._last_bytes)
+        gone = self.lost + self.dropped + self.outage
+        entered = self.sent + self.duplicated
+        errors_us = {
+            name: None if value is None else 1e6 * value
+            for name, value in (
+                ("p50", self._release_error.quantile(0.50)),
+                ("p99", self._release_error.quantile(0.99)),
+                ("max", self._release_error.maximum),
+            )
+        }
+        return {
+            "sent": self.sent,
+            "delivered": self.delivered,
+            "lost": self.lost,
+            "outage": self.outage,
+            "held": self.held,
+            "dropped": self.dropped,
+            "duplicated": self.duplicated,
+            "corrupted": self.corrupted,
+            "retransmitted": self.retransmitted,
+            "delay_ms": self._delay.summary_ms(),
+            "loss_share": gone / entered if entered else None,
+            "duplicate_share": (self.delivered - self._originals) / self.delivered if self.delivered else None,
+            "late_share": self.late / self._originals if self._originals else None,
+            "rate_bit_s": bits / span_s if span_s > 0.0 else None,
+            "release_error_us": errors_us,
+        }
+
+
+def report_lines(link: dict[str, Any]) -> list[str]:
+    """A line of text for each line of a summary's `link`: what was asked, and what was achieved."""
+    return [f"link {name}: asked {_asked(one)}; {_achieved(one['achieved'])}" for name, one in link.items()]
+
+
+def _asked(one: dict[str, Any]) -> str:
+    delay_ms, loss_share = one["expected"]["delay_ms"], one["expected"]["loss_share"]
+    known = []
+    if delay_ms["mean"] is not None:
+        known.append(f"{delay_ms['mean']:.2f} ± {delay_ms['sd']:.2f} ms, p99 {delay_ms['p99']:.1f} ms")
+    if loss_share:
+        known.append(f"{100.0 * loss_share:.2f} % lost")
+    return (one["asked"] or "no delay") + (f" ({', '.join(known)})" if known else "")
+
+
+def _achieved(achieved: dict[str, Any]) -> str:
+    delay_ms = achieved["delay_ms"]
+    if delay_ms["mean"] is None:
+        return f"nothing of {achieved['sent']} delivered"
+    said = [f"achieved {delay_ms['mean']:.2f} ± {delay_ms['sd'] or 0.0:.2f} ms", f"p99 {delay_ms['p99']:.1f} ms"]
+    said += [
+        f"{100.0 * achieved[f'{name}_share']:.2f} % {word}"
+        for name, word in (("loss", "lost"), ("duplicate", "doubled"), ("late", "reordered"))
+        if achieved[f"{name}_share"]
+    ]
+    return ", ".join([*said, f"of {achieved['sent']}"])

@@ -1,0 +1,283 @@
+"""netem's grammar for a link profile, with clauses of our own for traces, outages and retransmission."""
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast, get_args
+
+from common.delay_distribution import DelayTable, Distribution
+from common.errors import ConfigurationError
+from common.link_loss import GilbertElliott, LossModel, RandomLoss, StateLoss
+from common.link_profile import QUEUE_LIMIT, Chance, LinkModel, LinkProfile, Outage, Rate, Slot
+from common.link_randomness import CorrelationModel
+from common.link_trace import Trace
+from common.units import (
+    format_duration,
+    format_rate,
+    format_share,
+    parse_duration,
+    parse_rate,
+    parse_share,
+)
+
+GRAMMAR = {
+    "delay": "delay TIME [JITTER [CORRELATION%]] "
+    "[distribution uniform|normal|pareto|paretonormal|exponential|TABLEFILE]",
+    "loss": "loss [random] P% [CORRELATION%] | loss state P13% [P31% [P32% [P23% [P14%]]]] | "
+    "loss gemodel P% [R% [1-H% [1-K%]]]",
+    "duplicate": "duplicate P% [CORRELATION%]",
+    "corrupt": "corrupt P% [CORRELATION%]",
+    "reorder": "reorder P% [CORRELATION%] [gap N]",
+    "rate": "rate RATE [PACKETOVERHEAD [CELLSIZE [CELLOVERHEAD]]]",
+    "limit": "limit MESSAGES",
+    "slot": "slot MIN [MAX]",
+    "trace": "trace FILE.csv",
+    "outage": "outage DURATION at TIME [every TIME]",
+    "retransmit": "retransmit TIME",
+}
+"""Each clause with its form; they may stand in any order, each once (outage: as often as there are any)."""
+
+_Value = TypeVar("_Value")
+
+
+class _Words:
+    """The words of a specification, read one after the other."""
+
+    def __init__(self, profile: str, spec: str) -> None:
+        self.spec = spec
+        try:
+            self._words = shlex.split(profile)
+        except ValueError as error:
+            raise ConfigurationError(f"link {spec!r}: {str(error).lower()}; valid: quotes in pairs") from error
+        self._position = 0
+
+    def peek(self) -> str | None:
+        return self._words[self._position] if self._position < len(self._words) else None
+
+    def take(self) -> str | None:
+        word = self.peek()
+        self._position += word is not None
+        return word
+
+    def take_if(self, word: str) -> bool:
+        return self.peek() == word and self.take() is not None
+
+    def number_follows(self, *, percent: bool) -> bool:
+        word = self.peek()
+        return bool(word) and (word or "")[0] in "0123456789+-." and (word or "").endswith("%") is percent
+
+    def value(self, read: Callable[[str, str], _Value], clause: str, name: str) -> _Value:
+        """The next word as `read` understands it."""
+        if (word := self.take()) is None:
+            raise self.error(f"{clause!r} without {name}", clause)
+        return read(word, f"link {self.spec!r}: {name}")
+
+    def shares(self, clause: str, names: list[str]) -> list[float]:
+        """The first percentage, and those of the others that follow."""
+        shares = [self.value(parse_share, clause, names[0])]
+        for name in names[1:]:
+            if not self.number_follows(percent=True):
+                break
+            shares.append(self.value(parse_share, clause, name))
+        return shares
+
+    def error(self, what: str, clause: str | None = None) -> ConfigurationError:
+        valid = GRAMMAR[clause] if clause else f"{GRAMMAR['delay']}, and {', '.join([*GRAMMAR][1:])}"
+        return ConfigurationError(f"link {self.spec!r}: {what}; valid: {valid}")
+
+
+def parse_profile(
+    profile: str, spec: str, seed: int, model: LinkModel, correlation_model: CorrelationModel
+) -> LinkProfile:
+    """Read `profile`, which is `spec` or a clause of it; ConfigurationError in one line that quotes `spec`."""
+    words = _Words(profile, spec)
+    settings: dict[str, Any] = {}
+    seen: set[str] = set()
+    while (clause := words.take()) is not None:
+        if clause not in _READERS:
+            raise words.error(f"{clause!r} is unknown there")
+        if clause in seen and clause != "outage":
+            raise words.error(f"{clause!r} stands there twice", clause)
+        seen.add(clause)
+        try:
+            _READERS[clause](words, settings)
+        except ConfigurationError:
+            raise
+        except ValueError as error:
+            raise ConfigurationError(f"link {spec!r}: {clause}: {error}") from error
+    if "trace" in seen and (other := seen & {"delay", "loss", "reorder"}):
+        raise words.error(f"'trace' brings its own delays and losses, and stands beside {min(other)!r}", "trace")
+    if "reorder" in seen and settings.get("delay_s", 0.0) == 0.0:
+        raise words.error("'reorder' without a delay to overtake", "delay")
+    if "retransmit" in seen and model != "stream":
+        raise words.error("'retransmit' in the datagram model, which never sends again", "retransmit")
+    try:
+        return LinkProfile(**settings, seed=seed, model=model, correlation_model=correlation_model)
+    except ValueError as error:
+        raise ConfigurationError(f"link {spec!r}: {error}") from error
+
+
+def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
+    settings["delay_s"] = words.value(parse_duration, "delay", "delay")
+    if words.number_follows(percent=False):
+        settings["jitter_s"] = words.value(parse_duration, "delay", "jitter")
+        if words.number_follows(percent=True):
+            settings["delay_correlation"] = words.value(parse_share, "delay", "correlation")
+    if words.take_if("distribution"):
+        if "jitter_s" not in settings:
+            raise words.error("'distribution' without a jitter to shape", "delay")
+        name = words.take() or ""
+        field = f"link {words.spec!r}: distribution"
+        if name in get_args(Distribution):
+            settings["distribution"] = cast(Distribution, name)
+        elif name in ("", *GRAMMAR):
+            raise ConfigurationError(
+                f"{field} {name!r} is unknown; valid: {', '.join(get_args(Distribution))}, TABLEFILE"
+            )
+        else:
+            settings["distribution"] = DelayTable.read(Path(name), field)
+
+
+def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
+    loss: LossModel
+    if words.take_if("state"):
+        p13, *rest = words.shares("loss", ["p13", "p31", "p32", "p23", "p14"])
+        # One probability alone is independent loss: state 3 is left as often as it is not entered.
+        loss = StateLoss(p13, *(rest or [1.0 - p13]))
+    elif words.take_if("gemodel"):
+        p, *rest = words.shares("loss", ["p", "r", "1-h", "1-k"])
+        loss = GilbertElliott(p, *(rest or [1.0 - p]))
+    else:
+        words.take_if("random")
+        loss = RandomLoss(*words.shares("loss", ["probability", "correlation"]))
+    settings["loss"] = loss
+
+
+def _read_chance(name: str) -> Callable[[_Words, dict[str, Any]], None]:
+    def read(words: _Words, settings: dict[str, Any]) -> None:
+        settings[name] = Chance(*words.shares(name, ["probability", "correlation"]))
+
+    return read
+
+
+def _read_reorder(words: _Words, settings: dict[str, Any]) -> None:
+    settings["reorder"] = Chance(*words.shares("reorder", ["probability", "correlation"]))
+    if words.take_if("gap"):
+        settings["gap"] = words.value(_positive, "reorder", "gap")
+
+
+def _read_rate(words: _Words, settings: dict[str, Any]) -> None:
+    numbers = []
+    bits_per_second = words.value(parse_rate, "rate", "rate")
+    for name in ("packet overhead", "cell size", "cell overhead"):
+        if not words.number_follows(percent=False):
+            break
+        numbers.append(words.value(_small_integer, "rate", name))
+    settings["rate"] = Rate(bits_per_second, *numbers)
+
+
+def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
+    settings["limit"] = words.value(_positive, "limit", "limit")
+
+
+def _read_slot(words: _Words, settings: dict[str, Any]) -> None:
+    least_s = words.value(parse_duration, "slot", "least time")
+    most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
+    settings["slot"] = Slot(least_s, most_s)
+
+
+def _read_trace(words: _Words, settings: dict[str, Any]) -> None:
+    settings["trace"] = words.value(lambda path, field: Trace.read(Path(path), field), "trace", "trace")
+
+
+def _read_outage(words: _Words, settings: dict[str, Any]) -> None:
+    duration_s = words.value(parse_duration, "outage", "duration")
+    if not words.take_if("at"):
+        raise words.error("'outage' without 'at' and a time", "outage")
+    at_s = words.value(parse_duration, "outage", "begin")
+    every_s = words.value(parse_duration, "outage", "period") if words.take_if("every") else None
+    settings["outages"] = (*settings.get("outages", ()), Outage(duration_s, at_s, every_s))
+
+
+def _read_retransmit(words: _Words, settings: dict[str, Any]) -> None:
+    settings["retransmit_s"] = words.value(parse_duration, "retransmit", "time")
+
+
+_READERS: dict[str, Callable[[_Words, dict[str, Any]], None]] = {
+    "delay": _read_delay,
+    "loss": _read_loss,
+    "duplicate": _read_chance("duplicate"),
+    "corrupt": _read_chance("corrupt"),
+    "reorder": _read_reorder,
+    "rate": _read_rate,
+    "limit": _read_limit,
+    "slot": _read_slot,
+    "trace": _read_trace,
+    "outage": _read_outage,
+    "retransmit": _read_retransmit,
+}
+
+
+def _positive(text: str, field: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) > 0):
+        raise ConfigurationError(f"{field}: {text!r}; valid: a whole number from 1 to 999999999")
+    return int(text)
+
+
+def _small_integer(text: str, field: str) -> int:
+    digits = text.removeprefix("-")
+    if not (digits.isascii() and digits.isdigit() and len(digits) < 6):
+        raise ConfigurationError(f"{field}: {text!r}; valid: a whole number of bytes, up to five digits")
+    return int(text)
+
+
+def format_profile(profile: LinkProfile) -> str:
+    """The profile in the words that `parse_profile` reads."""
+    clauses = [_format_delay(profile)]
+    if profile.loss is not None:
+        clauses.append(profile.loss.words())
+    clauses += [f"{name} {_format_chance(getattr(profile, name))}" for name in ("duplicate", "corrupt", "reorder")]
+    clauses = [clause for clause in clauses if not clause.endswith(" ")]
+    if profile.reorder is not None and profile.gap > 1:
+        clauses.append(f"gap {profile.gap}")
+    if profile.rate is not None:
+        rate = profile.rate
+        numbers = [rate.overhead_bytes, rate.cell_bytes, rate.cell_overhead_bytes]
+        while numbers and numbers[-1] == 0:
+            numbers.pop()
+        clauses.append(" ".join(["rate", format_rate(rate.bits_per_second), *map(str, numbers)]))
+    if profile.limit != QUEUE_LIMIT:
+        clauses.append(f"limit {profile.limit}")
+    if profile.slot is not None:
+        clauses.append(f"slot {format_duration(profile.slot.least_s)} {format_duration(profile.slot.most_s)}")
+    if profile.trace is not None:
+        clauses.append(f"trace {shlex.quote(profile.trace.name)}")
+    for outage in profile.outages:
+        every = "" if outage.every_s is None else f" every {format_duration(outage.every_s)}"
+        clauses.append(f"outage {format_duration(outage.duration_s)} at {format_duration(outage.at_s)}{every}")
+    if profile.retransmit_s is not None:
+        clauses.append(f"retransmit {format_duration(profile.retransmit_s)}")
+    return " ".join(filter(None, clauses))
+
+
+def _format_delay(profile: LinkProfile) -> str:
+    if profile.delay_s == 0.0 and profile.jitter_s == 0.0:
+        return ""
+    words = ["delay", format_duration(profile.delay_s)]
+    shape = profile.distribution
+    if profile.jitter_s or profile.delay_correlation or shape != "uniform":
+        words.append(format_duration(profile.jitter_s))
+        if profile.delay_correlation:
+            words.append(format_share(profile.delay_correlation))
+        if isinstance(shape, DelayTable):
+            words += ["distribution", shlex.quote(shape.name)]
+        elif shape != "uniform":
+            words += ["distribution", shape]
+    return " ".join(words)
+
+
+def _format_chance(chance: Chance | None) -> str:
+    if chance is None:
+        return ""
+    correlation = f" {format_share(chance.correlation)}" if chance.correlation else ""
+    return format_share(chance.share) + correlation

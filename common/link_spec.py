@@ -1,0 +1,109 @@
+"""Profiles for each direction and stream, from one specification."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from common.errors import ConfigurationError
+from common.link_grammar import parse_profile
+from common.link_profile import LinkModel, LinkProfile, check_seed_and_models, choices
+from common.link_randomness import CorrelationModel
+
+Direction = Literal["to_robot", "to_operator"]
+Stream = Literal["haptics", "telemetry", "video"]
+
+
+@dataclass(frozen=True)
+class LinkSpec:
+    """Profiles by direction and stream.
+
+    The clause of a stream in a direction (`to_operator.video`) wins over that of the stream, that over the
+    direction's, and that over the bare one.
+    """
+
+    clauses: Mapping[str, LinkProfile] = field(default_factory=dict)
+    """By name; the bare profile under the empty name. Their seeds are not used."""
+    seed: int = 0
+    model: LinkModel = "datagram"
+    correlation_model: CorrelationModel = "netem"
+
+    @classmethod
+    def parse(
+        cls,
+        spec: str,
+        seed: int = 0,
+        model: LinkModel = "datagram",
+        correlation_model: CorrelationModel = "netem",
+    ) -> "LinkSpec":
+        """Read `[PROFILE;] [NAME: PROFILE;] ...`, a name being a direction, a stream or `DIRECTION.STREAM`.
+
+        ConfigurationError, in one line, for an unknown or repeated name and for a bad profile.
+        """
+        check_seed_and_models(seed, model, correlation_model)
+        clauses: dict[str, LinkProfile] = {}
+        for clause in filter(str.strip, spec.split(";")):
+            before, colon, after = clause.partition(":")
+            # A colon further on belongs to a file's name.
+            named = bool(colon) and len(before.split()) <= 1
+            name, profile = (before.strip(), after) if named else ("", clause)
+            if named and name not in _names():
+                raise ConfigurationError(f"link {spec!r}: unknown name {name!r}; valid: {_valid_names()}")
+            if name in clauses:
+                what = repr(name) if name else "a profile without a name"
+                raise ConfigurationError(
+                    f"link {spec!r}: {what} stands there twice; "
+                    f"valid: one profile without a name and one for each of {_valid_names()}"
+                )
+            clauses[name] = parse_profile(profile, spec, seed, model, correlation_model)
+        return cls(clauses, seed, model, correlation_model)
+
+    def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:
+        """The profile of `stream` in `direction`, with a seed of its own so that no two are correlated."""
+        directions, streams = get_args(Direction), get_args(Stream)
+        if direction not in directions:
+            raise ValueError(f"direction = {direction!r}; valid: {choices(Direction)}")
+        if stream not in streams:
+            raise ValueError(f"stream = {stream!r}; valid: {choices(Stream)}")
+        key = (directions.index(direction), streams.index(stream))
+        seed = int(np.random.SeedSequence(self.seed, spawn_key=key).generate_state(1, np.uint64)[0])
+        back: Direction = "to_operator" if direction == "to_robot" else "to_robot"
+        there = self._clause(direction, stream)
+        round_trip_s = there.mean_delay_s() + self._clause(back, stream).mean_delay_s()
+        return dataclasses.replace(there, seed=seed, round_trip_s=round_trip_s)
+
+    def unused(self, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
+        """The names of clauses that none of the streams in `carried` goes by, so that a person can be told."""
+        used = {self._clause_name(direction, stream) for direction, stream in carried}
+        return [name for name in self.clauses if name not in used]
+
+    def _clause_name(self, direction: Direction, stream: Stream) -> str | None:
+        for name in (f"{direction}.{stream}", stream, direction, ""):
+            if name in self.clauses:
+                return name
+        return None
+
+    def _clause(self, direction: Direction, stream: Stream) -> LinkProfile:
+        name = self._clause_name(direction, stream)
+        nothing = LinkProfile(model=self.model, correlation_model=self.correlation_model)
+        return nothing if name is None else self.clauses[name]
+
+
+def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
+    """A line for each clause of `link` that none of the streams in `carried` goes by, to be shown to a person."""
+    return [
+        f"link: {f'the clause {name!r}' if name else 'the profile without a name'} applies to nothing that is sent here"
+        for name in link.unused(carried)
+    ]
+
+
+def _names() -> list[str]:
+    directions, streams = get_args(Direction), get_args(Stream)
+    return [*directions, *streams, *(f"{direction}.{stream}" for direction in directions for stream in streams)]
+
+
+def _valid_names() -> str:
+    first_direction, first_stream = get_args(Direction)[0], get_args(Stream)[0]
+    return f"{', '.join([*get_args(Direction), *get_args(Stream)])}, or both as {first_direction}.{first_stream}"

@@ -1,0 +1,134 @@
+import math
+import statistics
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.delay_distribution import DelayTable, cells, delays_at, moments, table
+from common.errors import ConfigurationError
+
+IPROUTE2_TABLES = Path("/usr/lib/x86_64-linux-gnu/tc")
+
+
+@pytest.mark.parametrize("shape", ["normal", "pareto", "paretonormal"])
+def test_tables_have_netems_size_and_resolution(shape: str) -> None:
+    quantiles = table(shape)
+    assert quantiles is not None
+    assert quantiles.shape == (4096,)
+    assert np.all(np.diff(quantiles) >= 0.0)
+    assert np.array_equal(quantiles * 8192, np.rint(quantiles * 8192))
+    assert not quantiles.flags.writeable
+
+
+def test_the_normal_table_spans_what_netems_does() -> None:
+    quantiles = table("normal")
+    assert quantiles is not None
+    assert quantiles[0] == -4.0
+    assert quantiles[-1] == pytest.approx(3.52, abs=0.005)
+
+
+def test_the_normal_table_holds_normal_quantiles() -> None:
+    normal = statistics.NormalDist()
+    quantiles = table("normal")
+    assert quantiles is not None
+    for entry, quantile in list(enumerate(quantiles.tolist()))[1:]:
+        assert normal.cdf(quantile) == pytest.approx((entry + 0.125) / 4096, abs=normal.pdf(quantile) / 16000)
+
+
+def test_the_pareto_table_has_the_figures_of_netems() -> None:
+    quantiles = table("pareto")
+    assert quantiles is not None
+    assert quantiles[0] == pytest.approx(-2.0 / 3.0, abs=1e-4)
+    assert quantiles[-1] == pytest.approx(4.0, abs=2e-4)
+    assert quantiles.mean() == pytest.approx(-0.03, abs=0.005)
+    assert quantiles.std() == pytest.approx(0.82, abs=0.005)
+    # Below the limit the survival function falls with the third power.
+    values = 1.5 + 0.75 * quantiles[quantiles < 3.9]
+    assert values**-3.0 == pytest.approx(1.0 - np.arange(values.size) / 4096, abs=3e-4)
+
+
+def test_paretonormal_is_a_quarter_normal() -> None:
+    normal, pareto, mixed = table("normal"), table("pareto"), table("paretonormal")
+    assert normal is not None
+    assert pareto is not None
+    assert mixed is not None
+    assert mixed[1:] == pytest.approx(0.25 * normal[1:] + 0.75 * pareto[1:], abs=1.0 / 8192)
+    assert mixed.mean() == pytest.approx(-0.025, abs=0.001)
+    assert mixed.std() == pytest.approx(0.834, abs=0.001)
+
+
+@pytest.mark.skipif(not IPROUTE2_TABLES.is_dir(), reason="iproute2's tables are not on this machine")
+@pytest.mark.parametrize("shape", ["normal", "pareto", "paretonormal"])
+def test_tables_differ_from_iproute2s_by_rounding_alone(shape: str) -> None:
+    quantiles = table(shape)
+    theirs = table(DelayTable.read(IPROUTE2_TABLES / f"{shape}.dist", "table"))
+    assert quantiles is not None
+    assert theirs is not None
+    assert np.max(np.abs(quantiles - theirs)) <= 1.0 / 8192
+
+
+def test_uniform_fills_its_range() -> None:
+    probabilities = np.array([0.0, 0.25, 0.5, 1.0 - 2.0**-53])
+    assert delays_at(probabilities, 0.050, 0.010, "uniform") == pytest.approx([0.040, 0.045, 0.050, 0.060])
+    assert moments(0.050, 0.010, "uniform") == pytest.approx((0.050, 0.010 / math.sqrt(3.0), 0.060))
+
+
+def test_exponential_is_a_floor_with_a_tail() -> None:
+    probabilities = np.array([0.0, 0.5, 1.0 - math.exp(-3.0)])
+    assert delays_at(probabilities, 0.050, 0.010, "exponential") == pytest.approx(
+        [0.050, 0.050 + 0.010 * math.log(2.0), 0.080]
+    )
+    mean_s, sd_s, greatest_s = moments(0.050, 0.010, "exponential")
+    assert (mean_s, sd_s) == pytest.approx((0.060, 0.010), rel=1e-4)
+    assert greatest_s == math.inf
+
+
+def test_a_negative_delay_sends_at_once() -> None:
+    assert delays_at(np.array([0.0, 0.5]), 0.005, 0.010, "uniform") == pytest.approx([0.0, 0.005])
+    assert moments(0.0, 0.010, "pareto")[2] == pytest.approx(0.040, abs=1e-5)
+
+
+def test_netem_picks_from_nanoseconds_or_entries() -> None:
+    assert cells("uniform", 0.010) == 20_000_000
+    assert cells("normal", 0.010) == 4096
+    assert cells(DelayTable("mine", (0, 1, 2)), 0.010) == 3
+
+
+def test_a_table_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "two.dist"
+    path.write_text("# two delays\n 8192\n-16384 # the lower one\n")
+    mine = DelayTable.read(path, "table")
+    assert mine.steps == (-16384, 8192)
+    assert delays_at(np.array([0.0, 0.49, 0.5, 0.99]), 0.050, 0.010, mine) == pytest.approx([0.03, 0.03, 0.06, 0.06])
+    assert moments(0.050, 0.010, mine) == pytest.approx((0.045, 0.015, 0.060))
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (b"", "0 entries"),
+        (b"# nothing but a comment\n", "0 entries"),
+        (b"1 2 x", "'x'"),
+        (b"1 2.5", "'2.5'"),
+        (b"40000", "'40000'"),
+        (b"-32769", "'-32769'"),
+        (b"+", "'+'"),
+        ("٣".encode(), "'٣'"),
+        (b"1 " * 16385, "16385 entries"),
+        (b"\xff\xfe\x00", "is no text"),
+    ],
+)
+def test_a_bad_table_is_refused_in_one_line(tmp_path: Path, content: bytes, named: str) -> None:
+    path = tmp_path / "bad.dist"
+    path.write_bytes(content)
+    with pytest.raises(ConfigurationError) as refusal:
+        DelayTable.read(path, "link 'x': distribution")
+    assert "\n" not in str(refusal.value)
+    assert named in str(refusal.value)
+    assert str(path) in str(refusal.value)
+
+
+def test_a_missing_table_names_the_distributions() -> None:
+    with pytest.raises(ConfigurationError, match=r"'gauss\.dist'.*uniform, normal, pareto, paretonormal, exponential"):
+        DelayTable.read(Path("gauss.dist"), "distribution")

@@ -1,0 +1,114 @@
+"""What a run's summary says of its links, from both sides in virtual time."""
+
+import json
+from typing import Any
+
+import pytest
+
+from common.errors import ConfigurationError
+from common.link_expectation import expected
+from common.link_figures import report_lines
+from common.link_model import DelayLine, LinkModel, LinkProfile
+from feelahead.benchmarks.link_samples import play
+from feelahead.loopback import Loopback, LoopbackSettings
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
+
+LINK = (
+    "to_operator: delay 30ms 5ms distribution normal loss 5% corrupt 5%; to_robot: delay 20ms duplicate 10%; "
+    "to_operator.telemetry: rate 1mbit"
+)
+
+
+@pytest.fixture(scope="module")
+def summary() -> dict[str, Any]:
+    both = Loopback(LoopbackSettings(RobotSettings(link=LINK), OperatorSettings(link=LINK)))
+    both.run_until(3.0)
+    return both.summary()
+
+
+def test_each_line_has_what_was_asked_beside_what_was_achieved(summary: dict[str, Any]) -> None:
+    link = summary["link"]
+    assert {name: line["asked"] for name, line in link.items()} == {
+        "to_robot": "delay 20ms duplicate 10%",
+        "to_operator": "delay 30ms 5ms distribution normal loss 5% corrupt 5%",
+        "to_operator.telemetry": "rate 1mbit",
+    }
+    haptics, motion = link["to_operator"]["achieved"], link["to_robot"]["achieved"]
+    assert haptics["delay_ms"]["mean"] == pytest.approx(30.0, abs=0.5)
+    assert haptics["delay_ms"]["sd"] == pytest.approx(5.0, abs=0.4)
+    assert haptics["loss_share"] == pytest.approx(0.05, abs=0.02)
+    assert motion["delay_ms"]["p99"] == pytest.approx(20.0, abs=1e-6)
+    assert motion["duplicate_share"] == pytest.approx(0.09, abs=0.03)
+    json.dumps(link, allow_nan=False)
+
+
+def test_the_other_side_sees_what_the_line_let_through(summary: dict[str, Any]) -> None:
+    line = summary["link"]["to_operator"]["achieved"]
+    messages = summary["messages"]
+    assert line["corrupted"] > 0
+    # A flipped bit makes most messages invalid; the others differ in a digit.
+    assert messages["rejected"] > line["corrupted"] / 4
+    assert messages["stiffness_received"] < messages["stiffness_sent"] - line["lost"]
+
+
+def test_a_line_of_text_for_each_link(summary: dict[str, Any]) -> None:
+    lines = report_lines(summary["link"])
+    assert len(lines) == 3
+    assert lines[0].startswith(
+        "link to_robot: asked delay 20ms duplicate 10% (20.00 ± 0.00 ms, p99 20.0 ms); achieved 20.00 ± 0.00 ms"
+    )
+    assert "% doubled" in lines[0]
+    assert "(30.00 ± 5.00 ms, p99 41.6 ms, 5.00 % lost); achieved" in lines[1]
+    idle: DelayLine[bytes] = DelayLine(LinkProfile.parse("rate 1mbit"))
+    assert report_lines({"to_robot": idle.summary()}) == ["link to_robot: asked rate 1mbit; nothing of 0 delivered"]
+    plain: DelayLine[bytes] = DelayLine(LinkProfile())
+    assert report_lines({"to_robot": plain.summary()})[0].startswith("link to_robot: asked no delay (0.00 ± 0.00 ms")
+
+
+@pytest.mark.parametrize(
+    ("spec", "model", "mean_ms", "loss_share"),
+    [
+        ("", "datagram", 0.0, 0.0),
+        ("delay 50ms 10ms distribution pareto", "datagram", 49.665, 0.0),
+        ("delay 50ms 10ms distribution exponential", "datagram", 60.0, 0.0),
+        ("delay 5ms loss gemodel 1% 25%", "datagram", 5.0, 0.01 / 0.26),
+        ("delay 5ms loss 10% 50%", "datagram", 5.0, None),
+        ("delay 5ms loss 10% outage 1s at 1s", "datagram", 5.0, None),
+        ("delay 5ms rate 1mbit", "datagram", None, 0.0),
+        ("delay 5ms slot 2ms", "datagram", None, 0.0),
+        ("delay 5ms", "stream", 5.0, 0.0),
+        ("delay 5ms 1ms", "stream", None, 0.0),
+        ("delay 5ms loss 1%", "stream", None, 0.0),
+    ],
+)
+def test_what_theory_knows_is_expected(
+    spec: str, model: LinkModel, mean_ms: float | None, loss_share: float | None
+) -> None:
+    known = expected(LinkProfile.parse(spec, model=model))
+    assert known["delay_ms"]["mean"] == (None if mean_ms is None else pytest.approx(mean_ms, abs=2e-3))
+    assert known["loss_share"] == (None if loss_share is None else pytest.approx(loss_share))
+
+
+def test_long_runs_come_to_what_is_expected() -> None:
+    profile = LinkProfile.parse("delay 50ms 10ms distribution paretonormal loss state 2% 30% 10% 40% 1%", seed=8)
+    _, line = play(profile, [1e-3 * number for number in range(60_000)], 0)
+    said = line.summary()
+    for name, tolerance_ms in (("mean", 0.15), ("sd", 0.15), ("p50", 0.2), ("p95", 0.4), ("p99", 0.6)):
+        assert said["achieved"]["delay_ms"][name] == pytest.approx(said["expected"]["delay_ms"][name], abs=tolerance_ms)
+    # Bursts: runs of this length differ with a standard deviation of 0.0022, over 30 seeds.
+    assert said["achieved"]["loss_share"] == pytest.approx(said["expected"]["loss_share"], abs=4 * 0.0022)
+
+
+def test_settings_refuse_a_bad_link() -> None:
+    with pytest.raises(ConfigurationError, match="'los'"):
+        RobotSettings(link="los 1%")
+    with pytest.raises(ConfigurationError, match="below 99%"):
+        RobotSettings(link="loss 100%", link_model="stream")
+    assert (
+        RobotSettings(link="loss 5% 50%", link_correlation="proper", seed=3)
+        .link_spec()
+        .profile("to_operator")
+        .correlation_model
+        == "proper"
+    )

@@ -1,0 +1,113 @@
+import gzip
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigurationError
+from common.link_model import DelayLine, LinkModel, LinkProfile
+from common.link_trace import Trace, read_samples
+
+
+def written(folder: Path, content: str, name: str = "trace.csv") -> Path:
+    path = folder / name
+    path.write_text(content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "delays_ms"),
+    [
+        ("delay_ns\n1000000\n\n2000000\n", [1.0, 2.0]),
+        ("delay_ns,note\n1000000,a\n,lost\n2000000,b\n", [1.0, None, 2.0]),
+        ("sent_ns,delay_ns\n5,1000000\n3,2000000\n4,\n", [2.0, None, 1.0]),
+        ("sent_ns,received_ns\n0,1000000\n1000000,\n2000000,2500000\n", [1.0, None, 0.5]),
+        ("seq,sent_ns,received_ns\n0,0,1000000\n1,1000000,\n2,2000000,2500000\n", [1.0, None, 0.5]),
+        # In order of arrival, and nothing of number 1: what a receiver can write down.
+        ("seq,sent_ns,delay_ns\n3,3,5000000\n0,0,9000000\n2,2,7000000\n", [9.0, None, 7.0, 5.0]),
+        ("\ufeffdelay_ns\n1000000\n", [1.0]),
+    ],
+)
+def test_reads_delays_in_order_of_sending(tmp_path: Path, content: str, delays_ms: list[float | None]) -> None:
+    trace = Trace.read(written(tmp_path, content), "trace")
+    assert [None if delay_s is None else 1e3 * delay_s for delay_s in trace.delays_s] == pytest.approx(delays_ms)
+
+
+def test_reads_compressed_files(tmp_path: Path) -> None:
+    path = tmp_path / "trace.csv.gz"
+    path.write_bytes(gzip.compress(b"delay_ns\n1000000\n"))
+    assert Trace.read(path, "trace").delays_s == pytest.approx([1e-3])
+    path.write_bytes(gzip.compress(b"delay_ns\n1000000\n" * 99)[:-12])
+    with pytest.raises(ConfigurationError, match=r"trace\.csv\.gz"):
+        Trace.read(path, "trace")
+
+
+def test_lost_messages_were_sent_between_their_neighbours(tmp_path: Path) -> None:
+    samples = read_samples(written(tmp_path, "seq,sent_ns,delay_ns\n0,0,1\n3,3000000000,1\n"), "trace")
+    assert [sample.sent_s for sample in samples] == pytest.approx([0.0, 1.0, 2.0, 3.0])
+    assert [sample.delay_s is None for sample in samples] == [False, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("", "the columns none"),
+        ("1000000\n2000000\n", "the columns 1000000"),
+        ("sent_ns\n1\n", "the columns sent_ns"),
+        ("delay_ns\n\n", "no message arrives"),
+        ("delay_ns,x\n,1\n", "no message arrives"),
+        ("delay_ns\nsoon\n", "row 1: delay_ns = 'soon'"),
+        ("delay_ns\n5\nnan\n", "row 2: delay_ns = 'nan'"),
+        ("delay_ns\n-5\n", "row 1: a delay of -5 ns"),
+        ("sent_ns,received_ns\n7,5\n", "row 1: a delay of -2 ns"),
+        ("sent_ns,received_ns\n,5\n", "row 1: sent_ns is empty"),
+        ("seq,delay_ns\n0,5\n99999999,5\n", "seq jumps from 0 to 99999999"),
+    ],
+)
+def test_a_bad_trace_is_refused_in_one_line(tmp_path: Path, content: str, named: str) -> None:
+    path = written(tmp_path, content)
+    with pytest.raises(ConfigurationError) as refusal:
+        LinkProfile.parse(f"trace {path}")
+    text = str(refusal.value)
+    assert "\n" not in text
+    assert named in text
+    assert str(path) in text
+    assert "valid: " in text
+
+
+@pytest.mark.parametrize("clause", ["delay 5ms", "loss 1%"])
+def test_a_trace_stands_for_delay_and_loss(tmp_path: Path, clause: str) -> None:
+    path = written(tmp_path, "delay_ns\n1\n")
+    with pytest.raises(ConfigurationError, match=f"stands beside '{clause.split(maxsplit=1)[0]}'"):
+        LinkProfile.parse(f"trace {path} {clause}")
+
+
+def deliveries(profile: LinkProfile, count: int) -> dict[int, float]:
+    """The delay in milliseconds of each message that arrives, when they are sent 1 s apart."""
+    line: DelayLine[int] = DelayLine(profile)
+    delays_ms = {}
+    for number in range(count):
+        line.push(float(number), number)
+        while (due_s := line.next_due()) is not None and due_s < number + 1.0:
+            delays_ms.update({arrived: 1e3 * (due_s - arrived) for arrived in line.pop(due_s)})
+    return delays_ms
+
+
+def test_a_trace_is_replayed_by_position_and_begins_anew_at_its_end(tmp_path: Path) -> None:
+    path = written(tmp_path, "delay_ns,x\n1000000,\n,\n3000000,\n")
+    profile = LinkProfile.parse(f"trace {path}")
+    assert deliveries(profile, 7) == pytest.approx({0: 1.0, 2: 3.0, 3: 1.0, 5: 3.0, 6: 1.0})
+
+
+def test_an_outage_does_not_shift_the_trace(tmp_path: Path) -> None:
+    path = written(tmp_path, "delay_ns\n1000000\n2000000\n")
+    profile = LinkProfile.parse(f"trace {path} outage 1.5s at 0s")
+    assert deliveries(profile, 4) == pytest.approx({2: 1.0, 3: 2.0})
+
+
+@pytest.mark.parametrize(("model", "delay_ms"), [("datagram", None), ("stream", 50.0 + 20.0)])
+def test_what_a_trace_loses_a_stream_sends_again(tmp_path: Path, model: LinkModel, delay_ms: float | None) -> None:
+    path = written(tmp_path, "delay_ns,x\n10000000,\n,\n20000000,\n")
+    retransmit = " retransmit 50ms" if model == "stream" else ""
+    assert deliveries(LinkProfile.parse(f"trace {path}{retransmit}", 2, model), 3).get(1) == (
+        None if delay_ms is None else pytest.approx(delay_ms)
+    )
