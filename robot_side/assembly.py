@@ -76,7 +76,9 @@ def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> 
             StiffnessMap(settings.stiffness),
             encoder_sigma_rad,
         ),
-        OperatorSession(LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed),
+        OperatorSession(
+            lambda: LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed
+        ),
         LoopAge(settings.assumed_delay_s),
         np.full(arm.joint_count, limits.velocity_rad_s),
         settings.motion,

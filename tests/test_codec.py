@@ -93,11 +93,11 @@ def test_well_packed_nonsense_is_refused(content: Any) -> None:
 
 
 def motion(**changes: Any) -> list[Any]:
-    fields = {"r2": 0.5, "lateral": [0.0, 0.0], "sent_s": 3.0} | changes
+    fields = {"token": 0, "r2": 0.5, "lateral": [0.0, 0.0], "sent_s": 3.0} | changes
     header = [1, 2, fields["sent_s"], None, None]
     return [
         PROTOCOL_VERSION,
-        ["motion", header, 0.0, fields["r2"], fields["lateral"], [0.0, 0.0], 0.0, True, False, False, False],
+        ["motion", header, 0.0, fields["r2"], fields["lateral"], [0.0, 0.0], 0.0, True, *[False] * 4, fields["token"]],
     ]
 
 
@@ -117,6 +117,8 @@ def test_the_unspoiled_message_is_valid() -> None:
         ({"lateral": [0.0]}, "length 2"),
         ({"lateral": [0.0, math.nan]}, "lateral"),
         ({"sent_s": math.inf}, "sent_s"),
+        ({"token": -1}, "token"),
+        ({"token": 0.5}, "int"),
     ],
 )
 def test_one_bad_field_spoils_the_whole_message(changes: dict[str, Any], named: str) -> None:

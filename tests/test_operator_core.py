@@ -4,7 +4,8 @@ import pytest
 
 from common.codec import decode, encode
 from common.link_end import LinkEnd
-from common.messages import Hello, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from common.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from common.session import SessionState
 from operator_side.core import INTENT_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.effects import Off
@@ -20,6 +21,11 @@ class Bench:
         self.device = SimulatedDualSense()
         self.now_s = 1.0
         self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
+        self.notice(SessionState.DISARMED)
+
+    def notice(self, session: SessionState, why: str = "", token: int = 7) -> None:
+        notice = LeaseNotice(self.robot.stamp(self.now_s), session=session, why=why, token=token, waiting=2, place=1)
+        self.side.receive(encode(notice), self.now_s)
 
     def stiffness(self, r2: float, state: MotionState = "armed", l2: float = 0.0, rumble: float = 0.0) -> bytes:
         return encode(StiffnessUpdate(self.robot.stamp(self.now_s), l2=l2, r2=r2, rumble=rumble, state=state))
@@ -108,6 +114,7 @@ def test_hands_become_a_motion_command(bench: Bench) -> None:
     bench.device.set_sticks(left=(1.0, 0.0))
     bench.device.read(bench.now_s)
     bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
     bench.read()
     [command] = bench.commands()
     assert command.r2 == 1.0
@@ -133,7 +140,7 @@ def test_hello_is_repeated_until_the_robot_answers(bench: Bench) -> None:
     for _ in range(250):
         bench.now_s += 0.004
         counted += hellos()
-    assert 3 <= counted <= 5
+    assert 4 <= counted <= 6
     bench.feel(0.0)
     assert hellos() == 0
     bench.now_s += 2.0
