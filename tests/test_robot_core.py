@@ -5,8 +5,8 @@ import pytest
 
 from common.messages import Header, Hello
 from common.session import SessionState
+from feelahead.experiments.session_bench import Bench
 from robot_side.settings import EnlargementOptions, RobotSettings
-from tests.session_bench import Bench
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def bench() -> Bench:
 
 def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:
     operator = bench.join(2)
-    bench.arm(operator)
+    bench.arm_it(operator)
     start = bench.tool_m
     bench.drive(0.5, operator, r2=0.4)
     moved = bench.tool_m - start

@@ -1,0 +1,84 @@
+"""An arm that remembers what it was told and when it slowed down, by its own measurements."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm_port import Arm, ArmState
+
+SLOWED = 0.05
+"""An arm slower by this share than it just was has begun to decelerate."""
+UNCHANGED = 0.005
+"""It began when its speed was last within this share: at 12 rad/s² a millisecond changes more than that."""
+_CRUISE_SAMPLES = 20
+_CRUISE_RAD_S = 0.05
+"""Slower than this nothing is cruising."""
+
+
+@dataclass(frozen=True)
+class Deceleration:
+    """One onset, after a stretch of even speed."""
+
+    time_s: float
+    """By the arm's measurement."""
+    after_s: float
+    """Since the newest command that it was told to follow was accepted; the gap limit is what it should be."""
+
+
+class WatchedArm:
+    """An Arm in front of another one."""
+
+    def __init__(self, arm: Arm, gap_s: float) -> None:
+        self.speeds_rad_s: deque[tuple[float, float]] = deque(maxlen=100_000)
+        """(when, the largest joint speed) of each state."""
+        self.decelerations: deque[Deceleration] = deque(maxlen=10_000)
+        self.told_to_move = 0
+        """Commands that were not to stand still."""
+        self.not_finite = 0
+        """Commands that held NaN or infinity."""
+        self._arm = arm
+        self._gap_s = gap_s
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_CRUISE_SAMPLES)
+        self._valid_until_s = 0.0
+        self._measured_s = -1.0
+
+    @property
+    def joint_count(self) -> int:
+        """As the arm's."""
+        return self._arm.joint_count
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """As the arm's."""
+        if np.any(joint_velocity_rad_s):
+            self.told_to_move += 1
+            self._valid_until_s = valid_until_s
+        self.not_finite += not np.isfinite(joint_velocity_rad_s).all()
+        self._arm.command(joint_velocity_rad_s, valid_until_s)
+
+    def command_gripper(self, closing: float, valid_until_s: float) -> None:
+        """As the arm's."""
+        self._arm.command_gripper(closing, valid_until_s)
+
+    def state(self, now_s: float) -> ArmState:
+        """As the arm's."""
+        state = self._arm.state(now_s)
+        if state.time_s > self._measured_s:
+            self._measured_s = state.time_s
+            self._watch(state)
+        return state
+
+    def _watch(self, state: ArmState) -> None:
+        speed = float(np.abs(state.joint_velocities_rad_s).max())
+        self.speeds_rad_s.append((state.time_s, speed))
+        recent = self._recent
+        fastest = max((past for _, past in recent), default=0.0)
+        slowest = min((past for _, past in recent), default=0.0)
+        cruising = len(recent) == _CRUISE_SAMPLES and slowest > max(_CRUISE_RAD_S, (1.0 - SLOWED) * fastest)
+        recent.append((state.time_s, speed))
+        if cruising and speed < (1.0 - SLOWED) * fastest:
+            # It began after the last sample that still was as fast as before.
+            onset_s = max(when_s for when_s, past in recent if past > (1.0 - UNCHANGED) * fastest)
+            self.decelerations.append(Deceleration(onset_s, onset_s - (self._valid_until_s - self._gap_s)))
+            recent.clear()
