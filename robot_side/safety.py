@@ -142,11 +142,13 @@ class Safety:
             self._command = self._accepted_s = None
 
     def _check_loop(self, now_s: float) -> None:
-        # No echo yet is no measured loop age: the conservative reading is that it is too old.
-        if self._echoed_s is None or now_s - self._echoed_s > self.settings.max_delay_s:
+        if not self._loop_is_young(now_s):
             age = "unknown" if self._echoed_s is None else f"{now_s - self._echoed_s:.2f} s"
             self._handle(SessionEvent.OLD_LOOP, now_s, f"loop age of {age}")
-            self._healthy_since_s = None
+
+    def _loop_is_young(self, now_s: float) -> bool:
+        # No echo yet is no measured loop age: the conservative reading is that it is too old.
+        return self._echoed_s is not None and now_s - self._echoed_s <= self.settings.max_delay_s
 
     def _follow_buttons(self, command: MotionCommand, now_s: float) -> None:
         pressed = command.arm and not self._arm_was_down
@@ -157,13 +159,16 @@ class Safety:
             self._handle(SessionEvent.TRIGGER_PULLED, now_s)
         elif command.emergency_stop:
             self._healthy_since_s = None
-        elif self._echoed_s is not None and now_s - self._echoed_s <= self.settings.max_delay_s:
+        elif self._loop_is_young(now_s):
             if self._healthy_since_s is None:
                 self._healthy_since_s = now_s
-            if now_s - self._healthy_since_s >= self.settings.healthy_s:
+            if self._healthy_for_long(now_s):
                 self._handle(SessionEvent.HEALTHY, now_s)
                 if pressed:
                     self._handle(SessionEvent.ARM, now_s)
+
+    def _healthy_for_long(self, now_s: float) -> bool:
+        return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
         """Follow the table; whatever is no step towards arming starts the healthy second anew."""

@@ -2,15 +2,16 @@
 
 import itertools
 import math
-import time
 from collections.abc import Iterator
 from typing import Any
 from unittest import mock
 
 import msgpack
+import msgspec
 import numpy as np
 
 from common.codec import decode, encode
+from common.messages import Header
 from common.session import SessionState
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
@@ -18,6 +19,7 @@ from robot_side.lease import MOST_AWAY, MOST_OBSERVERS
 
 _LEASE_S = QUICK.safety.lease_s
 _HOUR_S = 3600.0
+_WALL_CLOCK_S = 1.8e9
 
 
 def operator_restarts() -> Outcome:
@@ -86,6 +88,7 @@ def hand_over() -> Outcome:
     third = bench.join(4, b"third")
     bench.cruise(owner)
     token = owner.token
+    late = owner.command(bench.now_s, r2=1.0)
     bench.send(owner, r2=CRUISE, hand_over=True)
     bench.tick(2)
     passed = (owner.state, other.state, third.state) == (
@@ -100,8 +103,52 @@ def hand_over() -> Outcome:
     bench.tick(5)
     still = bench.moved_by == {2} and bench.state == "disarmed"
     bench.cruise(other)
-    safe = passed and disarmed and still and bench.moved_by == {2, 3}
-    return Outcome(safe, "to the one that has waited longest, disarmed, under a new token")
+    # Back to the first by way of the third; what it had sent under its first lease comes only now.
+    bench.send(other, hand_over=True)
+    bench.tick(2)
+    bench.send(third)
+    bench.send(third, hand_over=True)
+    bench.tick(2)
+    counted = bench.robot.session.not_owners
+    bench.robot.receive(owner.peer, _renumbered(late, owner, bench.now_s), bench.now_s)
+    fenced = owner.state is SessionState.DISARMED and bench.robot.session.not_owners == counted + 1
+    safe = passed and disarmed and still and fenced and bench.moved_by == {2, 3}
+    return Outcome(safe, f"to who waited longest, disarmed; the old token's command refused: {fenced}")
+
+
+def _renumbered(payload: bytes, operator: Operator, now_s: float) -> bytes:
+    """The same command with a newer sequence number, so that nothing but its token tells that it is old."""
+    return encode(msgspec.structs.replace(decode(payload), header=operator.link.stamp(now_s)))
+
+
+def wrong_arming() -> Outcome:
+    """The arming button in every way that must not arm, each for longer than the healthy second."""
+    bench = Bench()
+    operator = bench.join(2)
+    healthy_s = QUICK.safety.healthy_s
+    bench.drive(healthy_s - 0.02, operator)
+    bench.drive(0.012, operator, arm=True)
+    early = bench.state
+    bench.drive(2.0 * healthy_s, operator, arm=True)
+    held = bench.state
+    bench.drive(2.0 * healthy_s, operator, r2=CRUISE)
+    bench.drive(0.02, operator, r2=CRUISE, arm=True)
+    pulled = bench.state
+    silent = bench.join(3, b"without echoes")
+    bench.silence(_LEASE_S + 0.1)
+    bench.say_hello(silent)
+    bench.tick()
+    for step in range(round(2e3 * healthy_s)):
+        bench.tick()
+        if step % 4 == 0:
+            stamp = silent.link.stamp(bench.now_s)
+            header = Header(stamp.epoch, stamp.sequence, stamp.sent_s)
+            bench.send(silent, header=header, arm=step > 1.5e3 * healthy_s)
+    unknown = bench.state
+    bench.cruise(silent)
+    states = [early, held, pulled, unknown]
+    safe = all(state == "disarmed" for state in states)
+    return Outcome(safe, f"too early {early}, held all along {held}, pulled {pulled}, loop age unknown {unknown}")
 
 
 def comes_back() -> Outcome:
@@ -136,7 +183,7 @@ def wall_clock_jumps() -> Outcome:
         bench = Bench()
         operator = bench.join(2)
         bench.cruise(operator)
-        shown_s = time.time() + jump_s
+        shown_s = _WALL_CLOCK_S + jump_s
         with mock.patch("time.time", lambda shown_s=shown_s: shown_s):
             bench.drive(0.2, operator, r2=CRUISE)
         traces.append((list(bench.arm.speeds_rad_s), list(bench.robot.session.safety.stops), bench.state))
@@ -251,6 +298,7 @@ SESSION_FAULTS = (
         "0 reach the controller",
         bad_messages,
     ),
+    Fault("arming too early, pulled, blind", "disarmed until healthy", "never armed", wrong_arming),
     Fault("emergency stop", "stopped until armed anew, by whomever", "0 commands applied", emergency_stop),
     Fault("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded", reconnect_storm),
 )
