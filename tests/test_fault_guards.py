@@ -31,6 +31,14 @@ def put(owner: Any, name: str, value: Any) -> Patch:
     return lambda patch: patch.setattr(place, name, value)
 
 
+def both(first: Patch, second: Patch) -> Patch:
+    def patches(patch: pytest.MonkeyPatch) -> None:
+        first(patch)
+        second(patch)
+
+    return patches
+
+
 def nothing(*_: Any, **__: Any) -> None:
     return None
 
@@ -118,7 +126,11 @@ GUARDS = (
     Guard("the end of a silent lease", put(Lease, "expire", nothing), session_faults.two_operators),
     Guard(
         "a lease begins disarmed",
-        leads_to(SessionState.OBSERVING, SessionEvent.LEASE_PASSED, SessionState.ARMED),
+        # A new owner's loop age is not known yet, which alone would disarm it again.
+        both(
+            leads_to(SessionState.OBSERVING, SessionEvent.LEASE_PASSED, SessionState.ARMED),
+            put(Safety, "_loop_is_young", lambda *_: True),
+        ),
         session_faults.hand_over,
     ),
     Guard("an epoch ends with the next", put(Lease, "end_epoch_of", nothing), session_faults.operator_restarts),

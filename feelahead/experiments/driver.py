@@ -1,6 +1,6 @@
 """An operator side whose hands do as they are told by signals: the process that faults are tried on.
 
-    SIGUSR1    rest, arm, then hold one trigger evenly: R2 and L2 in turn
+    SIGUSR1    rest, arm, then hold R2 and L2 evenly, for a second each in turn
     SIGUSR2    press the button that hands the lease over
     SIGTERM    end
 
@@ -31,6 +31,7 @@ PROGRAM = "python -m feelahead.experiments.driver"
 _TRAVEL = 0.42
 """Raw travel: 0.1 m/s of the built-in arm."""
 _PRESS_S = 0.05
+_REVERSES_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class DriverSettings:
     """Where it publishes what the screen shows."""
     healthy_ms: float = 200.0
     """How long to rest before arming."""
+    backward: bool = False
+    """Begin with L2 instead of R2; then the other way each time."""
     status: StatusMode = "json"
     """JSON lines for programs."""
 
@@ -50,11 +53,11 @@ class DriverSettings:
 class Hands:
     """Rest, arm, drive: what the controller reports in turn."""
 
-    def __init__(self, healthy_s: float) -> None:
+    def __init__(self, healthy_s: float, *, backward: bool) -> None:
         self.phase = "rest"
         self._healthy_s = healthy_s
         self._since_s = 0.0
-        self._forward = False
+        self._forward = backward
         self._hand_over_until_s = -1.0
 
     def drive(self, now_s: float) -> None:
@@ -85,9 +88,8 @@ class Hands:
         if now_s < self._hand_over_until_s:
             pressed.add(Button.CREATE)
         travel = _TRAVEL if self.phase == "drive" else 0.0
-        return ControllerState(
-            l2=0.0 if self._forward else travel, r2=travel if self._forward else 0.0, pressed=frozenset(pressed)
-        )
+        forward = self._forward == (int((now_s - self._since_s) / _REVERSES_S) % 2 == 0)
+        return ControllerState(l2=0.0 if forward else travel, r2=travel if forward else 0.0, pressed=frozenset(pressed))
 
     def _to(self, phase: str, now_s: float) -> None:
         self.phase, self._since_s = phase, now_s
@@ -97,7 +99,7 @@ def command(arguments: Sequence[str]) -> int:
     """Obey until SIGTERM."""
     settings = parse_settings(DriverSettings, PROGRAM, arguments)
     clock = MonotonicClock()
-    hands = Hands(1e-3 * settings.healthy_ms)
+    hands = Hands(1e-3 * settings.healthy_ms, backward=settings.backward)
     signal.signal(signal.SIGUSR1, lambda *_: hands.drive(clock.now()))
     signal.signal(signal.SIGUSR2, lambda *_: hands.hand_over(clock.now()))
     core = OperatorSide(secrets.randbits(53), clock_domain(), haptics=False)

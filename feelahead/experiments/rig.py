@@ -19,6 +19,8 @@ _START_S = 90.0
 _PATIENCE_S = 10.0
 _CRUISE_S = 0.15
 _POLL_S = 0.005
+_REVERSAL_S = 0.05
+"""A deceleration so soon after a command was asked for by that command."""
 
 
 class RigError(FeelaheadError):
@@ -38,6 +40,8 @@ class Rig:
         self._drivers: list[SideProcess] = []
         self._phases: dict[int, dict[str, Any]] = {}
         self._pause = threading.Event()
+        self.stops: list[str] = []
+        """Why the robot side disarmed, each time that the log was read past it."""
         arguments = [f"--bind={bind}", f"--log={self._log}", f"--safety.healthy-s={HEALTHY_S}", *flags]
         self.robot = SideProcess("feelahead.experiments.watched_robot", "robot", arguments)
         try:
@@ -75,6 +79,9 @@ class Rig:
             f"--view-connect={view or self.listening['view']}",
             f"--healthy-ms={1e3 * HEALTHY_S}",
         ]
+        # Back and forth, or the arm would run into something in the end.
+        if len(self._drivers) % 2:
+            arguments.append("--backward")
         process = SideProcess("feelahead.experiments.driver", "driver", arguments)
         self._drivers.append(process)
         return process
@@ -110,7 +117,9 @@ class Rig:
     def lines(self) -> list[dict[str, Any]]:
         """What the robot side's log has got since the last call."""
         *whole, self._rest = (self._rest + self._reader.read()).split("\n")
-        return [json.loads(line) for line in whole]
+        lines = [json.loads(line) for line in whole]
+        self.stops += [line["why"] for line in lines if "stop" in line]
+        return lines
 
     def until_line(self, key: str, patience_s: float = _PATIENCE_S) -> dict[str, Any]:
         """The next line of the log with this key; RigError when none comes."""
@@ -138,7 +147,7 @@ class Rig:
         deadline_s = self.clock.now() + patience_s
         while (slowed_s is None or disarmed_s is None) and self.clock.now() < deadline_s:
             for line in self.lines():
-                if "deceleration" in line:
+                if line.get("deceleration") is not None and line["after"] > _REVERSAL_S:
                     slowed_s = line["after"]
                 elif "stop" in line:
                     disarmed_s = line["after"]

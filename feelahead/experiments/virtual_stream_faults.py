@@ -21,7 +21,12 @@ def stream_stops() -> Outcome:
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)
+    accepted_s = bench.now_s - 3 * TICK_S  # the last of the commands, one each four ticks
     bench.silence(T_S + 0.3)
+    speeds = dict(bench.arm.speeds_rad_s)
+    before, at_limit = (
+        speeds[min(speeds, key=lambda when_s: abs(when_s - at_s))] for at_s in (accepted_s, accepted_s + T_S)
+    )
     onsets_s = [one.after_s for one in bench.arm.decelerations]
     stood = bench.speed_rad_s < _RESTING_RAD_S
     told = bench.arm.told_to_move
@@ -30,7 +35,7 @@ def stream_stops() -> Outcome:
     bench.cruise(operator)
     again = bench.speed_rad_s > _RESTING_RAD_S
     return Outcome(
-        _begins_at_limit(onsets_s) and stood and stayed and again,
+        at_limit > 0.995 * before and _begins_at_limit(onsets_s) and stood and stayed and again,
         f"deceleration at {_milliseconds(onsets_s)}; it stood, and stood until armed anew",
     )
 
@@ -87,25 +92,27 @@ def backlog() -> Outcome:
 
 
 def robot_stopped() -> Outcome:
-    """The robot side neither ticks nor receives for two seconds; then all that came meanwhile is there."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
-    last = operator.link.stamp(bench.now_s).sequence
-    stopped_s = bench.now_s
-    held = []
-    for step in range(2000):
-        bench.ticks += 1
-        if step % 4 == 0:
-            held.append(operator.command(bench.now_s, r2=1.0))
-    told = bench.arm.told_to_move
-    for payload in held:
-        bench.robot.receive(operator.peer, payload, bench.now_s)
-    bench.drive(0.2, operator, r2=CRUISE)
-    applied = sum(sequence > last for sequence in bench.applied)
-    [stop] = bench.robot.session.safety.stops
-    safe = applied == 0 and bench.arm.told_to_move == told and bench.state == "disarmed"
-    return Outcome(safe, f"{applied} of {len(held)} applied; disarmed after {stop[0] - stopped_s:.1f} s: {stop[1]}")
+    """The robot side neither ticks nor receives for a while; then all that came meanwhile is there at once."""
+    measured, safe = [], True
+    # Within the lease and beyond it.
+    for pause_s in (0.5, 2.0):
+        bench = Bench()
+        operator = bench.join(2)
+        bench.cruise(operator)
+        last = operator.link.stamp(bench.now_s).sequence
+        held = []
+        for step in range(round(pause_s / TICK_S)):
+            bench.ticks += 1
+            if step % 4 == 0:
+                held.append(operator.command(bench.now_s, r2=1.0))
+        told = bench.arm.told_to_move
+        for payload in held:
+            bench.robot.receive(operator.peer, payload, bench.now_s)
+        bench.drive(0.2, operator, r2=CRUISE)
+        applied = sum(sequence > last for sequence in bench.applied)
+        safe &= applied == 0 and bench.arm.told_to_move == told and bench.state == "disarmed"
+        measured.append(f"{applied} of {len(held)} applied after {pause_s:g} s")
+    return Outcome(safe, ", ".join(measured))
 
 
 def replay() -> Outcome:
@@ -202,8 +209,8 @@ def _drive_late(bench: Bench, operator: Operator, duration_s: float, lateness_s:
 
 
 def _begins_at_limit(onsets_s: Sequence[float]) -> bool:
-    """One deceleration, not before T and no later than T + 5 ms."""
-    return len(onsets_s) == 1 and T_S - 1e-9 <= onsets_s[0] <= T_S + 0.005
+    """One deceleration, not before T, as far as the watched arm can tell, and no later than T + 5 ms."""
+    return len(onsets_s) == 1 and T_S - 5e-4 <= onsets_s[0] <= T_S + 0.005
 
 
 def _milliseconds(values_s: Sequence[float]) -> str:

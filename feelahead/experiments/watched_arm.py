@@ -7,12 +7,12 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm_port import Arm, ArmState
+from robot_side.simulation.joint_reference import MotionLimits
 
 SLOWED = 0.05
 """An arm slower by this share than it just was has begun to decelerate."""
-UNCHANGED = 0.005
-"""It began when its speed was last within this share: at 12 rad/s² a millisecond changes more than that."""
 _CRUISE_SAMPLES = 20
+_DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
 _CRUISE_RAD_S = 0.05
 """Slower than this nothing is cruising."""
 
@@ -22,7 +22,7 @@ class Deceleration:
     """One onset, after a stretch of even speed."""
 
     time_s: float
-    """By the arm's measurement."""
+    """By the arm's measurement, to half a millisecond."""
     after_s: float
     """Since the newest command that it was told to follow was accepted; the gap limit is what it should be."""
 
@@ -78,7 +78,7 @@ class WatchedArm:
         cruising = len(recent) == _CRUISE_SAMPLES and slowest > max(_CRUISE_RAD_S, (1.0 - SLOWED) * fastest)
         recent.append((state.time_s, speed))
         if cruising and speed < (1.0 - SLOWED) * fastest:
-            # It began after the last sample that still was as fast as before.
-            onset_s = max(when_s for when_s, past in recent if past > (1.0 - UNCHANGED) * fastest)
+            # Samples may lie several milliseconds apart on a busy machine, but the arm's deceleration is known.
+            onset_s = state.time_s - (fastest - speed) / _DECELERATION_RAD_S2
             self.decelerations.append(Deceleration(onset_s, onset_s - (self._valid_until_s - self._gap_s)))
             recent.clear()
