@@ -18,6 +18,7 @@ HEALTHY_S = 0.2
 _START_S = 90.0
 _PATIENCE_S = 10.0
 _CRUISE_S = 0.15
+_ATTEMPTS = 5
 _POLL_S = 0.005
 _REVERSAL_S = 0.05
 """A deceleration so soon after a command was asked for by that command."""
@@ -30,7 +31,8 @@ class RigError(FeelaheadError):
 class Rig:
     """One robot side, and as many drivers as are asked for; all of them end with the context."""
 
-    def __init__(self, bind: str = "tcp://127.0.0.1:0", flags: Sequence[str] = ()) -> None:
+    def __init__(self, bind: str = "tcp://127.0.0.1:0", flags: Sequence[str] = (), before: Sequence[str] = ()) -> None:
+        """`before` is a command in whose surroundings the robot side is to run."""
         self.clock = MonotonicClock()
         self._folder = tempfile.TemporaryDirectory(prefix="feelahead-faults-")
         self._log = Path(self._folder.name) / "log.jsonl"
@@ -43,7 +45,7 @@ class Rig:
         self.stops: list[str] = []
         """Why the robot side disarmed, each time that the log was read past it."""
         arguments = [f"--bind={bind}", f"--log={self._log}", f"--safety.healthy-s={HEALTHY_S}", *flags]
-        self.robot = SideProcess("feelahead.experiments.watched_robot", "robot", arguments)
+        self.robot = SideProcess("feelahead.experiments.watched_robot", "robot", arguments, before)
         try:
             self.listening = self.robot.wait_for("listening", _START_S)
         except BaseException:
@@ -72,7 +74,7 @@ class Rig:
         """Let time pass."""
         self._pause.wait(duration_s)
 
-    def driver(self, control: str | None = None, view: str | None = None) -> SideProcess:
+    def driver(self, control: str | None = None, view: str | None = None, before: Sequence[str] = ()) -> SideProcess:
         """One more driver, connected to the robot side or to these addresses."""
         arguments = [
             f"--connect={control or self.listening['control']}",
@@ -82,7 +84,7 @@ class Rig:
         # Back and forth, or the arm would run into something in the end.
         if len(self._drivers) % 2:
             arguments.append("--backward")
-        process = SideProcess("feelahead.experiments.driver", "driver", arguments)
+        process = SideProcess("feelahead.experiments.driver", "driver", arguments, before)
         self._drivers.append(process)
         return process
 
@@ -104,11 +106,15 @@ class Rig:
         return said
 
     def drive(self, driver: SideProcess) -> None:
-        """Have it own, arm and drive, until the arm moves evenly."""
+        """Have it own, arm and drive, until the arm moves evenly; anew when a busy machine breaks the stream."""
         self.until(driver, "session", "disarmed", "ready", "armed", "stopped", "stopped_ready")
-        self.signal(driver, signal.SIGUSR1)
-        self.until(driver, "phase", "drive")
-        self.wait(_CRUISE_S)
+        for _ in range(_ATTEMPTS):
+            self.signal(driver, signal.SIGUSR1)
+            self.until(driver, "phase", "drive")
+            self.wait(_CRUISE_S)
+            if self.phase(driver)["phase"] == "drive":
+                return
+        raise RigError(f"the stream broke {_ATTEMPTS} times in {_CRUISE_S:g} s of driving: the machine is too busy")
 
     def signal(self, process: SideProcess, number: signal.Signals) -> None:
         """Send it a signal."""
