@@ -24,6 +24,7 @@ from feelahead.experiments import real_faults
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.first_side import either_side_first
 from feelahead.experiments.rig import Rig, RigError
+from feelahead.experiments.slow_viewer import slow_viewer
 from feelahead.experiments.unplugged import unplugged
 from feelahead.experiments.virtual_session_faults import SESSION_FAULTS
 from feelahead.experiments.virtual_stream_faults import STREAM_FAULTS
@@ -63,6 +64,7 @@ REAL_ROWS: tuple[Row, ...] = (
         real_faults.intruders,
         0.04,
     ),
+    ("slow viewers", "lose frames, alone", "tick p99 changes by < 10 %", slow_viewer, 0.03),
     ("reconnect storm, 50/s", "control unaffected", "no stop, memory growth < 10 MB", real_faults.storm, 0.05),
 )
 

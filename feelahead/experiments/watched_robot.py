@@ -4,14 +4,17 @@
 
 Lines: {"deceleration", "after"}: when the arm slowed down, and how long after the newest command was accepted, by
 the arm's own measurement; {"stop", "why", "after"}: when the robot side disarmed, and how long after it; and
-{"figures"}: counters, a few times a second. Times in seconds of the monotonic clock.
+{"figures"}: counters, ten times a second. Times in seconds of the monotonic clock.
 """
 
 import json
 from pathlib import Path
 from typing import Any, TextIO
 
+import numpy as np
+
 import robot_side.main
+from common.clock import MonotonicClock
 from common.command_line import run_command
 from common.errors import ConfigurationError
 from common.link_end import Arrival
@@ -19,7 +22,7 @@ from common.messages import MotionCommand
 from feelahead.experiments.watched_arm import WatchedArm
 from robot_side.arm_port import Arm, ArmState
 from robot_side.assembly import build_robot_side
-from robot_side.core import RobotSide
+from robot_side.core import Outgoing, RobotSide
 from robot_side.settings import RobotSettings
 
 PROGRAM = "python -m feelahead.experiments.watched_robot"
@@ -38,6 +41,7 @@ class Watch:
         self._out_of_order = 0
         self._stops = 0
         self._next_s = 0.0
+        self._ticks_s: list[float] = []
 
     def build(self, settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
         """As robot_side.assembly's, watched."""
@@ -52,7 +56,16 @@ class Watch:
                 self._accepted(command, arrival, now_s)
             return accepted
 
+        tick, clock = core.tick, MonotonicClock()
+
+        def timed(now_s: float) -> list[Outgoing]:
+            began_s = clock.now()
+            outgoing = tick(now_s)
+            self._ticks_s.append(clock.now() - began_s)
+            return outgoing
+
         core.session.safety.receive = judged  # type: ignore[method-assign]
+        core.tick = timed  # type: ignore[method-assign]
         return core
 
     def ticked(self, arm: WatchedArm, now_s: float) -> None:
@@ -79,6 +92,8 @@ class Watch:
         self._last_order = order
 
     def _figures(self, core: RobotSide, arm: WatchedArm) -> dict[str, Any]:
+        tick_p99_us = 1e6 * float(np.quantile(self._ticks_s, 0.99)) if self._ticks_s else 0.0
+        self._ticks_s.clear()
         speed = arm.speeds_rad_s[-1][1] if arm.speeds_rad_s else 0.0
         return core.session.summary() | {
             "state": core.session.safety.state,
@@ -87,6 +102,7 @@ class Watch:
             "told_to_move": arm.told_to_move,
             "not_finite": arm.not_finite,
             "speed_rad_s": speed,
+            "tick_p99_us": tick_p99_us,
             "rejected": core.session.rejected,
             "motion_received": core.session.motion_received,
         }
