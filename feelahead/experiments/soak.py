@@ -4,9 +4,11 @@
     python -m feelahead.experiments.soak --minutes 2
 
 Resident memory and open descriptors at the start, in the middle and at the end; messages and errors. Virtual: both
-cores in this process, as fast as they go. The statistics of the summaries keep up to 100 000 samples each, which
-fills about 0.8 MB for each of them over the first minutes and then stays; the threshold allows for it. Real: feelahead-robot and feelahead-operator with a simulated person, over
+cores in this process, as fast as they go. Real: feelahead-robot and feelahead-operator with a simulated person, over
 loopback. The person grasps, lifts, and then rests; their messages keep flowing.
+
+The summaries' statistics keep up to 100 000 samples each: 0.8 MB for each of them over the first minutes, and no more.
+The threshold allows for it.
 """
 
 import json
