@@ -18,6 +18,7 @@ import tyro
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
+from common.priority import raise_priority
 from common.session import OWNING
 from common.sockets import OperatorSockets
 from common.status import Status, StatusMode
@@ -108,6 +109,7 @@ def command(arguments: Sequence[str]) -> int:
         StopSignal() as stop,
         Status(settings.status, "driver") as status,
     ):
+        raise_priority()
         _loop(core, hands, clock, sockets, stop, status)
     return 0
 

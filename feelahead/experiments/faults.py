@@ -121,7 +121,9 @@ def _try_real(repeats: int, progress: Progress, add: Callable[[str, str, str, Ou
             try:
                 outcome = run(rig, count, lambda: progress.advance(bar))
             except RigError as error:
+                # The machine's fault or the robot's: it was not shown to be safe.
                 outcome = Outcome(False, str(error))
+                rig.end_drivers()
             add(name, behaviour, number, outcome)
     progress.update(bar, description="real processes: cable pulled")
     add("cable pulled (network namespaces)", "the same as kill -9", _DECELERATION, unplugged())

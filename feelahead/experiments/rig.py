@@ -40,6 +40,7 @@ class Rig:
         self._reader = self._log.open(encoding="utf-8")
         self._rest = ""
         self._drivers: list[SideProcess] = []
+        self._started = 0
         self._phases: dict[int, dict[str, Any]] = {}
         self._pause = threading.Event()
         self.stops: list[str] = []
@@ -63,12 +64,16 @@ class Rig:
 
     def close(self) -> None:
         """End everything, also what a signal has stopped."""
-        for process in (*self._drivers, self.robot):
-            if process.running:
-                os.kill(process.process_id, signal.SIGCONT)
-            process.__exit__(None, None, None)
+        self.end_drivers()
+        _end(self.robot)
         self._reader.close()
         self._folder.cleanup()
+
+    def end_drivers(self) -> None:
+        """End all of them, also what a signal has stopped."""
+        for process in self._drivers:
+            _end(process)
+        self._drivers.clear()
 
     def wait(self, duration_s: float) -> None:
         """Let time pass."""
@@ -82,7 +87,8 @@ class Rig:
             f"--healthy-ms={1e3 * HEALTHY_S}",
         ]
         # Back and forth, or the arm would run into something in the end.
-        if len(self._drivers) % 2:
+        self._started += 1
+        if self._started % 2 == 0:
             arguments.append("--backward")
         process = SideProcess("feelahead.experiments.driver", "driver", arguments, before)
         self._drivers.append(process)
@@ -159,3 +165,9 @@ class Rig:
                     disarmed_s = line["after"]
             self.wait(_POLL_S)
         return slowed_s, disarmed_s
+
+
+def _end(process: SideProcess) -> None:
+    if process.running:
+        os.kill(process.process_id, signal.SIGCONT)
+    process.__exit__(None, None, None)

@@ -52,7 +52,7 @@ class SoakSettings:
     """How long, in the time of the run."""
     virtual: bool = False
     """In virtual time, in one process."""
-    link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 20ms 5ms loss 1%"
+    link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 20ms 5ms"
     """Emulated link, in netem's words."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """For every random draw."""

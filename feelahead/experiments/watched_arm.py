@@ -1,5 +1,6 @@
 """An arm that remembers what it was told and when it slowed down, by its own measurements."""
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -11,7 +12,10 @@ from robot_side.simulation.joint_reference import MotionLimits
 
 SLOWED = 0.05
 """An arm slower by this share than it just was has begun to decelerate."""
-_CRUISE_SAMPLES = 20
+_CRUISE_S = 0.02
+_STEP_S = 0.001
+_LONGEST_WATCHED_S = 1.0
+"""After a longer pause of this process the steps in between are left to the arm."""
 _DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
 _CRUISE_RAD_S = 0.05
 """Slower than this nothing is cruising."""
@@ -40,9 +44,9 @@ class WatchedArm:
         """Commands that held NaN or infinity."""
         self._arm = arm
         self._gap_s = gap_s
-        self._recent: deque[tuple[float, float]] = deque(maxlen=_CRUISE_SAMPLES)
+        self._recent: deque[tuple[float, float]] = deque()
         self._valid_until_s = 0.0
-        self._measured_s = -1.0
+        self._asked_s = self._measured_s = -math.inf
 
     @property
     def joint_count(self) -> int:
@@ -63,22 +67,32 @@ class WatchedArm:
 
     def state(self, now_s: float) -> ArmState:
         """As the arm's."""
+        if 0.0 < now_s - self._asked_s < _LONGEST_WATCHED_S:
+            # Tick by tick, however late the caller is: the arm goes on by itself, and we are to see when it slows down.
+            for step in range(1, int((now_s - self._asked_s) / _STEP_S)):
+                self._watch(self._arm.state(self._asked_s + step * _STEP_S))
+        self._asked_s = now_s
         state = self._arm.state(now_s)
-        if state.time_s > self._measured_s:
-            self._measured_s = state.time_s
-            self._watch(state)
+        self._watch(state)
         return state
 
     def _watch(self, state: ArmState) -> None:
+        if state.time_s <= self._measured_s:
+            return
+        self._measured_s = state.time_s
         speed = float(np.abs(state.joint_velocities_rad_s).max())
         self.speeds_rad_s.append((state.time_s, speed))
         recent = self._recent
+        # All of the newest 20 ms, and the one before them.
+        while len(recent) > 2 and state.time_s - recent[1][0] > _CRUISE_S:
+            recent.popleft()
         fastest = max((past for _, past in recent), default=0.0)
         slowest = min((past for _, past in recent), default=0.0)
-        cruising = len(recent) == _CRUISE_SAMPLES and slowest > max(_CRUISE_RAD_S, (1.0 - SLOWED) * fastest)
+        steady = len(recent) > 1 and recent[-1][0] - recent[0][0] >= _CRUISE_S - _STEP_S
+        cruising = steady and slowest > max(_CRUISE_RAD_S, (1.0 - SLOWED) * fastest)
         recent.append((state.time_s, speed))
         if cruising and speed < (1.0 - SLOWED) * fastest:
-            # Samples may lie several milliseconds apart on a busy machine, but the arm's deceleration is known.
+            # It has slowed down for a while by now, at a rate that is known.
             onset_s = state.time_s - (fastest - speed) / _DECELERATION_RAD_S2
             self.decelerations.append(Deceleration(onset_s, onset_s - (self._valid_until_s - self._gap_s)))
             recent.clear()
