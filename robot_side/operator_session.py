@@ -1,5 +1,6 @@
 """Which operators the robot side knows, whose commands count, and the newest that the owner said."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -48,6 +49,7 @@ class OperatorSession:
         self._announcements = Announcements(new_link, self.lease)
         self._owner_link = new_link()
         self._token = 0
+        self._updated_s = -math.inf
         self._began = False
         self._echoed_s: float | None = None
         self._sent_s: float | None = None
@@ -98,6 +100,9 @@ class OperatorSession:
 
     def update(self, now_s: float) -> None:
         """Let go of whoever has been silent for too long; to be called in every tick."""
+        if now_s == self._updated_s:
+            return  # a flood that arrives at once costs this once
+        self._updated_s = now_s
         self.lease.expire(now_s)
         self._follow_owner()
 
@@ -201,6 +206,8 @@ class OperatorSession:
             return
         self._token = self.lease.token
         self._owner_link = owner.link
+        # A button that it held while it waited is not pressed anew.
+        owner.hand_over_was_down = owner.next_target_was_down = True
         self.leases_granted += 1
         self._began = True
         self._echoed_s = self._sent_s = None

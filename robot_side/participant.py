@@ -20,8 +20,8 @@ class Participant:
         """Since when it observes; the longest is the next to own."""
         self.answered_s = -math.inf
         """When its Hello was answered last."""
-        self.next_target_was_down = False
-        self.hand_over_was_down = False
+        self.next_target_was_down = True
+        self.hand_over_was_down = True
 
     @property
     def state(self) -> SessionState:

@@ -80,11 +80,20 @@ def test_the_token_grows_over_a_restart_of_the_robot_side() -> None:
 
 def test_a_button_that_stays_down_hands_over_once(bench: Bench) -> None:
     first, second = bench.join(2), bench.join(3, b"second")
+    bench.drive(0.02, first)
     bench.drive(0.1, first, hand_over=True)
     assert second.state is SessionState.DISARMED
     bench.drive(0.1, second, hand_over=False)
     bench.drive(0.1, second, hand_over=True)
     assert first.state is SessionState.DISARMED
+
+
+def test_a_button_that_was_held_while_waiting_hands_nothing_over(bench: Bench) -> None:
+    first, second = bench.join(2), bench.join(3, b"second")
+    bench.drive(0.02, first)
+    bench.drive(0.02, first, hand_over=True)
+    bench.drive(0.1, second, hand_over=True)
+    assert (first.state, second.state) == (SessionState.OBSERVING, SessionState.DISARMED)
 
 
 def test_without_observers_the_button_changes_nothing(bench: Bench) -> None:
@@ -103,6 +112,7 @@ def test_a_dead_observer_does_not_get_the_lease(bench: Bench) -> None:
         if step % 4 == 0:
             bench.send(owner)
     alive = bench.join(4, b"alive")
+    bench.send(owner)
     bench.send(owner, hand_over=True)
     bench.tick(2)
     assert alive.state is SessionState.DISARMED

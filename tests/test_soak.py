@@ -33,7 +33,7 @@ def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None
     assert command(["--minutes", "0.02", "--virtual"]) == 0
     said = capsys.readouterr().out
     assert "flat" in said.splitlines()[-1]
-    assert "'motion_received': 3" in said
+    assert "'motion_sent': 290" in said
 
 
 @pytest.mark.parametrize(

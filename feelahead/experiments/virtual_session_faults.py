@@ -173,7 +173,7 @@ def comes_back() -> Outcome:
     observes = owner.state is SessionState.OBSERVING and other.state is SessionState.DISARMED
     bench.cruise(other)
     safe = resumed and free and renewed and observes
-    return Outcome(safe, f"owner, then owner under a new token ({free}), then observer ({observes}); never armed")
+    return Outcome(safe, "owner; later owner under a new token; at last observer: disarmed each time")
 
 
 def wall_clock_jumps() -> Outcome:
