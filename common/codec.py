@@ -9,10 +9,11 @@ from typing import Any
 import msgpack
 import msgspec
 
-from common.errors import RemoteProtocolError
+from common.errors import OtherVersionError, RemoteProtocolError
 from common.messages import AnyMessage, Message
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
+"""2: the lease, with its token in every command."""
 MAXIMUM_BYTES = 4096
 """The largest message is a tenth of this; a longer payload is not looked into."""
 
@@ -24,7 +25,10 @@ def encode(message: Message) -> bytes:
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Unpack and validate one message whole; RemoteProtocolError says what is wrong with the bytes."""
+    """Unpack and validate one message whole; RemoteProtocolError says what is wrong with the bytes.
+
+    OtherVersionError, a kind of it, for a peer of another version, whatever else the bytes hold.
+    """
     if len(payload) > MAXIMUM_BYTES:
         raise RemoteProtocolError(f"a payload of {len(payload)} bytes; valid: up to {MAXIMUM_BYTES}")
     try:
@@ -35,8 +39,10 @@ def decode(payload: bytes) -> AnyMessage:
     if not isinstance(body, list) or len(body) != 2:
         raise RemoteProtocolError("no [version, message] pair")
     version, content = body
-    if version != PROTOCOL_VERSION:
+    if type(version) is not int or version < 0:
         raise RemoteProtocolError(f"protocol version {version!r:.40}; valid: {PROTOCOL_VERSION}")
+    if version != PROTOCOL_VERSION:
+        raise OtherVersionError(f"protocol version {version!s:.40}; valid: {PROTOCOL_VERSION}")
     try:
         message: AnyMessage = msgspec.convert(content, AnyMessage)
     except msgspec.ValidationError as error:

@@ -4,6 +4,7 @@
     ├── ConfigurationError   what a person asked for cannot be done (also a ValueError); a command prints it
     │                        as one line and ends with exit code 2
     ├── RemoteProtocolError  the peer sent what is no valid message; it is counted and dropped whole
+    │   └── OtherVersionError    the peer speaks another version of the protocol
     └── DeviceError          the controller is missing, unreadable or gone; the text says what to do about it
 
 Arguments of public functions that are out of range raise a plain ValueError that names the argument.
@@ -20,6 +21,10 @@ class ConfigurationError(FeelaheadError, ValueError):
 
 class RemoteProtocolError(FeelaheadError):
     """Bytes from the peer that are no valid message of this protocol version."""
+
+
+class OtherVersionError(RemoteProtocolError):
+    """A message of another version of the protocol: the two sides are of different releases."""
 
 
 class DeviceError(FeelaheadError):

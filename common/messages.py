@@ -1,8 +1,8 @@
 """Every message that crosses the link, frozen and validated when it is made and when it is decoded.
 
-    operator ── Hello, MotionCommand ──▶ robot          control, ROUTER/DEALER
-    robot ── Hello, StiffnessUpdate ──▶ operator        control
-    robot ── Telemetry ──▶ whoever looks                view, PUB/SUB
+    operator ── Hello, MotionCommand ──▶ robot              control, ROUTER/DEALER
+    robot ── Hello, LeaseNotice, StiffnessUpdate ──▶ operator   control
+    robot ── Telemetry ──▶ whoever looks                    view, PUB/SUB
 
 A field out of range or not finite makes the whole message invalid: nothing of it is ever applied.
 """
@@ -12,10 +12,15 @@ from typing import Literal
 
 import msgspec
 
+from common.session import SessionState
+
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
 MotionState = Literal["disarmed", "armed", "stopped"]
+
+_LARGEST = 2**63 - 1
+_LONGEST_REASON = 200
 
 
 def _in_range(name: str, low: float, high: float, *values: float) -> None:
@@ -58,8 +63,8 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     """How long the sender held that one, on its clock."""
 
     def __post_init__(self) -> None:
-        _in_range("epoch", 0, 2**63 - 1, self.epoch)
-        _in_range("sequence", 0, 2**63 - 1, self.sequence)
+        _in_range("epoch", 0, _LARGEST, self.epoch)
+        _in_range("sequence", 0, _LARGEST, self.sequence)
         _finite("sent_s", self.sent_s)
         _both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
         _both_or_neither("last", self.last_sent_s, self.last_held_s)
@@ -101,6 +106,10 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     """The arming button is down."""
     emergency_stop: bool = False
     next_target: bool = False
+    hand_over: bool = False
+    """The button that passes the lease on to whoever has waited longest is down."""
+    token: int = 0
+    """The fencing token of the lease under which it was sent; none is 0."""
 
     def __post_init__(self) -> None:
         _in_range("l2", 0.0, 1.0, self.l2)
@@ -108,6 +117,28 @@ class MotionCommand(Message, frozen=True, tag="motion"):
         _in_range("lateral", -1.0, 1.0, *self.lateral)
         _in_range("turning", -1.0, 1.0, *self.turning)
         _in_range("gripper", -1.0, 1.0, self.gripper)
+        _in_range("token", 0, _LARGEST, self.token)
+
+
+class LeaseNotice(Message, frozen=True, tag="lease"):
+    """Where the receiver stands with the robot side; repeated, so that a lost one does no harm."""
+
+    session: SessionState
+    why: str
+    """Why it stands there."""
+    token: int
+    """The fencing token of the present lease, whoever owns it; it only grows. 0 before the first."""
+    waiting: int
+    """How many observe."""
+    place: int = 0
+    """The receiver's place among them: 1 is next; 0 for an owner, and for who is not known."""
+
+    def __post_init__(self) -> None:
+        if len(self.why) > _LONGEST_REASON:
+            raise ValueError(f"why has {len(self.why)} characters; valid: up to {_LONGEST_REASON}")
+        _in_range("token", 0, _LARGEST, self.token)
+        _in_range("waiting", 0, 1000, self.waiting)
+        _in_range("place", 0, 1000, self.place)
 
 
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
@@ -157,4 +188,4 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
         _in_range("r2", 0.0, 1.0, self.r2)
 
 
-AnyMessage = Hello | MotionCommand | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | LeaseNotice | StiffnessUpdate | Telemetry

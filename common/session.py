@@ -1,48 +1,138 @@
-"""When the operator's motion may reach the arm: armed on purpose, disarmed by anything unusual.
+"""What one operator is to the robot side: one table of states, events and what follows, which the code runs from.
 
-disarmed ── arming button pressed, after a healthy second with released triggers ──▶ armed
-armed ── the stream broke off, the loop grew too old, or a new epoch began ──▶ disarmed
-any ── emergency stop ──▶ stopped ── arming button, as from disarmed ──▶ armed
+docs/session.md shows this very table and its diagram; `python -m feelahead.session_diagram` writes them anew.
+A pair of state and event that the table does not name changes nothing.
 """
 
-from common.messages import MotionState
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+from types import MappingProxyType
+from typing import Final
 
 
-class Arming:
-    """The state machine; `now_s` is monotonic and comes with every call."""
+class SessionState(StrEnum):
+    """Where one operator (one epoch) stands; the values travel in LeaseNotice."""
 
-    def __init__(self, healthy_s: float = 1.0) -> None:
-        self.state: MotionState = "disarmed"
-        self.stops: list[tuple[float, str]] = []
-        """(when, why) of each transition out of `armed`, and of each emergency stop."""
-        self._required_s = healthy_s
-        self._healthy_since_s: float | None = None
-        self._arm_was_down = True
+    UNKNOWN = "unknown"
+    """No Hello yet, or one that was refused."""
+    OBSERVING = "observing"
+    """It sees and waits; another one owns the lease."""
+    DISARMED = "disarmed"
+    """It owns the lease, and the arm stands still."""
+    READY = "ready"
+    """As disarmed, after a healthy second with released triggers: the arming button arms."""
+    ARMED = "armed"
+    """It owns the lease, and its commands reach the arm."""
+    STOPPED = "stopped"
+    """It owns the lease under an emergency stop."""
+    STOPPED_READY = "stopped_ready"
+    """As stopped, after a healthy second with released triggers."""
+    AWAY = "away"
+    """It fell silent, and lost the lease if it had it; remembered, so that it can come back."""
+    ENDED = "ended"
+    """Its epoch is over and never comes back."""
 
-    def disarm(self, now_s: float, reason: str) -> None:
-        """Back to disarmed; the healthy second begins anew."""
-        if self.state == "armed":
-            self.stops.append((now_s, reason))
-            self.state = "disarmed"
-        self._healthy_since_s = None
 
-    def emergency_stop(self, now_s: float) -> None:
-        """Stop whatever goes on, until armed again."""
-        if self.state != "stopped":
-            self.stops.append((now_s, "emergency stop"))
-        self.state = "stopped"
-        self._healthy_since_s = None
+class SessionEvent(Enum):
+    """What can happen to an operator; the values are the words of the diagram."""
 
-    def command(self, now_s: float, *, triggers_released: bool, arm_down: bool) -> None:
-        """Take note of one fresh command; the arming button's way down arms when all else is fulfilled."""
-        pressed = arm_down and not self._arm_was_down
-        self._arm_was_down = arm_down
-        if self.state == "armed":
-            return
-        if not triggers_released:
-            self._healthy_since_s = None
-            return
-        if self._healthy_since_s is None:
-            self._healthy_since_s = now_s
-        if pressed and now_s - self._healthy_since_s >= self._required_s:
-            self.state = "armed"
+    ASKED_WHILE_FREE = "Hello (or any message when away), lease free"
+    ASKED_WHILE_HELD = "Hello (or any message when away), lease held"
+    ASKED_WHILE_FULL = "Hello, no room for another observer"
+    LEASE_PASSED = "lease passed on to it"
+    HEALTHY = "healthy second with released triggers"
+    ARM = "arming button pressed"
+    TRIGGER_PULLED = "trigger pulled"
+    GAP = "no command for the gap limit"
+    OLD_LOOP = "loop age over the limit"
+    EMERGENCY_STOP = "emergency stop"
+    WRONG_TOKEN = "command with another token"  # noqa: S105  # no password
+    HAND_OVER = "hand-over button, somebody waits"
+    SILENT = "nothing heard for the lease limit"
+    NEW_EPOCH = "another epoch on its connection"
+    FORGOTTEN = "room needed"
+
+
+OWNING: Final = frozenset(
+    {
+        SessionState.DISARMED,
+        SessionState.READY,
+        SessionState.ARMED,
+        SessionState.STOPPED,
+        SessionState.STOPPED_READY,
+    }
+)
+"""The states of the one that owns the lease."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One row of the table."""
+
+    before: SessionState
+    event: SessionEvent
+    after: SessionState
+    why: str
+
+
+def _rows(
+    before: Iterable[SessionState], event: SessionEvent, after: SessionState | None, why: str
+) -> tuple[Transition, ...]:
+    """The same for each state, in the order of their definition; `after` None means that it stays as it is."""
+    return tuple(Transition(state, event, after or state, why) for state in SessionState if state in set(before))
+
+
+def _build() -> tuple[Transition, ...]:
+    state, event = SessionState, SessionEvent
+    strangers = (state.UNKNOWN, state.AWAY)
+    known = (state.OBSERVING, *OWNING)
+    return (
+        *_rows(strangers, event.ASKED_WHILE_FREE, state.DISARMED, "first come, and always disarmed"),
+        *_rows(strangers, event.ASKED_WHILE_HELD, state.OBSERVING, "one owner, many observers"),
+        *_rows([state.UNKNOWN], event.ASKED_WHILE_FULL, None, "no room for another observer"),
+        *_rows([state.AWAY], event.ASKED_WHILE_FULL, None, "no room for another observer"),
+        *_rows([state.OBSERVING], event.LEASE_PASSED, state.DISARMED, "a lease that was passed on begins disarmed"),
+        *_rows([state.DISARMED], event.HEALTHY, state.READY, "may be armed"),
+        *_rows([state.STOPPED], event.HEALTHY, state.STOPPED_READY, "may be armed again"),
+        *_rows([state.READY, state.STOPPED_READY], event.ARM, state.ARMED, "armed on purpose"),
+        *_rows([state.READY], event.TRIGGER_PULLED, state.DISARMED, "arming needs released triggers"),
+        *_rows([state.STOPPED_READY], event.TRIGGER_PULLED, state.STOPPED, "arming needs released triggers"),
+        *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, "no command for the gap limit"),
+        *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for the gap limit"),
+        *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, "loop age over the limit"),
+        *_rows([state.STOPPED_READY], event.OLD_LOOP, state.STOPPED, "loop age over the limit"),
+        *_rows(OWNING, event.EMERGENCY_STOP, state.STOPPED, "emergency stop"),
+        *_rows(known, event.WRONG_TOKEN, None, "counted, never applied"),
+        *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
+        *_rows(known, event.SILENT, state.AWAY, "nothing heard for the lease limit"),
+        *_rows((*known, state.AWAY), event.NEW_EPOCH, state.ENDED, "the operator side began a new epoch"),
+        *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "so many others are remembered"),
+    )
+
+
+TRANSITIONS: Final = _build()
+TABLE: Final[Mapping[tuple[SessionState, SessionEvent], Transition]] = MappingProxyType(
+    {(row.before, row.event): row for row in TRANSITIONS}
+)
+
+
+class Session:
+    """One operator's walk through the table."""
+
+    def __init__(self) -> None:
+        self.state = SessionState.UNKNOWN
+        self.why = "no Hello yet"
+        """Of the last row that applied."""
+
+    @property
+    def owns(self) -> bool:
+        """Whether it has the lease."""
+        return self.state in OWNING
+
+    def handle(self, event: SessionEvent) -> Transition | None:
+        """Follow the table; the row that applied, or None when it names no such pair and nothing changes."""
+        row = TABLE.get((self.state, event))
+        if row is not None:
+            self.state, self.why = row.after, row.why
+        return row

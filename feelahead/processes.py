@@ -25,12 +25,13 @@ class SideFailedError(FeelaheadError):
 class SideProcess:
     """One side, started with `--status json`; its events are read by a thread so that none blocks it."""
 
-    def __init__(self, module: str, name: str, arguments: Sequence[str]) -> None:
+    def __init__(self, module: str, name: str, arguments: Sequence[str], before: Sequence[str] = ()) -> None:
+        """Run `module` with `arguments`; `before` is a command in whose surroundings it is to run."""
         self.name = name
         self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed by __exit__
         # -P: a folder named `common` in the working directory must not shadow the package.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", module, "--status", "json", *arguments],
+            [*before, sys.executable, "-P", "-m", module, "--status", "json", *arguments],
             stdout=subprocess.PIPE,
             stderr=self._errors,
             stdin=subprocess.DEVNULL,

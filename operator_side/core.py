@@ -5,12 +5,14 @@ controller reports ─▶ read_report ─▶ newest intent ─▶ motion ─▶ 
 view payloads ─▶ receive_view ─▶ screen
 """
 
+import math
 from typing import Any
 
 from common.codec import decode, encode
-from common.errors import RemoteProtocolError
+from common.errors import OtherVersionError, RemoteProtocolError
 from common.link_end import LinkEnd
-from common.messages import Hello, MotionCommand, StiffnessUpdate, Telemetry
+from common.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.dualsense.effects import Off, TriggerEffect
 from operator_side.dualsense.report import Rumble, build_output_report, parse_input_report
@@ -21,7 +23,11 @@ STIFFNESS_EXPIRES_S = 0.2
 """Triggers are released this long after the last stiffness that was received."""
 INTENT_EXPIRES_S = 0.1
 """Without a controller report for this long nothing is sent, so that the robot stops."""
-_HELLO_PERIOD_S = 0.25
+HEARTBEAT_PERIOD_S = 0.2
+"""A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""
+_REMEMBERED_LEASES = 100
+NOTICE_EXPIRES_S = 0.5
+"""Without a notice for this long nobody knows whose lease it is."""
 
 
 class OperatorSide:
@@ -41,7 +47,13 @@ class OperatorSide:
         """The newest view of the robot; None before the first."""
         self.stiffness: StiffnessUpdate | None = None
         """The newest stiffness; None before the first and once it has expired."""
+        self.lease: LeaseNotice | None = None
+        """Where we stand with the robot side; None before the first notice and once it has expired."""
+        self.leases: list[str] = []
+        """Each standing that we had in turn, the latest ones."""
         self.rejected = 0
+        self.other_version: str | None = None
+        """What the robot side's messages said when they were of another version; None once they are not."""
         self.stiffness_received = 0
         self.motion_sent = 0
         self.applied_age = RunningStatistics(seed)
@@ -50,7 +62,8 @@ class OperatorSide:
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
         self._stiffness_s = 0.0
-        self._hello_s: float | None = None
+        self._hello_s = -math.inf
+        self._lease_s = 0.0
         self._screen_order = (-1, -1)
         self._selectors = (EffectSelector(), EffectSelector())
         self._written: tuple[TriggerEffect, TriggerEffect, Rumble] = (Off(), Off(), Rumble())
@@ -59,13 +72,21 @@ class OperatorSide:
         """Take one control payload from the robot side."""
         try:
             message = decode(payload)
-        except RemoteProtocolError:
+        except RemoteProtocolError as error:
+            self.rejected += 1
+            if isinstance(error, OtherVersionError):
+                self.other_version = str(error)
+            return
+        if not isinstance(message, Hello | LeaseNotice | StiffnessUpdate):
             self.rejected += 1
             return
-        if not isinstance(message, Hello | StiffnessUpdate):
-            self.rejected += 1
-            return
+        self.other_version = None
+        known_epoch = self.link.peer_epoch
         arrival = self.link.arrived(message, now_s)
+        if self.link.peer_epoch != known_epoch:
+            self.lease = None  # it was another robot side's
+        if isinstance(message, LeaseNotice) and arrival.fresh:
+            self._follow_lease(message, now_s)
         if isinstance(message, StiffnessUpdate):
             self.stiffness_received += 1
             if arrival.fresh:
@@ -100,17 +121,28 @@ class OperatorSide:
         self._intent, self._intent_s = operator_intent(state, self._calibration), now_s
 
     def motion(self, now_s: float) -> list[bytes]:
-        """What to send to the robot side now: a motion command, and a Hello while the robot does not answer."""
+        """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
+        if self.lease is not None and now_s - self._lease_s > NOTICE_EXPIRES_S:
+            self.lease = None
+        linked = self.stiffness is not None and now_s - self._stiffness_s < 2 * HEARTBEAT_PERIOD_S
         payloads = []
-        linked = self.stiffness is not None and now_s - self._stiffness_s < 2 * _HELLO_PERIOD_S
-        if not linked and (self._hello_s is None or now_s - self._hello_s >= _HELLO_PERIOD_S):
+        command = self._command(now_s)
+        if command is not None:
+            self.motion_sent += 1
+            payloads.append(encode(command))
+        if (command is None or not linked) and now_s - self._hello_s >= HEARTBEAT_PERIOD_S:
             self._hello_s = now_s
             payloads.append(encode(self.link.hello(now_s)))
-        intent = self._intent
-        # Before the robot side has answered, it would not know whose motion this is.
-        if self.link.peer_epoch is None or intent is None or now_s - self._intent_s > INTENT_EXPIRES_S:
-            return payloads
-        command = MotionCommand(
+        return payloads
+
+    def _command(self, now_s: float) -> MotionCommand | None:
+        """What the hands do; None while there is no lease to send it under, or no controller."""
+        intent, lease = self._intent, self.lease
+        if intent is None or now_s - self._intent_s > INTENT_EXPIRES_S:
+            return None
+        if lease is None or lease.session not in OWNING:
+            return None
+        return MotionCommand(
             self.link.stamp(now_s),
             l2=intent.l2,
             r2=intent.r2,
@@ -121,10 +153,15 @@ class OperatorSide:
             arm=intent.arm,
             emergency_stop=intent.emergency_stop,
             next_target=intent.next_target,
+            hand_over=intent.hand_over,
+            token=lease.token,
         )
-        self.motion_sent += 1
-        payloads.append(encode(command))
-        return payloads
+
+    def _follow_lease(self, notice: LeaseNotice, now_s: float) -> None:
+        standing = "owner" if notice.session in OWNING else str(notice.session)
+        if not self.leases or self.leases[-1] != standing:
+            self.leases = [*self.leases, standing][-_REMEMBERED_LEASES:]
+        self.lease, self._lease_s = notice, now_s
 
     def output_report(self, now_s: float) -> bytes | None:
         """What the controller has to be told now; None while nothing changes."""
@@ -149,15 +186,25 @@ class OperatorSide:
 
     def status(self, now_s: float) -> dict[str, float | str | None]:
         """A few figures for the status line."""
-        linked = self.stiffness is not None and now_s - self._stiffness_s <= STIFFNESS_EXPIRES_S
         mean_s = self.link.delay.mean
         return {
-            "link": "up" if linked else "waiting for the robot side",
+            "link": self._link_status(now_s),
             "state": None if self.stiffness is None else self.stiffness.state,
             "L2": None if self.stiffness is None else self.stiffness.l2,
             "R2": None if self.stiffness is None else self.stiffness.r2,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
+
+    def _link_status(self, now_s: float) -> str:
+        lease = self.lease
+        if self.other_version is not None:
+            return f"refused: {self.other_version}"
+        if lease is not None and lease.session is SessionState.OBSERVING:
+            return f"observing ({lease.place} of {lease.waiting} waiting)"
+        if lease is not None and lease.session not in OWNING:
+            return f"refused: {lease.why}"
+        linked = self.stiffness is not None and now_s - self._stiffness_s <= STIFFNESS_EXPIRES_S
+        return "up" if linked and lease is not None else "waiting for the robot side"
 
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""
@@ -168,6 +215,7 @@ class OperatorSide:
                 "rejected": self.rejected,
                 "stale": self.link.stale,
             },
+            "lease_states": self.leases,
             "delay_ms": {
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),

@@ -19,6 +19,7 @@ class Action(Enum):
     CLOSE_GRIPPER = "close the gripper while held"
     OPEN_GRIPPER = "open the gripper while held"
     NEXT_TARGET = "next target"
+    HAND_OVER = "hand the robot over to the observer that has waited longest"
 
 
 BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
@@ -29,6 +30,7 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
         Action.CLOSE_GRIPPER: Button.CROSS,
         Action.OPEN_GRIPPER: Button.SQUARE,
         Action.NEXT_TARGET: Button.TRIANGLE,
+        Action.HAND_OVER: Button.CREATE,
     }
 )
 """The whole button map. Besides: R2 advances, L2 retreats, the left stick moves across, the right one turns."""
@@ -87,6 +89,7 @@ class OperatorIntent:
     emergency_stop: bool
     next_target: bool
     """One press is one step: whoever counts looks for the change from false to true."""
+    hand_over: bool
     gripper: Literal[-1, 0, 1]
     """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
 
@@ -116,5 +119,6 @@ def operator_intent(state: ControllerState, calibration: TravelCalibration = _DE
         arm=Action.ARM in held,
         emergency_stop=Action.EMERGENCY_STOP in held,
         next_target=Action.NEXT_TARGET in held,
+        hand_over=Action.HAND_OVER in held,
         gripper=gripper,
     )

@@ -1,6 +1,7 @@
 """Settings to a robot side that is ready to tick: the simulated arm, its camera, and everything in between."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from common.delay import LoopAge
 from common.errors import ConfigurationError
 from common.link_end import LinkEnd
 from robot_side.arm import MujocoArm, MujocoKinematics
-from robot_side.arm_port import ArmState
+from robot_side.arm_port import Arm, ArmState
 from robot_side.core import RobotSide
 from robot_side.enlargement import Enlargement
 from robot_side.kinematic_error import position_covariance
@@ -42,8 +43,13 @@ class SimulationObserver:
         figures.truth(self._truth.observe(), self._roles, now_s)
 
 
-def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
-    """Put a robot side together; ConfigurationError for a model that cannot be used."""
+def build_robot_side(
+    settings: RobotSettings, epoch: int, clock_domain: str, watch: Callable[[Arm], Arm] | None = None
+) -> RobotSide:
+    """Put a robot side together; ConfigurationError for a model that cannot be used.
+
+    `watch` may stand in front of the arm, to record what it is told and does.
+    """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
@@ -68,7 +74,7 @@ def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> 
     if settings.enlargement.mode == "once":
         sampled = _sampled_covariances(scene, arm, kinematics, encoder_sigma_rad, int(samples))
     return RobotSide(
-        arm,
+        arm if watch is None else watch(arm),
         kinematics,
         camera,
         AheadSensing(
@@ -76,7 +82,9 @@ def build_robot_side(settings: RobotSettings, epoch: int, clock_domain: str) -> 
             StiffnessMap(settings.stiffness),
             encoder_sigma_rad,
         ),
-        OperatorSession(LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed),
+        OperatorSession(
+            lambda: LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed
+        ),
         LoopAge(settings.assumed_delay_s),
         np.full(arm.joint_count, limits.velocity_rad_s),
         settings.motion,

@@ -13,21 +13,24 @@ import numpy as np
 from common.arrays import FloatArray
 from common.codec import encode
 from common.delay import LoopAge
-from common.messages import StiffnessUpdate, Telemetry
+from common.messages import MotionState, StiffnessUpdate, Telemetry
 from robot_side.arm_port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.held_object import HeldObject, grip, gripped_object, with_held
-from robot_side.operator_session import OperatorSession
+from robot_side.operator_session import OperatorSession, Receiver
 from robot_side.perceived_objects import ObjectSource, PerceivedObjects, Role
 from robot_side.resolved_rate import joint_velocities
 from robot_side.run_figures import RunFigures
 from robot_side.safety import Permission
 from robot_side.sensing import AheadSensing, Sensed
+from robot_side.stiffness import Stiffness
 from robot_side.target_selection import next_target, object_centers, target_index
 from robot_side.tool_motion import ToolMotionSettings, tool_twist
 
 OutgoingStream = Literal["haptics", "telemetry"]
 
 TELEMETRY_PERIOD_S = 0.02
+OBSERVER_PERIOD_S = 0.02
+"""How often those who only observe are told the stiffness."""
 TRUTH_PERIOD_S = 0.01
 _SHOWN_NAME = 100
 """Characters of an object's name that telemetry carries; a message has a limit."""
@@ -53,7 +56,7 @@ class Observer(Protocol):
 
 
 class RobotSide:
-    """The pipeline of one robot, with one operator at a time."""
+    """The pipeline of one robot, with one operator at a time and others that observe."""
 
     def __init__(
         self,
@@ -91,6 +94,7 @@ class RobotSide:
         self._centers_m: FloatArray = np.empty((0, 3))
         self._last: tuple[ArmState, Sensed] | None = None
         self._next_telemetry_s = -np.inf
+        self._next_observers_s = -np.inf
         self._next_truth_s = -np.inf
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
@@ -101,7 +105,8 @@ class RobotSide:
         """One turn of the pipeline at `now_s`; what to send."""
         if self._start_s is None:
             self._start_s = now_s
-        if self.session.take_epoch_began():
+        self.session.update(now_s)
+        if self.session.take_owner_changed():
             self._loop_age.reset()
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
@@ -196,18 +201,15 @@ class RobotSide:
         speed_m_s: float,
         now_s: float,
     ) -> list[Outgoing]:
-        outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in self.session.take_answers()]
+        outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in self.session.take_answers(now_s)]
         stiffness = sensed.stiffness
-        if (operator := self.session.operator(now_s)) is not None:
-            update = StiffnessUpdate(
-                self.session.link.stamp(now_s),
-                l2=stiffness.l2,
-                r2=stiffness.r2,
-                rumble=stiffness.rumble,
-                state=permission.state,
-            )
+        if (owner := self.session.owner(now_s)) is not None:
             self.stiffness_sent += 1
-            outgoing.append(Outgoing("haptics", operator, encode(update)))
+            outgoing.append(_stiffness(owner, stiffness, permission.state))
+        if now_s >= self._next_observers_s:
+            self._next_observers_s = now_s + OBSERVER_PERIOD_S
+            observers = self.session.observers(now_s)
+            outgoing += [_stiffness(one, stiffness, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
             target = target_index(objects)
@@ -215,7 +217,7 @@ class RobotSide:
             if target is not None and np.isfinite(self._centers_m[target]).all():
                 target_in_tool = (self._centers_m[target] - pose.tool_position_m) @ pose.tool_rotation
             view = Telemetry(
-                self.session.link.stamp(now_s),
+                self.session.view_header(now_s),
                 state=permission.state,
                 tool_position_m=_vector3(pose.tool_position_m),
                 # A simulation about to become unstable shows wild figures, and must get as far as saying so.
@@ -236,7 +238,10 @@ class RobotSide:
         """A few figures for the status line."""
         loop_age_s = self._loop_age.value(now_s)
         values: dict[str, float | str | bool | None] = {
-            "state": self.session.safety.arming.state,
+            "state": self.session.safety.state,
+            "owner": "none" if self.session.lease.owner is None else str(self.session.lease.owner.state),
+            "observers": len(self.session.lease.observers()),
+            "refused": self.session.refused,
             "loop_age_ms": 1e3 * loop_age_s,
         }
         if self._last is not None:
@@ -252,20 +257,26 @@ class RobotSide:
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""
         start_s = self._start_s or 0.0
-        stops = [{"time_s": when_s - start_s, "reason": reason} for when_s, reason in self.session.safety.arming.stops]
+        stops = [{"time_s": when_s - start_s, "reason": reason} for when_s, reason in self.session.safety.stops]
         return self.figures.summary() | {
             "skipped": vars(self._sensing.skipped).copy(),
             "messages": {
                 "stiffness_sent": self.stiffness_sent,
                 "motion_received": self.session.motion_received,
                 "rejected": self.session.rejected,
-                "stale": self.session.link.stale,
+                "stale": self.session.stale,
             },
+            "lease": self.session.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
         }
+
+
+def _stiffness(receiver: Receiver, stiffness: Stiffness, state: MotionState) -> Outgoing:
+    update = StiffnessUpdate(receiver.header, l2=stiffness.l2, r2=stiffness.r2, rumble=stiffness.rumble, state=state)
+    return Outgoing("haptics", receiver.peer, encode(update))
 
 
 def _vector3(values: FloatArray) -> tuple[float, float, float]:

@@ -1,86 +1,123 @@
-"""Which operator the robot side listens to, and the newest that it said."""
+"""Which operators the robot side knows, whose commands count, and the newest that the owner said."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from common.codec import decode, encode
-from common.errors import RemoteProtocolError
-from common.link_end import LinkEnd
-from common.messages import AnyMessage, Hello, MotionCommand
+from common.codec import decode
+from common.errors import OtherVersionError, RemoteProtocolError
+from common.link_end import Arrival, LinkEnd
+from common.messages import Header, Hello, MotionCommand
+from common.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
+from robot_side.announcements import Announcements, Answer
+from robot_side.lease import MOST_OBSERVERS, Lease
+from robot_side.participant import Participant
 from robot_side.safety import Permission, Safety
-
-OPERATOR_SILENT_S = 1.0
-"""An operator that has not been heard of for so long no longer keeps others out."""
-_ANSWER_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
-class Answer:
-    """A payload for `peer`."""
+class Receiver:
+    """Where to send what an operator is to feel, and the header to send it under."""
 
     peer: bytes
-    payload: bytes
+    header: Header
 
 
 class OperatorSession:
-    """One operator at a time: admits, orders and judges what arrives, and forgets all of it in a new epoch."""
+    """One owner and its observers: admits, orders and judges what arrives."""
 
-    def __init__(self, link: LinkEnd, safety: Safety, seed: int = 0) -> None:
-        self.link = link
+    def __init__(self, new_link: Callable[[], LinkEnd], safety: Safety, seed: int = 0) -> None:
+        """`new_link` makes our end towards one more operator; all of them have our one epoch."""
         self.safety = safety
+        self.lease = Lease(safety)
         self.rejected = 0
-        """Payloads that were no valid message, or not the operator's."""
+        """Payloads that were no valid message, or came from somebody who was not admitted."""
+        self.other_version = 0
+        """Those of them that were of another version of the protocol."""
+        self.refused = 0
+        """Those of them that asked to be admitted: there was no room, or the epoch had ended."""
+        self.not_owners = 0
+        """Commands that were not the owner's, or not under its present lease; never applied."""
         self.motion_received = 0
+        """All motion commands, whoever sent them."""
         self.applied_age = RunningStatistics(seed)
         """Age in seconds of the command that moves the arm, in every tick in which one does."""
-        self._peer: bytes | None = None
-        self._heard_s = -math.inf
-        self._answers: list[Answer] = []
-        self._answered_s = -math.inf
+        self.leases_granted = 0
+        self._new_link = new_link
+        self._announcements = Announcements(new_link, self.lease)
+        self._owner_link = new_link()
+        self._token = 0
+        self._updated_s = -math.inf
         self._began = False
         self._echoed_s: float | None = None
         self._sent_s: float | None = None
-        self._next_target_was_down = False
         self._next_target_pressed = False
 
+    @property
+    def link(self) -> LinkEnd:
+        """Our end towards the present owner, or else the last one."""
+        return self._owner_link
+
+    @property
+    def stale(self) -> int:
+        """Messages of all operators that came too late to be applied."""
+        return self.lease.stale + sum(one.link.stale for one in self.lease.known())
+
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Take one control payload from `peer`; what is invalid, late or not the operator's never gets further."""
+        """Take one control payload from `peer`; what is invalid, late or not the owner's never moves the arm."""
+        self.update(now_s)
         try:
             message = decode(payload)
+        except OtherVersionError as error:
+            self.rejected += 1
+            self.other_version += 1
+            self._announcements.refuse(peer, SessionState.UNKNOWN, str(error), now_s)
+            return
         except RemoteProtocolError:
             self.rejected += 1
             return
         if not isinstance(message, Hello | MotionCommand) or (isinstance(message, Hello) and message.side == "robot"):
             self.rejected += 1
             return
-        known = message.header.epoch == self.link.peer_epoch
-        if not known and not self._admits(message, now_s):
-            self._answer_hello(peer, now_s)
+        participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
+        if participant is None:
             self.rejected += 1
             return
-        arrival = self.link.arrived(message, now_s)
-        if message.header.epoch != self.link.peer_epoch:
-            self.rejected += 1  # an epoch that has ended
-            return
-        if not known:
-            self._begin_epoch(now_s)
-        # The same operator may come back over another connection.
-        self._peer, self._heard_s = peer, now_s
-        if isinstance(message, Hello):
-            self._answer_hello(peer, now_s)
-            return
-        self.motion_received += 1
-        if self.safety.receive(message, arrival, now_s):
-            # Both on our own clock, so that they age from tick to tick.
-            self._echoed_s = None if arrival.loop_age_s is None else now_s - arrival.loop_age_s
-            self._sent_s = None if arrival.one_way_s is None else now_s - arrival.one_way_s
-            self._next_target_pressed |= message.next_target and not self._next_target_was_down
-            self._next_target_was_down = message.next_target
+        arrival = participant.link.arrived(message, now_s)
+        if arrival.fresh:
+            # Only what is new shows that an operator lives, and where: a replay proves nothing.
+            participant.heard_s, participant.peer = now_s, peer
+            if participant.state is SessionState.AWAY:
+                self.lease.ask(participant, now_s)
+                self._follow_owner()
+        if isinstance(message, MotionCommand):
+            self.motion_received += 1
+            self._judge(participant, message, arrival, now_s)
+        elif arrival.fresh:
+            self._announcements.answer(participant, now_s)
 
-    def operator(self, now_s: float) -> bytes | None:
-        """Where to send what the operator is to feel; None while there is nobody."""
-        return self._peer if now_s - self._heard_s <= OPERATOR_SILENT_S else None
+    def update(self, now_s: float) -> None:
+        """Let go of whoever has been silent for too long; to be called in every tick."""
+        if now_s == self._updated_s:
+            return  # a flood that arrives at once costs this once
+        self._updated_s = now_s
+        self.lease.expire(now_s)
+        self._follow_owner()
+
+    def owner(self, now_s: float) -> Receiver | None:
+        """Where to send the owner's stiffness; None while there is no owner."""
+        owner = self.lease.owner
+        return None if owner is None else self._receiver(owner, now_s)
+
+    def observers(self, now_s: float) -> list[Receiver]:
+        """Where to send what observers may feel."""
+        return [self._receiver(one, now_s) for one in self.lease.observers()]
+
+    def view_header(self, now_s: float) -> Header:
+        """The header of what goes to whoever looks."""
+        return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
         """How old the stamp of ours is that the newest accepted command echoes; None before the first (eq. 8)."""
@@ -93,8 +130,8 @@ class OperatorSession:
             self.applied_age.add(now_s - self._sent_s)
         return permission
 
-    def take_epoch_began(self) -> bool:
-        """Whether another epoch began since the last call."""
+    def take_owner_changed(self) -> bool:
+        """Whether another operator, or the same under another lease, became the owner since the last call."""
         began, self._began = self._began, False
         return began
 
@@ -103,23 +140,78 @@ class OperatorSession:
         pressed, self._next_target_pressed = self._next_target_pressed, False
         return pressed
 
-    def take_answers(self) -> list[Answer]:
+    def take_answers(self, now_s: float) -> list[Answer]:
         """What to send besides stiffness."""
-        answers, self._answers = self._answers, []
-        return answers
+        return self._announcements.take(now_s)
 
-    def _admits(self, message: AnyMessage, now_s: float) -> bool:
-        """Whether a message of another epoch may begin it: a Hello, once the present operator has gone silent."""
-        return isinstance(message, Hello) and now_s - self._heard_s > OPERATOR_SILENT_S
+    def summary(self) -> dict[str, Any]:
+        """Who asked for the lease, and what came of it."""
+        return {
+            "granted": self.leases_granted,
+            "token": self.lease.token,
+            "observers": len(self.lease.observers()),
+            "refused": self.refused,
+            "commands_of_non_owners": self.not_owners,
+            "other_version": self.other_version,
+            "discarded_by_age": self.safety.discarded_by_age,
+        }
 
-    def _begin_epoch(self, now_s: float) -> None:
-        self.safety.new_epoch(now_s)
+    def _admit(self, peer: bytes, message: Hello | MotionCommand, now_s: float) -> Participant | None:
+        """Make room for a new epoch, which only a Hello can begin; None for whoever is turned away."""
+        epoch = message.header.epoch
+        if self.lease.has_ended(epoch):
+            self.refused += isinstance(message, Hello)
+            self._announcements.refuse(peer, SessionState.ENDED, "this epoch has ended; start anew", now_s)
+            return None
+        if not isinstance(message, Hello):
+            self._announcements.refuse(peer, SessionState.UNKNOWN, "no Hello yet", now_s)
+            return None
+        self.lease.end_epoch_of(peer, epoch, now_s)
+        participant = Participant(epoch, peer, self._new_link(), now_s)
+        if not self.lease.ask(participant, now_s):
+            self.refused += 1
+            why = f"{MOST_OBSERVERS} others observe already"
+            self._announcements.refuse(peer, SessionState.UNKNOWN, why, now_s)
+            return None
+        self._follow_owner()
+        return participant
+
+    def _judge(self, participant: Participant, command: MotionCommand, arrival: Arrival, now_s: float) -> None:
+        if not self._may_command(participant, command):
+            self.not_owners += 1
+            participant.session.handle(SessionEvent.WRONG_TOKEN)
+            if command.emergency_stop and participant is self.lease.owner:
+                # It counts however late it comes, under whichever of its leases.
+                self.safety.emergency_stop(now_s)
+            return
+        if not self.safety.receive(command, arrival, now_s):
+            return
+        # Both on our own clock, so that they age from tick to tick.
+        self._echoed_s = None if arrival.loop_age_s is None else now_s - arrival.loop_age_s
+        self._sent_s = None if arrival.one_way_s is None else now_s - arrival.one_way_s
+        self._next_target_pressed |= command.next_target and not participant.next_target_was_down
+        participant.next_target_was_down = command.next_target
+        handing_over = command.hand_over and not participant.hand_over_was_down
+        participant.hand_over_was_down = command.hand_over
+        if handing_over and self.lease.hand_over(now_s):
+            self._follow_owner()
+
+    def _may_command(self, participant: Participant, command: MotionCommand) -> bool:
+        return participant is self.lease.owner and command.token == self.lease.token
+
+    def _follow_owner(self) -> None:
+        """Forget what the last owner said as soon as there is another lease."""
+        owner = self.lease.owner
+        if owner is None or self.lease.token == self._token:
+            return
+        self._token = self.lease.token
+        self._owner_link = owner.link
+        # A button that it held while it waited is not pressed anew.
+        owner.hand_over_was_down = owner.next_target_was_down = True
+        self.leases_granted += 1
         self._began = True
         self._echoed_s = self._sent_s = None
-        self._next_target_was_down = self._next_target_pressed = False
+        self._next_target_pressed = False
 
-    def _answer_hello(self, peer: bytes, now_s: float) -> None:
-        # Bounded, however fast strangers knock.
-        if now_s - self._answered_s >= _ANSWER_PERIOD_S:
-            self._answered_s = now_s
-            self._answers.append(Answer(peer, encode(self.link.hello(now_s))))
+    def _receiver(self, participant: Participant, now_s: float) -> Receiver:
+        return Receiver(participant.peer, self._announcements.stamp(now_s, participant.link))

@@ -6,19 +6,21 @@ it the robot side disarms, and the arm itself decelerates from its measured stat
 while a steady delay, however long, ages nothing.
 """
 
+from collections import deque
 from dataclasses import dataclass
 
 from common.link_end import Arrival
 from common.messages import MotionCommand, MotionState
-from common.session import Arming
+from common.session import Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
 """Travel below this counts as released: a calibrated trigger at rest reads 0, give or take a count."""
+_REMEMBERED_STOPS = 1000
 
 
 @dataclass(frozen=True)
 class SafetySettings:
-    """The limits; all in seconds."""
+    """The limits; all in seconds. None of them can be switched off: 0 is refused, or means no allowance at all."""
 
     gap_s: float = 0.1
     """Without an accepted command for this long the arm stops."""
@@ -30,6 +32,8 @@ class SafetySettings:
     """A loop age above this disarms."""
     healthy_s: float = 1.0
     """How long commands must have come, with released triggers, before arming."""
+    lease_s: float = 0.9
+    """An operator that was silent for this long loses the lease: within a second, a tick included."""
 
     def __post_init__(self) -> None:
         for name in ("gap_s", "age_s", "max_delay_s"):
@@ -38,6 +42,8 @@ class SafetySettings:
         for name in ("jitter_s", "healthy_s"):
             if not 0.0 <= getattr(self, name) < 60.0:
                 raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to below 60")
+        if not self.gap_s < self.lease_s < 60.0:
+            raise ValueError(f"lease_s = {self.lease_s}; valid: above gap_s = {self.gap_s} to below 60")
 
 
 @dataclass(frozen=True)
@@ -51,48 +57,129 @@ class Permission:
 
 
 class Safety:
-    """Guards the arm against a stream that is broken, old, or not meant."""
+    """Guards the arm against a stream that is broken, old, or not meant. It listens to the lease's owner alone.
+
+    An emergency stop is latched: it outlasts its operator, until somebody arms again.
+    """
 
     def __init__(self, settings: SafetySettings) -> None:
-        self.arming = Arming(settings.healthy_s)
+        self.stops: deque[tuple[float, str]] = deque(maxlen=_REMEMBERED_STOPS)
+        """(when, why) of each transition out of armed, and of each emergency stop."""
         self.discarded_by_age = 0
-        self._settings = settings
+        self.settings = settings
+        self._stopped = False
+        self._session: Session | None = None
+        self._forget()
+
+    def _forget(self) -> None:
         self._command: MotionCommand | None = None
-        self._accepted_s = 0.0
+        self._accepted_s: float | None = None
+        self._echoed_s: float | None = None
+        self._healthy_since_s: float | None = None
+        self._arm_was_down = True
+
+    @property
+    def state(self) -> MotionState:
+        """The robot's, whoever owns it."""
+        if self._session is not None and self._session.state is SessionState.ARMED:
+            return "armed"
+        return "stopped" if self._stopped else "disarmed"
+
+    def begin(self, session: Session) -> None:
+        """Listen to another owner; nothing of the one before counts."""
+        self._forget()
+        self._session = session
+        if self._stopped:
+            session.handle(SessionEvent.EMERGENCY_STOP)
+
+    def end(self, event: SessionEvent, now_s: float) -> None:
+        """The owner leaves; `event` says how."""
+        self._handle(event, now_s)
+        self._forget()
+        self._session = None
 
     def receive(self, command: MotionCommand, arrival: Arrival, now_s: float) -> bool:
-        """Judge one command; True when it was accepted. An emergency stop counts however late it comes."""
+        """Judge one command of the owner; True when it was accepted. An emergency stop counts however late it is."""
         if command.emergency_stop:
-            self.arming.emergency_stop(now_s)
+            self.emergency_stop(now_s)
         if not arrival.fresh:
             return False
-        if arrival.queueing_age_s > self._settings.age_s + self._settings.jitter_s:
+        if self._queued_too_long(arrival):
             self.discarded_by_age += 1
             return False
-        self._check_gap(now_s)
-        if arrival.loop_age_s is not None and arrival.loop_age_s > self._settings.max_delay_s:
-            self.arming.disarm(now_s, f"loop age of {arrival.loop_age_s:.2f} s")
+        self.check(now_s)
         self._command, self._accepted_s = command, now_s
-        if not command.emergency_stop:
-            released = command.l2 <= RELEASED_TRAVEL and command.r2 <= RELEASED_TRAVEL
-            self.arming.command(now_s, triggers_released=released, arm_down=command.arm)
+        if arrival.loop_age_s is not None:
+            self._echoed_s = now_s - arrival.loop_age_s
+        self._check_loop(now_s)
+        self._follow_buttons(command, now_s)
         return True
 
-    def new_epoch(self, now_s: float) -> None:
-        """The operator side restarted or another one took over: nothing of the old one counts any more."""
-        self._command = None
-        self.arming.disarm(now_s, "the operator side began a new epoch")
+    def emergency_stop(self, now_s: float) -> None:
+        """Stop whatever goes on; nothing happens while it stands stopped already."""
+        if self._session is not None and self._session.state is not SessionState.STOPPED:
+            self._handle(SessionEvent.EMERGENCY_STOP, now_s)
 
     def permission(self, now_s: float) -> Permission:
         """What may move in this tick."""
+        self.check(now_s)
+        state = self.state
+        if state != "armed" or self._command is None or self._accepted_s is None or not self._command.run:
+            return Permission(state, None, now_s)
+        return Permission(state, self._command, self._accepted_s + self.settings.gap_s)
+
+    def check(self, now_s: float) -> None:
+        """Whether silence or the loop's age has to stop the arm by now."""
         self._check_gap(now_s)
-        valid_until_s = self._accepted_s + self._settings.gap_s
-        if self.arming.state != "armed" or self._command is None or not self._command.run:
-            return Permission(self.arming.state, None, valid_until_s)
-        return Permission(self.arming.state, self._command, valid_until_s)
+        self._check_loop(now_s)
+
+    def _queued_too_long(self, arrival: Arrival) -> bool:
+        return arrival.queueing_age_s > self.settings.age_s + self.settings.jitter_s
 
     def _check_gap(self, now_s: float) -> None:
-        gap_s = now_s - self._accepted_s
-        if self._command is not None and gap_s > self._settings.gap_s:
-            self.arming.disarm(now_s, f"no command for {gap_s * 1e3:.0f} ms")
-            self._command = None
+        if self._accepted_s is not None and now_s - self._accepted_s > self.settings.gap_s:
+            self._handle(SessionEvent.GAP, now_s, f"no command for {1e3 * (now_s - self._accepted_s):.0f} ms")
+            self._command = self._accepted_s = None
+
+    def _check_loop(self, now_s: float) -> None:
+        if not self._loop_is_young(now_s):
+            age = "unknown" if self._echoed_s is None else f"{now_s - self._echoed_s:.2f} s"
+            self._handle(SessionEvent.OLD_LOOP, now_s, f"loop age of {age}")
+
+    def _loop_is_young(self, now_s: float) -> bool:
+        # No echo yet is no measured loop age: the conservative reading is that it is too old.
+        return self._echoed_s is not None and now_s - self._echoed_s <= self.settings.max_delay_s
+
+    def _follow_buttons(self, command: MotionCommand, now_s: float) -> None:
+        pressed = command.arm and not self._arm_was_down
+        self._arm_was_down = command.arm
+        if self.state == "armed":
+            return
+        if command.l2 > RELEASED_TRAVEL or command.r2 > RELEASED_TRAVEL:
+            self._handle(SessionEvent.TRIGGER_PULLED, now_s)
+        elif command.emergency_stop:
+            self._healthy_since_s = None
+        elif self._loop_is_young(now_s):
+            if self._healthy_since_s is None:
+                self._healthy_since_s = now_s
+            if self._healthy_for_long(now_s):
+                self._handle(SessionEvent.HEALTHY, now_s)
+                if pressed:
+                    self._handle(SessionEvent.ARM, now_s)
+
+    def _healthy_for_long(self, now_s: float) -> bool:
+        return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
+
+    def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
+        """Follow the table; whatever is no step towards arming starts the healthy second anew."""
+        if event is not SessionEvent.HEALTHY:
+            self._healthy_since_s = None
+        if event is SessionEvent.EMERGENCY_STOP:
+            self._stopped = True
+        row = None if self._session is None else self._session.handle(event)
+        if row is None:
+            return
+        if row.after is SessionState.ARMED:
+            self._stopped = False
+        elif row.before is SessionState.ARMED or event is SessionEvent.EMERGENCY_STOP:
+            self.stops.append((now_s, why or row.why))

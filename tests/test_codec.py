@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
-from common.errors import RemoteProtocolError
-from common.messages import AnyMessage, Header, Hello, MotionCommand, StiffnessUpdate, Telemetry
+from common.errors import OtherVersionError, RemoteProtocolError
+from common.messages import AnyMessage, Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.session import SessionState
 
 unit = st.floats(0.0, 1.0)
 signed_unit = st.floats(-1.0, 1.0)
@@ -39,6 +40,15 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         turning=st.tuples(signed_unit, signed_unit),
         gripper=signed_unit,
         run=st.booleans(),
+    ),
+    st.builds(
+        LeaseNotice,
+        headers,
+        session=st.sampled_from(SessionState),
+        why=st.text(max_size=200),
+        token=st.integers(0, 2**63 - 1),
+        waiting=st.integers(0, 1000),
+        place=st.integers(0, 1000),
     ),
     st.builds(StiffnessUpdate, headers, l2=unit, r2=unit, rumble=unit, state=st.sampled_from(["armed", "stopped"])),
 )
@@ -93,11 +103,11 @@ def test_well_packed_nonsense_is_refused(content: Any) -> None:
 
 
 def motion(**changes: Any) -> list[Any]:
-    fields = {"r2": 0.5, "lateral": [0.0, 0.0], "sent_s": 3.0} | changes
+    fields = {"token": 0, "r2": 0.5, "lateral": [0.0, 0.0], "sent_s": 3.0} | changes
     header = [1, 2, fields["sent_s"], None, None]
     return [
         PROTOCOL_VERSION,
-        ["motion", header, 0.0, fields["r2"], fields["lateral"], [0.0, 0.0], 0.0, True, False, False, False],
+        ["motion", header, 0.0, fields["r2"], fields["lateral"], [0.0, 0.0], 0.0, True, *[False] * 4, fields["token"]],
     ]
 
 
@@ -117,6 +127,8 @@ def test_the_unspoiled_message_is_valid() -> None:
         ({"lateral": [0.0]}, "length 2"),
         ({"lateral": [0.0, math.nan]}, "lateral"),
         ({"sent_s": math.inf}, "sent_s"),
+        ({"token": -1}, "token"),
+        ({"token": 0.5}, "int"),
     ],
 )
 def test_one_bad_field_spoils_the_whole_message(changes: dict[str, Any], named: str) -> None:
@@ -127,8 +139,17 @@ def test_one_bad_field_spoils_the_whole_message(changes: dict[str, Any], named: 
 def test_another_version_is_told_apart_from_garbage() -> None:
     content = motion()
     content[0] = PROTOCOL_VERSION + 1
-    with pytest.raises(RemoteProtocolError, match=f"protocol version {PROTOCOL_VERSION + 1}"):
+    with pytest.raises(OtherVersionError, match=f"protocol version {PROTOCOL_VERSION + 1}"):
         decode(msgpack.packb(content))
+
+
+@pytest.mark.parametrize("version", [-1, True, "2", None, 2.0, [2]])
+def test_what_is_no_version_is_garbage(version: object) -> None:
+    content = motion()
+    content[0] = version
+    with pytest.raises(RemoteProtocolError) as caught:
+        decode(msgpack.packb(content))
+    assert not isinstance(caught.value, OtherVersionError)
 
 
 def test_an_oversize_payload_is_not_looked_into() -> None:

@@ -2,10 +2,11 @@ from collections.abc import Callable
 
 import pytest
 
-from common.codec import decode, encode
+from common.codec import PROTOCOL_VERSION, decode, encode
 from common.link_end import LinkEnd
-from common.messages import Hello, MotionCommand, MotionState, StiffnessUpdate, Telemetry
-from operator_side.core import INTENT_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
+from common.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from common.session import SessionState
+from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.effects import Off
 from operator_side.dualsense.simulated import SimulatedDualSense
@@ -20,6 +21,11 @@ class Bench:
         self.device = SimulatedDualSense()
         self.now_s = 1.0
         self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
+        self.notice(SessionState.DISARMED)
+
+    def notice(self, session: SessionState, why: str = "", token: int = 7) -> None:
+        notice = LeaseNotice(self.robot.stamp(self.now_s), session=session, why=why, token=token, waiting=2, place=1)
+        self.side.receive(encode(notice), self.now_s)
 
     def stiffness(self, r2: float, state: MotionState = "armed", l2: float = 0.0, rumble: float = 0.0) -> bytes:
         return encode(StiffnessUpdate(self.robot.stamp(self.now_s), l2=l2, r2=r2, rumble=rumble, state=state))
@@ -108,6 +114,7 @@ def test_hands_become_a_motion_command(bench: Bench) -> None:
     bench.device.set_sticks(left=(1.0, 0.0))
     bench.device.read(bench.now_s)
     bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
     bench.read()
     [command] = bench.commands()
     assert command.r2 == 1.0
@@ -133,7 +140,7 @@ def test_hello_is_repeated_until_the_robot_answers(bench: Bench) -> None:
     for _ in range(250):
         bench.now_s += 0.004
         counted += hellos()
-    assert 3 <= counted <= 5
+    assert 4 <= counted <= 6
     bench.feel(0.0)
     assert hellos() == 0
     bench.now_s += 2.0
@@ -195,3 +202,87 @@ def test_a_restarted_robot_is_followed(bench: Bench) -> None:
     bench.side.receive(encode(bench.robot.hello(bench.now_s)), bench.now_s)
     bench.feel(1.0)
     assert sum(bench.device.effects[1].zone_strengths) == 80
+
+
+def test_an_observer_sends_nothing_but_hellos(bench: Bench) -> None:
+    bench.notice(SessionState.OBSERVING)
+    sent = []
+    for _ in range(250):
+        bench.now_s += 0.004
+        bench.read()
+        bench.notice(SessionState.OBSERVING)
+        bench.feel(0.5)
+        sent += [decode(payload) for payload in bench.side.motion(bench.now_s)]
+    assert all(isinstance(message, Hello) for message in sent)
+    assert len(sent) == pytest.approx(5, abs=1)
+    assert bench.side.motion_sent == 0
+
+
+def test_commands_carry_the_token_of_the_lease(bench: Bench) -> None:
+    bench.read()
+    assert [command.token for command in bench.commands()] == [7]
+    bench.notice(SessionState.DISARMED, token=9)
+    assert [command.token for command in bench.commands()] == [9]
+
+
+def test_without_notices_the_lease_is_not_known_any_more(bench: Bench) -> None:
+    bench.now_s += NOTICE_EXPIRES_S + 0.001
+    bench.read()
+    assert bench.commands() == []
+    assert bench.side.lease is None
+
+
+def test_the_create_button_hands_over(bench: Bench) -> None:
+    bench.device.set_buttons(frozenset({Button.CREATE}))
+    bench.read()
+    [command] = bench.commands()
+    assert command.hand_over
+
+
+def test_an_owner_without_a_controller_still_says_hello(bench: Bench) -> None:
+    hellos = 0
+    for _ in range(250):
+        bench.now_s += 0.004
+        bench.notice(SessionState.DISARMED)
+        bench.feel(0.0)
+        hellos += sum(isinstance(decode(payload), Hello) for payload in bench.side.motion(bench.now_s))
+    assert hellos == pytest.approx(5, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("session", "shown"),
+    [
+        (SessionState.ARMED, "up"),
+        (SessionState.OBSERVING, "observing (1 of 2 waiting)"),
+        (SessionState.UNKNOWN, "refused: 8 others observe already"),
+        (SessionState.ENDED, "refused: 8 others observe already"),
+    ],
+)
+def test_the_status_shows_where_we_stand(bench: Bench, session: SessionState, shown: str) -> None:
+    bench.feel(0.0)
+    bench.notice(session, "8 others observe already")
+    status = bench.side.status(bench.now_s)
+    assert (status["link"], status["state"]) == (shown, "armed")
+
+
+def test_every_standing_is_in_the_summary(bench: Bench) -> None:
+    for session in (SessionState.READY, SessionState.ARMED, SessionState.OBSERVING, SessionState.DISARMED):
+        bench.notice(session)
+    assert bench.side.summary()["lease_states"] == ["owner", "observing", "owner"]
+
+
+def test_a_robot_side_of_another_version_is_told_apart(bench: Bench) -> None:
+    payload = bytes([0x92, PROTOCOL_VERSION + 1]) + bench.stiffness(0.5)[2:]
+    bench.side.receive(payload, bench.now_s)
+    shown = bench.side.status(bench.now_s)["link"]
+    assert shown == f"refused: protocol version {PROTOCOL_VERSION + 1}; valid: {PROTOCOL_VERSION}"
+    assert bench.side.rejected == 1
+    bench.feel(0.5)
+    assert bench.side.status(bench.now_s)["link"] == "up"
+
+
+def test_a_lease_of_a_robot_side_that_restarted_does_not_count(bench: Bench) -> None:
+    bench.robot = LinkEnd("robot", 7, "clock")
+    bench.side.receive(encode(bench.robot.hello(bench.now_s)), bench.now_s)
+    bench.read()
+    assert bench.commands() == []

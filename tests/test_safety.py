@@ -4,7 +4,7 @@ import pytest
 
 from common.link_end import Arrival
 from common.messages import Header, MotionCommand
-from common.session import Arming
+from common.session import Session, SessionEvent
 from robot_side.safety import Safety, SafetySettings
 
 FRESH = Arrival(fresh=True, queueing_age_s=0.0, one_way_s=0.01, loop_age_s=0.02)
@@ -16,6 +16,9 @@ class Stream:
 
     def __init__(self, settings: SafetySettings | None = None) -> None:
         self.safety = Safety(settings or SafetySettings())
+        self.session = Session()
+        self.session.handle(SessionEvent.ASKED_WHILE_FREE)
+        self.safety.begin(self.session)
         self.now_s = 10.0
         self._sequence = 0
 
@@ -94,7 +97,7 @@ def test_a_longer_gap_stops_and_needs_arming_again() -> None:
     stream.send(0.5, r2=1.0)
     assert stream.safety.permission(stream.now_s).command is None
     assert stream.state == "disarmed"
-    [(_, reason)] = stream.safety.arming.stops
+    [(_, reason)] = stream.safety.stops
     assert "no command for" in reason
 
 
@@ -151,7 +154,7 @@ def test_a_new_epoch_disarms() -> None:
     stream = Stream()
     stream.arm()
     stream.send(0.1, r2=1.0)
-    stream.safety.new_epoch(stream.now_s)
+    stream.safety.end(SessionEvent.NEW_EPOCH, stream.now_s)
     assert stream.safety.permission(stream.now_s).command is None
     assert stream.state == "disarmed"
 
@@ -163,7 +166,47 @@ def test_zero_never_means_no_limit(name: str, value: float) -> None:
         SafetySettings(**{name: value})
 
 
-def test_disarming_what_is_not_armed_is_no_stop() -> None:
-    arming = Arming()
-    arming.disarm(1.0, "nothing")
-    assert arming.stops == []
+@pytest.mark.parametrize("value", [0.0, 0.1, 60.0, float("nan")])
+def test_a_lease_outlasts_a_gap(value: float) -> None:
+    with pytest.raises(ValueError, match="lease_s"):
+        SafetySettings(lease_s=value)
+
+
+def test_stopping_what_is_not_armed_is_no_stop() -> None:
+    stream = Stream()
+    stream.send(0.1)
+    stream.now_s += 1.0
+    assert stream.state == "disarmed"
+    assert not stream.safety.stops
+
+
+def test_a_loop_that_falls_silent_grows_old_while_commands_keep_coming() -> None:
+    stream = Stream()
+    stream.arm()
+    no_echo = Arrival(fresh=True, queueing_age_s=0.0, one_way_s=0.01, loop_age_s=None)
+    stream.send(1.9, no_echo, r2=0.5)
+    assert stream.state == "armed"
+    stream.send(0.2, no_echo, r2=0.5)
+    assert stream.state == "disarmed"
+
+
+def test_a_loop_age_that_is_not_known_keeps_from_arming() -> None:
+    stream = Stream()
+    unknown = Arrival(fresh=True, queueing_age_s=0.0, one_way_s=0.01, loop_age_s=None)
+    stream.send(1.1, unknown)
+    stream.send(0.1, unknown, arm=True)
+    assert stream.state == "disarmed"
+
+
+def test_an_emergency_stop_outlasts_its_operator() -> None:
+    stream = Stream()
+    stream.arm()
+    stream.send(STEP_S, emergency_stop=True)
+    stream.safety.end(SessionEvent.SILENT, stream.now_s)
+    assert stream.state == "stopped"
+    stream.session = Session()
+    stream.session.handle(SessionEvent.ASKED_WHILE_FREE)
+    stream.safety.begin(stream.session)
+    assert stream.state == "stopped"
+    assert [why for _, why in stream.safety.stops] == ["emergency stop"]
+    stream.arm()

@@ -29,7 +29,7 @@ def pressing(*buttons: Button) -> OperatorIntent:
 
 def test_nobody_touches_it() -> None:
     intent = operator_intent(ControllerState())
-    assert intent == OperatorIntent(0.0, 0.0, (0.0, 0.0), (0.0, 0.0), False, False, False, False, 0)
+    assert intent == OperatorIntent(0.0, 0.0, (0.0, 0.0), (0.0, 0.0), False, False, False, False, False, 0)
     assert intent.triggers_released
 
 
@@ -85,6 +85,7 @@ def test_the_button_map() -> None:
         Action.CLOSE_GRIPPER: Button.CROSS,
         Action.OPEN_GRIPPER: Button.SQUARE,
         Action.NEXT_TARGET: Button.TRIANGLE,
+        Action.HAND_OVER: Button.CREATE,
     }
 
 
@@ -95,6 +96,7 @@ def test_the_button_map() -> None:
         (Button.OPTIONS, "arm", True),
         (Button.CIRCLE, "emergency_stop", True),
         (Button.TRIANGLE, "next_target", True),
+        (Button.CREATE, "hand_over", True),
         (Button.CROSS, "gripper", 1),
         (Button.SQUARE, "gripper", -1),
     ],
@@ -109,7 +111,7 @@ def test_each_button_does_one_thing(button: Button, field: str, value: object) -
 
 def test_every_other_button_does_nothing() -> None:
     unused = [button for button in Button if button not in BUTTON_OF.values()]
-    assert len(unused) == len(Button) - 6
+    assert len(unused) == len(Button) - 7
     for button in unused:
         assert pressing(button) == pressing()
 

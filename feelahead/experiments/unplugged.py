@@ -1,0 +1,71 @@
+"""A cable that is really pulled: a virtual Ethernet link between network namespaces, set down in mid-motion.
+
+Needs root and iproute2's `ip`; without them the row says so.
+"""
+
+import contextlib
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+
+from common.errors import FeelaheadError
+from feelahead.experiments.fault import Outcome
+from feelahead.experiments.real_faults import Onsets
+from feelahead.experiments.rig import Rig
+
+_ROBOT, _OPERATOR = "10.91.83.1", "10.91.83.2"
+"""Inside namespaces of our own, where no other network is."""
+
+
+class NotPermittedError(FeelaheadError):
+    """Network namespaces cannot be had here."""
+
+
+def unplugged() -> Outcome:
+    """Both sides in namespaces of their own, and the link between them set down while the arm moves."""
+    onsets = Onsets()
+    try:
+        with _namespaces() as (robot, operator), Rig(f"tcp://{_ROBOT}:5555", ["--insecure"], robot) as rig:
+            driver = rig.driver(before=operator)
+            rig.drive(driver)
+            rig.lines()
+            _ip("-n", robot[-1], "link", "set", "robot0", "down")
+            onsets.take(rig)
+            rig.wait(0.5)
+            told = rig.figures()["told_to_move"]
+            _ip("-n", robot[-1], "link", "set", "robot0", "up")
+            rig.wait(2.0)
+            figures = rig.figures()
+            safe = figures["told_to_move"] == told and figures["state"] == "disarmed"
+    except NotPermittedError as error:
+        return Outcome(True, f"skipped: {error}")
+    return onsets.outcome(safe=safe)
+
+
+@contextlib.contextmanager
+def _namespaces() -> Iterator[tuple[list[str], list[str]]]:
+    """The commands that run a program in either namespace; both are gone afterwards."""
+    if shutil.which("ip") is None or os.geteuid() != 0:
+        raise NotPermittedError("network namespaces need root and iproute2 (apt install iproute2)")
+    robot, operator = (f"feelahead-{side}-{os.getpid()}" for side in ("robot", "operator"))
+    try:
+        for name in (robot, operator):
+            _ip("netns", "add", name)
+        link = ("robot0", "type", "veth", "peer", "name", "operator0")
+        _ip("-n", robot, "link", "add", *link)
+        _ip("-n", robot, "link", "set", "operator0", "netns", operator)
+        for name, device, address in ((robot, "robot0", _ROBOT), (operator, "operator0", _OPERATOR)):
+            _ip("-n", name, "address", "add", f"{address}/24", "dev", device)
+            _ip("-n", name, "link", "set", device, "up")
+            _ip("-n", name, "link", "set", "lo", "up")
+        yield ["ip", "netns", "exec", robot], ["ip", "netns", "exec", operator]
+    finally:
+        for name in (robot, operator):
+            subprocess.run(["ip", "netns", "del", name], capture_output=True, check=False)  # noqa: S607
+
+
+def _ip(*arguments: str) -> None:
+    done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
+    if done.returncode != 0:
+        raise NotPermittedError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")

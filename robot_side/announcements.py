@@ -1,0 +1,91 @@
+"""What the robot side says to operators besides stiffness: Hello, and where each stands with the lease."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+
+from common.codec import encode
+from common.link_end import LinkEnd
+from common.messages import Header, LeaseNotice
+from common.session import SessionState
+from robot_side.lease import Lease
+from robot_side.participant import Participant
+
+_NOTICE_PERIOD_S = 0.05
+_ANSWER_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A payload for `peer`."""
+
+    peer: bytes
+    payload: bytes
+
+
+class Announcements:
+    """Answers and lease notices, bounded however fast strangers knock."""
+
+    def __init__(self, new_link: Callable[[], LinkEnd], lease: Lease) -> None:
+        self._lease = lease
+        self._link = new_link()
+        self._sequence = itertools.count(1)
+        self._answers: list[Answer] = []
+        self._answered_stranger_s = -math.inf
+        self._noticed_s = -math.inf
+        self._noticed: list[tuple[int, SessionState]] = []
+        self._noticed_token = 0
+
+    def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
+        """The next header of our epoch, which has one sequence whoever it goes to; `link` None: to nobody named."""
+        header = (link or self._link).stamp(now_s)
+        return msgspec.structs.replace(header, sequence=next(self._sequence))
+
+    def answer(self, participant: Participant, now_s: float) -> None:
+        """Answer a Hello, at a bounded rate: ours, and where it stands."""
+        if now_s - participant.answered_s < _ANSWER_PERIOD_S:
+            return
+        participant.answered_s = now_s
+        self._hello(participant.peer, participant.link, now_s)
+        self._notice(participant, now_s)
+
+    def refuse(self, peer: bytes, session: SessionState, why: str, now_s: float) -> None:
+        """Tell somebody who was not admitted that we are here, and why they are not let in; at a bounded rate."""
+        if now_s - self._answered_stranger_s < _ANSWER_PERIOD_S:
+            return
+        self._answered_stranger_s = now_s
+        self._hello(peer, self._link, now_s)
+        waiting = len(self._lease.observers())
+        notice = LeaseNotice(self.stamp(now_s), session=session, why=why, token=self._lease.token, waiting=waiting)
+        self._answers.append(Answer(peer, encode(notice)))
+
+    def take(self, now_s: float) -> list[Answer]:
+        """What to send now: answers, and a notice for everyone when anything changed or the last ones are old."""
+        standing = [(one.epoch, one.state) for one in self._lease.present()]
+        changed = standing != self._noticed or self._lease.token != self._noticed_token
+        if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:
+            self._noticed_s, self._noticed, self._noticed_token = now_s, standing, self._lease.token
+            for participant in self._lease.present():
+                self._notice(participant, now_s)
+        answers, self._answers = self._answers, []
+        return answers
+
+    def _hello(self, peer: bytes, link: LinkEnd, now_s: float) -> None:
+        hello = link.hello(now_s)
+        header = msgspec.structs.replace(hello.header, sequence=next(self._sequence))
+        self._answers.append(Answer(peer, encode(msgspec.structs.replace(hello, header=header))))
+
+    def _notice(self, participant: Participant, now_s: float) -> None:
+        observers = self._lease.observers()
+        notice = LeaseNotice(
+            self.stamp(now_s, participant.link),
+            session=participant.state,
+            why=participant.session.why,
+            token=self._lease.token,
+            waiting=len(observers),
+            place=observers.index(participant) + 1 if participant in observers else 0,
+        )
+        self._answers.append(Answer(participant.peer, encode(notice)))

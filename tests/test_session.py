@@ -1,0 +1,130 @@
+"""The session's table: what it promises for every state, and that docs/session.md shows it as it is."""
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
+from feelahead.session_diagram import BEGIN, DOCUMENT, END, diagram, table, updated
+
+CHANGING = [row for row in TRANSITIONS if row.after is not row.before]
+WAYS_IN = (SessionEvent.ASKED_WHILE_FREE, SessionEvent.LEASE_PASSED)
+STOPPING = (
+    SessionEvent.GAP,
+    SessionEvent.OLD_LOOP,
+    SessionEvent.EMERGENCY_STOP,
+    SessionEvent.HAND_OVER,
+    SessionEvent.SILENT,
+    SessionEvent.NEW_EPOCH,
+)
+
+
+def after(state: SessionState, event: SessionEvent) -> SessionState:
+    session = Session()
+    session.state = state
+    session.handle(event)
+    return session.state
+
+
+def test_each_state_and_event_has_one_row_at_most() -> None:
+    assert len(TABLE) == len(TRANSITIONS)
+
+
+def test_every_state_can_be_reached_and_left() -> None:
+    assert {row.after for row in CHANGING} == set(SessionState) - {SessionState.UNKNOWN}
+    assert {row.before for row in CHANGING} == set(SessionState) - {SessionState.ENDED}
+
+
+def test_every_event_is_in_the_table() -> None:
+    assert {row.event for row in TRANSITIONS} == set(SessionEvent)
+
+
+def test_only_the_arming_button_arms_and_only_after_a_healthy_second() -> None:
+    into = {(row.before, row.event) for row in CHANGING if row.after is SessionState.ARMED}
+    ready = (SessionState.READY, SessionState.STOPPED_READY)
+    assert into == {(state, SessionEvent.ARM) for state in ready}
+    assert {row.event for row in CHANGING if row.after in ready} == {SessionEvent.HEALTHY}
+
+
+@pytest.mark.parametrize("event", STOPPING)
+def test_whatever_stops_stops_the_armed(event: SessionEvent) -> None:
+    assert after(SessionState.ARMED, event) is not SessionState.ARMED
+
+
+def test_every_lease_begins_disarmed() -> None:
+    for row in TRANSITIONS:
+        if row.before not in OWNING and row.after in OWNING:
+            assert row.after is SessionState.DISARMED
+            assert row.event in WAYS_IN
+
+
+@pytest.mark.parametrize("state", sorted(OWNING))
+def test_an_emergency_stop_stops_every_owner(state: SessionState) -> None:
+    assert after(state, SessionEvent.EMERGENCY_STOP) is SessionState.STOPPED
+
+
+def test_a_stop_ends_by_arming_alone() -> None:
+    stopped = {SessionState.STOPPED, SessionState.STOPPED_READY}
+    ways_out = {row.event for row in TRANSITIONS if row.before in stopped and row.after in OWNING - stopped}
+    assert ways_out == {SessionEvent.ARM}
+
+
+@pytest.mark.parametrize("event", SessionEvent)
+def test_what_has_ended_stays_so(event: SessionEvent) -> None:
+    assert after(SessionState.ENDED, event) is SessionState.ENDED
+
+
+towards_armed = st.sampled_from([SessionEvent.ASKED_WHILE_FREE, SessionEvent.HEALTHY, SessionEvent.ARM])
+
+
+@given(st.lists(towards_armed | st.sampled_from(SessionEvent), max_size=40))
+@settings(derandomize=True, deadline=None, max_examples=300)
+def test_armed_always_follows_a_lease_a_healthy_second_and_the_button(events: list[SessionEvent]) -> None:
+    session = Session()
+    since_lease: list[SessionEvent] = []
+    for event in events:
+        session.handle(event)
+        if session.owns:
+            since_lease.append(event)
+        else:
+            since_lease = []
+        if session.state is SessionState.ARMED:
+            assert since_lease[0] in WAYS_IN
+            last_arm = len(since_lease) - 1 - since_lease[::-1].index(SessionEvent.ARM)
+            assert SessionEvent.HEALTHY in since_lease[:last_arm]
+            assert not set(since_lease[last_arm:]) & set(STOPPING)
+
+
+def test_the_reason_is_that_of_the_last_row() -> None:
+    session = Session()
+    session.handle(SessionEvent.ASKED_WHILE_HELD)
+    session.handle(SessionEvent.HEALTHY)
+    assert session.why == "one owner, many observers"
+
+
+def test_the_document_shows_the_table_as_it_is() -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert updated(text) == text, "out of date: python -m feelahead.session_diagram --write"
+
+
+def test_a_changed_row_changes_the_document() -> None:
+    assert table(TRANSITIONS[1:]) not in DOCUMENT.read_text(encoding="utf-8")
+    assert diagram(TRANSITIONS[:-1]) != diagram()
+
+
+def test_a_document_without_marks_is_refused() -> None:
+    with pytest.raises(ValueError, match="marks"):
+        updated(f"{END} the wrong way round {BEGIN}")
+
+
+@pytest.mark.parametrize(("flag", "code"), [("--writ", 2), ("--help", 0)])
+def test_the_command_says_what_it_takes(flag: str, code: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "feelahead.session_diagram", flag], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code
+    assert "--write" in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,48 @@
+"""The soak's own judgement; the soak itself is `python -m feelahead.experiments.soak`."""
+
+import subprocess
+import sys
+
+import pytest
+
+from feelahead.experiments.soak import Sample, command, flat, sample
+
+
+def series(*resident_mb: float, descriptors: int = 10) -> list[Sample]:
+    return [Sample(float(k), round(1024 * one), descriptors) for k, one in enumerate(resident_mb)]
+
+
+def test_what_fills_at_the_start_and_then_stays_is_flat() -> None:
+    assert flat(series(100, *[180] * 20))
+    assert flat(series(*[100] * 20, 109))
+
+
+def test_what_keeps_growing_is_not() -> None:
+    assert not flat(series(*range(100, 121)))
+    assert not flat([*series(*[100] * 20), Sample(20.0, 102_400, 11)])
+
+
+def test_a_process_is_looked_at() -> None:
+    one = sample("self", 2.0)
+    assert one.minutes == 2.0
+    assert one.resident_kb > 10_000
+    assert one.descriptors >= 3
+
+
+def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["--minutes", "0.02", "--virtual"]) == 0
+    said = capsys.readouterr().out
+    assert "flat" in said.splitlines()[-1]
+    assert "'motion_sent': 290" in said
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--minutes", "0"], ["--minutes", "nan"], ["--link", "delay fast"], ["--seed", "-1"]]
+)
+def test_bad_input_is_one_line(arguments: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "feelahead.experiments.soak", *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "valid" in done.stderr
