@@ -125,8 +125,7 @@ class _Loop:
                 now_s = self._clock.now()
                 if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
                     break
-                operator = self._core.session.operator(now_s)
-                for peer, payload in self._admission.admitted(self._sockets.receive(), operator):
+                for peer, payload in self._admission.admitted(self._sockets.receive(), self._core.session.owner_peer):
                     self._core.receive(peer, payload, now_s)
                 ticked = self._pacer.due(now_s)
                 if ticked:
@@ -196,7 +195,7 @@ class _Loop:
             self._sockets.refresh_keys()
             for text in self._sockets.key_news():
                 self._status.note(text)
-        self._collection.idle(now_s, resting=self._core.session.safety.arming.state != "armed")
+        self._collection.idle(now_s, resting=self._core.session.safety.state != "armed")
 
 
 if __name__ == "__main__":

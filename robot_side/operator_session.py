@@ -61,6 +61,12 @@ class OperatorSession:
         return self._owner_link
 
     @property
+    def owner_peer(self) -> bytes | None:
+        """From where the owner speaks; None while there is no owner."""
+        owner = self.lease.owner
+        return None if owner is None else owner.peer
+
+    @property
     def stale(self) -> int:
         """Messages of all operators that came too late to be applied."""
         return self.lease.stale + sum(one.link.stale for one in self.lease.known())
