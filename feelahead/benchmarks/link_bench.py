@@ -16,7 +16,7 @@ from common.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
 from common.link_figures import report_lines
 from common.link_model import CorrelationModel, LinkModel, LinkProfile, LinkSpec
-from feelahead.benchmarks.link_real import HEADER, Plan, RealRun, run_real
+from feelahead.benchmarks.link_real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link_reference import compare, independent_delays, judge, measure_band, table
 from feelahead.benchmarks.link_samples import LinkSample, play, read_link_sample
 from feelahead.benchmarks.overlap_report import Goal, Table, show, show_goals
@@ -36,7 +36,7 @@ class LinkBenchSettings:
 
     In real time: two processes on this machine send to each other over ZeroMQ, each delaying what it sends. Shown are
     how late messages were released, the processor time, and the delays from sending to reception. With --virtual,
-    nothing waits: the model alone, message by message, the same numbers on every machine.
+    nothing waits: the model alone, message by message, the same on every machine but for the time taken.
 
     Try: feelahead bench link --link "delay 50ms 10ms distribution normal loss 1%" --count 3000
          feelahead bench link --link "delay 50ms 10ms distribution normal" --virtual
@@ -138,8 +138,15 @@ def _virtual(
         sent_s = read_link_sample(settings.sends, "--sends").sent_s.tolist()
     elif reference is not None:
         sent_s = reference.sent_s.tolist()
+    before_s = cpu_s()
     sample, line = play(profile, sent_s, settings.bytes)
+    message_s = (cpu_s() - before_s) / len(sent_s)
     _show_lines(console, {"in virtual time": line.summary()})
+    console.print(
+        f"processor time of the line alone: {1e6 * message_s:.1f} us a message, "
+        f"{200.0 * settings.rate * message_s:.2f} % of a core at {settings.rate:g} Hz both ways",
+        highlight=False,
+    )
     if reference is None:
         return sample
     kept, stalls = reference.without_stalls(profile)

@@ -207,7 +207,7 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
     sent_s = [math.nan] * plan.count
     received_s = [math.nan] * plan.count
     padding = bytes(max(0, plan.size_bytes - HEADER.size))
-    before_s = _cpu_s()
+    before_s = cpu_s()
     number = 0
     next_send_s = start_s
     last_s = start_s + plan.count * plan.period_s + _PATIENCE_S
@@ -239,7 +239,7 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
         if due_s is None and number == plan.count and not ended:
             ended = True
             busy_s = clock.now() - start_s
-            cpu_share = (_cpu_s() - before_s) / busy_s
+            cpu_share = (cpu_s() - before_s) / busy_s
             # A socket that is full of our messages refuses at first.
             for _ in range(100):
                 if link.send(HEADER.pack(_END, now_s)):
@@ -280,7 +280,7 @@ def _go_first(*, realtime: bool) -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
 
-def _cpu_s() -> float:
+def cpu_s() -> float:
     """Processor time of this process with all its threads, in seconds."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
