@@ -126,6 +126,8 @@ class RobotSockets(SocketShell):
         """(peer, payload) of every control message that has arrived, oldest first."""
         if self._authenticator is not None:
             self._authenticator.serve()
+        # Connections that come and go at the view pile up until its socket is asked anything.
+        self._view.getsockopt(zmq.EVENTS)
         if (second := int(self._clock.now())) != self._second:
             self._second = second
             for peer in self._peers.values():
