@@ -423,11 +423,12 @@ def test_a_message_from_the_future_is_counted_and_leaves_the_estimate_in_doubt_u
 def test_delays_longer_than_any_never_reach_the_mean(invented_s: float) -> None:
     generator, clock = np.random.default_rng(26), ahead(4.0)
     offset = ClockOffset(shared_clock=False)
-    end_s = talk(offset, clock, *generator.normal(0.050, 0.005, (2, 2500)))
+    jitter_s = generator.normal(0.050, 0.005, (2, 2500))
+    end_s = talk(offset, clock, jitter_s[0], jitter_s[1])
     offset.arrived(invented_s, end_s)
     assert not offset.update(invented_s, clock(end_s), 0.0, end_s)
     assert offset.rejected == 2
-    end_s = talk(offset, clock, *generator.normal(0.050, 0.005, (2, 500)), start_s=end_s)
+    end_s = talk(offset, clock, jitter_s[0][:500], jitter_s[1][:500], start_s=end_s)
     assert offset.estimator == "mean"
     assert abs(error_s(offset, clock, end_s)) < 0.5e-3
 
