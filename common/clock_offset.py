@@ -40,7 +40,8 @@ class ClockOffset:
         if not 0.0 < max_skew < 0.01:
             raise ValueError(f"max_skew = {max_skew}; valid: above 0 to below 0.01")
         self.round_trip_s: float | None = None
-        """The newest exchange's time both ways without the peer's holding time; None before the first."""
+        """The newest exchange's time both ways without the peer's holding time, of the stamp that arrived last; None
+        before the first."""
         self.rejected = 0
         """Stamps that contradict each other or all that was known."""
         self.jumps = 0
@@ -97,6 +98,7 @@ class ClockOffset:
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
             return False
+        self.round_trip_s = max(0.0, round_trip_s)
         if not self._shared_clock:
             self._take_to_peer(local_sent_s, peer_sent_s - peer_held_s, local_received_s, fair=True)
         return True

@@ -151,6 +151,14 @@ def test_reordering_does_not_pull_the_mean() -> None:
     assert traffic.operator.offset_summary_ms()["estimator"] == "mean"
 
 
+def test_the_round_trip_is_both_ways_together_even_where_messages_overtake_each_other() -> None:
+    traffic = Traffic(Scenario("", JITTER, JITTER, 0.0), seed=4, duration_s=5.0)
+    last_estimates(traffic)
+    assert traffic.robot.round_trip.mean == pytest.approx(0.100, abs=1.5e-3)
+    assert traffic.operator.round_trip.mean == pytest.approx(0.100, abs=1.5e-3)
+    assert traffic.robot.round_trip.sd == pytest.approx(0.010 * math.sqrt(2.0), abs=1e-3)
+
+
 def test_an_asymmetry_that_both_ends_are_told_costs_nothing() -> None:
     nearer = Way("exponential", 0.030, 0.010)
     for told_s, expected_s in ((0.0, 0.010), (0.020, 0.0)):
