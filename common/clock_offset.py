@@ -13,8 +13,10 @@ MAX_SKEW = 600e-6
 by which quartz crystals differ."""
 _CONTRADICTIONS = 8
 """As many in a row in one direction mean that a clock has jumped."""
+_LONGEST_S = 1000.0
+"""No delay is longer; what seems so are stamps that a peer invented, and must not reach any sum."""
 _REMEMBERED_ECHOES = 1024
-"""A second's stamps at 1 kHz: by then no message of before is on its way."""
+"""A second's stamps at 1 kHz; one that is echoed again after that counts twice, which does little harm."""
 _ROUNDING = 1e-15
 """Of the stamps, relative: what four operations on them lose."""
 
@@ -28,8 +30,8 @@ class ClockOffset:
     it. The bound does not trust it. Two processes that read the same clock (`shared_clock`) differ by exactly 0.
 
     A clock that jumps, as after a suspend, starts the estimate anew: as soon as messages seem to arrive before they
-    were sent, or within two blocks of time when both directions shift against each other. Only until then the bound
-    may be wrong.
+    were sent, or within three blocks of time (2.4 s on a link that has been up for a minute) when both directions
+    shift against each other by less than that. Only until then the bound may be wrong.
     """
 
     def __init__(self, *, shared_clock: bool, asymmetry_s: float = 0.0, max_skew: float = MAX_SKEW) -> None:
@@ -38,7 +40,8 @@ class ClockOffset:
         if not 0.0 < max_skew < 0.01:
             raise ValueError(f"max_skew = {max_skew}; valid: above 0 to below 0.01")
         self.round_trip_s: float | None = None
-        """The newest exchange's time both ways without the peer's holding time; None before the first."""
+        """The newest exchange's time both ways without the peer's holding time, of the stamp that arrived last; None
+        before the first."""
         self.rejected = 0
         """Stamps that contradict each other or all that was known."""
         self.jumps = 0
@@ -95,6 +98,7 @@ class ClockOffset:
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
             return False
+        self.round_trip_s = max(0.0, round_trip_s)
         if not self._shared_clock:
             self._take_to_peer(local_sent_s, peer_sent_s - peer_held_s, local_received_s, fair=True)
         return True
@@ -102,7 +106,7 @@ class ClockOffset:
     def _is_possible(self, round_trip_s: float, peer_sent_s: float, held_s: float, received_s: float) -> bool:
         # Two clocks measure the round trip and the holding, and may differ by their skew.
         allowed_s = self._max_skew * held_s + 2.0 * _ROUNDING * abs(received_s)
-        if math.isfinite(peer_sent_s) and held_s >= 0.0 and -allowed_s <= round_trip_s < math.inf:
+        if math.isfinite(peer_sent_s) and held_s >= 0.0 and -allowed_s <= round_trip_s < _LONGEST_S:
             return True
         self.rejected += 1
         return False
@@ -122,7 +126,8 @@ class ClockOffset:
         self._now_s = max(self._now_s, now_s)
         self._interval.advance(now_s)
         difference_s = now_s - (peer_sent_s - self._peer_origin_s)
-        if self._interval.take_least(-difference_s, self._margin(peer_sent_s, local_received_s)):
+        possible = abs(difference_s) < _LONGEST_S
+        if possible and self._interval.take_least(-difference_s, self._margin(peer_sent_s, local_received_s)):
             self._contradictions_from = 0
             self._tracking.from_peer.add(now_s, difference_s)
             return
@@ -145,7 +150,8 @@ class ClockOffset:
             return
         sent_s = local_sent_s - self._origin_s
         difference_s = peer_received_s - self._peer_origin_s - sent_s
-        if self._interval.take_greatest(difference_s, sent_s, self._margin(peer_received_s, now_s)):
+        possible = abs(difference_s) < _LONGEST_S
+        if possible and self._interval.take_greatest(difference_s, sent_s, self._margin(peer_received_s, now_s)):
             self._contradictions_to = 0
             self._tracking.to_peer.add(sent_s, difference_s, fair=fair)
             return

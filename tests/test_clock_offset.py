@@ -419,6 +419,20 @@ def test_a_message_from_the_future_is_counted_and_leaves_the_estimate_in_doubt_u
     assert offset.jumps == 0
 
 
+@pytest.mark.parametrize("invented_s", [-1e300, -1e6])
+def test_delays_longer_than_any_never_reach_the_mean(invented_s: float) -> None:
+    generator, clock = np.random.default_rng(26), ahead(4.0)
+    offset = ClockOffset(shared_clock=False)
+    jitter_s = generator.normal(0.050, 0.005, (2, 2500))
+    end_s = talk(offset, clock, jitter_s[0], jitter_s[1])
+    offset.arrived(invented_s, end_s)
+    assert not offset.update(invented_s, clock(end_s), 0.0, end_s)
+    assert offset.rejected == 2
+    end_s = talk(offset, clock, jitter_s[0][:500], jitter_s[1][:500], start_s=end_s)
+    assert offset.estimator == "mean"
+    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
+
+
 def test_a_holding_time_by_a_fast_clock_is_no_contradiction() -> None:
     offset = ClockOffset(shared_clock=False)
     exchange(offset, 0.0, 1e-6, 10.0, 1e-6, ahead(0.0, 100e-6))

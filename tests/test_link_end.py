@@ -151,6 +151,14 @@ def test_reordering_does_not_pull_the_mean() -> None:
     assert traffic.operator.offset_summary_ms()["estimator"] == "mean"
 
 
+def test_the_round_trip_is_both_ways_together_even_where_messages_overtake_each_other() -> None:
+    traffic = Traffic(Scenario("", JITTER, JITTER, 0.0), seed=4, duration_s=5.0)
+    last_estimates(traffic)
+    assert traffic.robot.round_trip.mean == pytest.approx(0.100, abs=1.5e-3)
+    assert traffic.operator.round_trip.mean == pytest.approx(0.100, abs=1.5e-3)
+    assert traffic.robot.round_trip.sd == pytest.approx(0.010 * math.sqrt(2.0), abs=1e-3)
+
+
 def test_an_asymmetry_that_both_ends_are_told_costs_nothing() -> None:
     nearer = Way("exponential", 0.030, 0.010)
     for told_s, expected_s in ((0.0, 0.010), (0.020, 0.0)):
@@ -253,6 +261,38 @@ def test_a_peer_that_slept_is_followed_and_its_messages_are_not_old_for_ever(sle
     assert ages_s[500] == pytest.approx(slept_s, abs=1e-6)
     assert max(ages_s[520:]) < 1e-6
     assert arrival.one_way_s == pytest.approx(0.02, abs=1e-3)
+
+
+stamp = st.floats(allow_nan=False, allow_infinity=False) | st.floats(0.0, 60.0)
+hold = st.floats(0.0, 1e9) | st.floats(0.0, 0.1)
+invented = st.lists(st.tuples(stamp, stamp, hold, stamp, hold), min_size=1, max_size=12)
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(invented, min_size=1, max_size=4), st.booleans())
+def test_a_peer_that_invents_stamps_spoils_nothing_for_long(
+    bouts: list[list[tuple[float, float, float, float, float]]], shared: bool
+) -> None:
+    robot, operator = ends(robot_clock=CLOCK if shared else "another clock")
+    ahead_s, now_s, sequence = 0.0 if shared else 500.0, 1.0, 10**6
+    robot.arrived(operator.hello(now_s), ahead_s + now_s + 0.02)
+    operator.arrived(robot.hello(ahead_s + now_s + 0.02), now_s + 0.04)
+    for bout in bouts:
+        for sent_s, echo_s, echo_held_s, last_s, last_held_s in bout:
+            sequence, now_s = sequence + 1, now_s + 0.05
+            header = Header(2, sequence, sent_s, echo_s, echo_held_s, last_s, last_held_s)
+            one_way_s = robot.arrived(motion(header), ahead_s + now_s).one_way_s
+            assert one_way_s is None or math.isfinite(one_way_s)
+        for _ in range(40):
+            now_s += 0.05
+            arrival = robot.arrived(motion(operator.stamp(now_s)), ahead_s + now_s + 0.02)
+            operator.arrived(stiffness(robot.stamp(ahead_s + now_s + 0.02)), now_s + 0.04)
+        assert arrival.one_way_s is not None
+        assert 0.0 <= arrival.one_way_s < 0.1
+        bound_s, offset_s = robot.clock_offset.bound_s, robot.clock_offset.offset_s
+        assert bound_s is not None
+        assert offset_s is not None
+        assert abs(offset_s + ahead_s) <= bound_s
 
 
 def test_the_summary_of_a_shared_clock_is_exact_and_that_of_no_peer_is_empty() -> None:

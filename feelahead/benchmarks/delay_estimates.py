@@ -30,10 +30,10 @@ class DelayEstimatesSettings:
     """How well each side knows the other's clock and the delays, against the truth, in virtual time.
 
     Two ends of a link exchange real messages, 1000 a second from the robot and 250 from the operator, between clocks
-    that are up to a day apart and drift by 20 or 100 ppm. After the seconds given, the offset and the one-way delays
-    are compared with the truth, at every arrival the offset's bound is, and what others would have made of the same
-    stamps stands beside. The first link, exponential queues above 50 ms both ways, takes all the runs; the other
-    rows a twentieth each.
+    that are up to a day apart and drift by 20 or 100 ppm. The offset and the one-way delays after the seconds given
+    are compared with the truth, beside what others would have made of the same stamps; whether the bound on the
+    offset held is looked at on every arrival. The first link, exponential queues above 50 ms both ways, takes all
+    the runs; the other rows a twentieth each.
 
     A thousand runs take about four minutes on a core of their own.
 
