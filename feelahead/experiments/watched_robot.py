@@ -27,6 +27,8 @@ from robot_side.settings import RobotSettings
 
 PROGRAM = "python -m feelahead.experiments.watched_robot"
 _PERIOD_S = 0.1
+_PAUSE_S = 0.5
+"""A tick so late means that this process stood still."""
 
 
 class Watch:
@@ -42,6 +44,8 @@ class Watch:
         self._stops = 0
         self._next_s = 0.0
         self._ticks_s: list[float] = []
+        self._ticked_s = 0.0
+        self._told_at_pause = 0
 
     def build(self, settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
         """As robot_side.assembly's, watched."""
@@ -70,6 +74,9 @@ class Watch:
 
     def ticked(self, arm: WatchedArm, now_s: float) -> None:
         """Write down what is new."""
+        if now_s - self._ticked_s > _PAUSE_S:
+            self._told_at_pause = arm.told_to_move
+        self._ticked_s = now_s
         while arm.decelerations:
             one = arm.decelerations.popleft()
             self._write(deceleration=one.time_s, after=one.after_s)
@@ -100,6 +107,7 @@ class Watch:
             "oldest_accepted_s": self._oldest_s,
             "out_of_order": self._out_of_order,
             "told_to_move": arm.told_to_move,
+            "told_since_pause": arm.told_to_move - self._told_at_pause,
             "not_finite": arm.not_finite,
             "speed_rad_s": speed,
             "tick_p99_us": tick_p99_us,
