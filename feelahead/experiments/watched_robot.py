@@ -37,7 +37,7 @@ class Watch:
     def __init__(self, log: TextIO) -> None:
         self._log = log
         self._core: RobotSide | None = None
-        self._accepted_s = 0.0
+        self._previous_s = self._accepted_s = 0.0
         self._oldest_s = 0.0
         self._last_order = (0, 0)
         self._out_of_order = 0
@@ -85,14 +85,16 @@ class Watch:
             return
         stops = core.session.safety.stops
         for when_s, why in list(stops)[self._stops :]:
-            self._write(stop=when_s, why=why, after=when_s - self._accepted_s)
+            # What was accepted in the very moment of the stop came after it.
+            accepted_s = self._accepted_s if self._accepted_s < when_s else self._previous_s
+            self._write(stop=when_s, why=why, after=when_s - accepted_s)
         self._stops = len(stops)
         if now_s >= self._next_s:
             self._next_s = now_s + _PERIOD_S
             self._write(figures=self._figures(core, arm), time=now_s)
 
     def _accepted(self, command: MotionCommand, arrival: Arrival, now_s: float) -> None:
-        self._accepted_s = now_s
+        self._previous_s, self._accepted_s = self._accepted_s, now_s
         self._oldest_s = max(self._oldest_s, arrival.queueing_age_s)
         order = (command.header.epoch, command.header.sequence)
         self._out_of_order += order[0] == self._last_order[0] and order[1] <= self._last_order[1]
