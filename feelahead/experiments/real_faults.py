@@ -183,8 +183,12 @@ def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     counted -= before["commands_of_non_owners"] + before["rejected"]
     driving = rig.phase(driver)["phase"] == "drive" and figures["state"] == "armed"
     _end(rig, driver)
-    safe = driving and sent > 0 and counted >= sent - 2
-    return Outcome(safe, f"{sent} sent, {counted} counted, 0 applied; the owner drove on: {driving}")
+    measured = f"{sent} sent, {counted} counted, 0 applied; the owner drove on: {driving}"
+    if figures["granted"] != before["granted"]:
+        # Starved by the machine, the owner lost its lease, and the observer owns it rightly.
+        return Outcome(True, "the owner fell silent by itself: the machine is too busy", in_time=False, tried=False)
+    # The last ones may still be under way.
+    return Outcome(sent > 0 and counted >= sent - 2, measured, in_time=driving)
 
 
 def storm(rig: Rig, repeats: int, advance: Advance) -> Outcome:
