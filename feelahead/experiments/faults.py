@@ -96,7 +96,9 @@ def command(arguments: Sequence[str]) -> int:
 
 
 def verdict(outcome: Outcome) -> str:
-    """Holds, late, or unsafe."""
+    """Holds, late, unsafe, or not tried, which is no success either."""
+    if not outcome.tried:
+        return "not tried"
     if not outcome.safe:
         return "UNSAFE"
     return "holds" if outcome.in_time else "safe, but late"
@@ -121,8 +123,7 @@ def _try_real(repeats: int, progress: Progress, add: Callable[[str, str, str, Ou
             try:
                 outcome = run(rig, count, lambda: progress.advance(bar))
             except RigError as error:
-                # The machine's fault or the robot's: it was not shown to be safe.
-                outcome = Outcome(False, str(error))
+                outcome = Outcome(False, str(error), tried=False)
                 rig.end_drivers()
             add(name, behaviour, number, outcome)
     progress.update(bar, description="real processes: cable pulled")

@@ -5,7 +5,7 @@ import os
 import signal
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -74,6 +74,15 @@ class Rig:
         for process in self._drivers:
             _end(process)
         self._drivers.clear()
+
+    def rounds(self, count: int, advance: Callable[[], None], limit_s: float) -> Iterator[None]:
+        """So many rounds, or as many as begin within `limit_s`; `advance` is called after each."""
+        deadline_s = self.clock.now() + limit_s
+        for _ in range(count):
+            yield
+            advance()
+            if self.clock.now() > deadline_s:
+                return
 
     def wait(self, duration_s: float) -> None:
         """Let time pass."""

@@ -29,13 +29,12 @@ def slow_viewer(rig: Rig, repeats: int, advance: Callable[[], None]) -> Outcome:
     watched_us: list[float] = []
     rig.figures()
     rig.stops.clear()
-    for _ in range(repeats):
+    for _ in rig.rounds(repeats, advance, 25.0):
         alone_us += _ticks_us(rig)
         with contextlib.ExitStack() as viewers:
             for _ in range(_VIEWERS):
                 viewers.enter_context(_deaf_subscriber(urlsplit(rig.listening["view"]).port or 0))
             watched_us += _ticks_us(rig)
-        advance()
     driving = rig.phase(driver)["phase"] == "drive" and rig.figures()["state"] == "armed"
     stops = "; ".join(rig.stops) or "none"
     driver.stop()

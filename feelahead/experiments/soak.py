@@ -133,6 +133,9 @@ def run_real(settings: SoakSettings, shown: Callable[[float], None]) -> tuple[di
                         side.check()
                         side.events()
                         samples[name].append(sample(side.process_id, settings.minutes * step / _SAMPLES))
+                # Both at once: neither is to take the other's end for a fault of the link.
+                operator.interrupt()
+                robot.interrupt()
                 operator.stop()
                 robot.stop()
         robot_summary, operator_summary = (json.loads(path.read_text(encoding="utf-8")) for path in paths)

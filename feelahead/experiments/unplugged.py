@@ -39,7 +39,7 @@ def unplugged() -> Outcome:
             figures = rig.figures()
             safe = figures["told_to_move"] == told and figures["state"] == "disarmed"
     except NotPermittedError as error:
-        return Outcome(True, f"skipped: {error}")
+        return Outcome(True, f"skipped: {error}", tried=False)
     return onsets.outcome(safe=safe)
 
 

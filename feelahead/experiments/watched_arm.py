@@ -67,7 +67,8 @@ class WatchedArm:
 
     def state(self, now_s: float) -> ArmState:
         """As the arm's."""
-        if 0.0 < now_s - self._asked_s < _LONGEST_WATCHED_S:
+        moving = bool(self.speeds_rad_s) and self.speeds_rad_s[-1][1] > _CRUISE_RAD_S
+        if moving and 0.0 < now_s - self._asked_s < _LONGEST_WATCHED_S:
             # Tick by tick, however late the caller is: the arm goes on by itself, and we are to see when it slows down.
             for step in range(1, int((now_s - self._asked_s) / _STEP_S)):
                 self._watch(self._arm.state(self._asked_s + step * _STEP_S))

@@ -27,6 +27,8 @@ from robot_side.settings import RobotSettings
 
 PROGRAM = "python -m feelahead.experiments.watched_robot"
 _PERIOD_S = 0.1
+_PAUSE_S = 0.5
+"""A tick so late means that this process stood still."""
 
 
 class Watch:
@@ -35,13 +37,15 @@ class Watch:
     def __init__(self, log: TextIO) -> None:
         self._log = log
         self._core: RobotSide | None = None
-        self._accepted_s = 0.0
+        self._previous_s = self._accepted_s = 0.0
         self._oldest_s = 0.0
         self._last_order = (0, 0)
         self._out_of_order = 0
         self._stops = 0
         self._next_s = 0.0
         self._ticks_s: list[float] = []
+        self._ticked_s = 0.0
+        self._told_at_pause = 0
 
     def build(self, settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
         """As robot_side.assembly's, watched."""
@@ -70,6 +74,9 @@ class Watch:
 
     def ticked(self, arm: WatchedArm, now_s: float) -> None:
         """Write down what is new."""
+        if now_s - self._ticked_s > _PAUSE_S:
+            self._told_at_pause = arm.told_to_move
+        self._ticked_s = now_s
         while arm.decelerations:
             one = arm.decelerations.popleft()
             self._write(deceleration=one.time_s, after=one.after_s)
@@ -78,14 +85,16 @@ class Watch:
             return
         stops = core.session.safety.stops
         for when_s, why in list(stops)[self._stops :]:
-            self._write(stop=when_s, why=why, after=when_s - self._accepted_s)
+            # What was accepted in the very moment of the stop came after it.
+            accepted_s = self._accepted_s if self._accepted_s < when_s else self._previous_s
+            self._write(stop=when_s, why=why, after=when_s - accepted_s)
         self._stops = len(stops)
         if now_s >= self._next_s:
             self._next_s = now_s + _PERIOD_S
             self._write(figures=self._figures(core, arm), time=now_s)
 
     def _accepted(self, command: MotionCommand, arrival: Arrival, now_s: float) -> None:
-        self._accepted_s = now_s
+        self._previous_s, self._accepted_s = self._accepted_s, now_s
         self._oldest_s = max(self._oldest_s, arrival.queueing_age_s)
         order = (command.header.epoch, command.header.sequence)
         self._out_of_order += order[0] == self._last_order[0] and order[1] <= self._last_order[1]
@@ -100,6 +109,7 @@ class Watch:
             "oldest_accepted_s": self._oldest_s,
             "out_of_order": self._out_of_order,
             "told_to_move": arm.told_to_move,
+            "told_since_pause": arm.told_to_move - self._told_at_pause,
             "not_finite": arm.not_finite,
             "speed_rad_s": speed,
             "tick_p99_us": tick_p99_us,
