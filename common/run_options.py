@@ -8,6 +8,9 @@ import tyro
 
 from common.link_model import CorrelationModel, LinkModel, LinkSpec
 from common.status import StatusMode
+from common.units import parse_duration
+
+_LARGEST_ASYMMETRY_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,9 @@ class RunOptions:
     link_correlation: CorrelationModel = "netem"
     """What a correlation in the link means: netem's own, which makes loss rarer and leaves delays independent, or a
     proper one, which keeps shares and distributions."""
+    asymmetry: Annotated[str, tyro.conf.arg(metavar="TIME")] = "0ms"
+    """By how much the least delay to the robot exceeds that to the operator (12ms, or -12ms), where that is known from
+    elsewhere: no exchange of messages between two clocks can tell. Half of it would be an error of the offset."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after this long; without it, at Ctrl-C."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
@@ -38,6 +44,10 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         self.link_spec()
+        if abs(self.asymmetry_s()) > _LARGEST_ASYMMETRY_S:
+            raise ValueError(
+                f"--asymmetry {self.asymmetry}: valid: -{_LARGEST_ASYMMETRY_S:g}s to {_LARGEST_ASYMMETRY_S:g}s"
+            )
         if self.duration is not None and not 0.0 < self.duration < 1e6:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
@@ -50,3 +60,8 @@ class RunOptions:
     def link_spec(self) -> LinkSpec:
         """The emulated link, with this run's seed; ConfigurationError for a bad one."""
         return LinkSpec.parse(self.link, max(0, self.seed), self.link_model, self.link_correlation)
+
+    def asymmetry_s(self) -> float:
+        """`asymmetry` in seconds, with its sign; ConfigurationError for what is no time."""
+        text = self.asymmetry.strip()
+        return -parse_duration(text[1:], "--asymmetry") if text.startswith("-") else parse_duration(text, "--asymmetry")

@@ -50,6 +50,7 @@ class Loopback:
             haptics=settings.operator.haptics,
             calibration=settings.operator.calibration,
             seed=settings.operator.seed,
+            asymmetry_s=settings.operator.asymmetry_s(),
         )
         self.device = SimulatedDualSense()
         self.person = SimulatedOperator(

@@ -41,8 +41,10 @@ class OperatorSide:
         haptics: bool = True,
         calibration: TravelCalibration | None = None,
         seed: int = 0,
+        asymmetry_s: float = 0.0,
     ) -> None:
-        self.link = LinkEnd("operator", epoch, clock_domain, seed)
+        """`asymmetry_s`: see LinkEnd."""
+        self.link = LinkEnd("operator", epoch, clock_domain, seed, asymmetry_s)
         self.screen: Telemetry | None = None
         """The newest view of the robot; None before the first."""
         self.stiffness: StiffnessUpdate | None = None

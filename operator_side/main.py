@@ -41,6 +41,7 @@ def command(arguments: Sequence[str]) -> int:
         haptics=settings.haptics,
         calibration=settings.calibration,
         seed=settings.seed,
+        asymmetry_s=settings.asymmetry_s(),
     )
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))

@@ -83,7 +83,9 @@ def build_robot_side(
             encoder_sigma_rad,
         ),
         OperatorSession(
-            lambda: LinkEnd("robot", epoch, clock_domain, settings.seed), Safety(settings.safety), settings.seed
+            lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
+            Safety(settings.safety),
+            settings.seed,
         ),
         LoopAge(settings.assumed_delay_s),
         np.full(arm.joint_count, limits.velocity_rad_s),

@@ -64,6 +64,8 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (ROBOT, ["--duration", "-3"], "-3", "above 0"),
         (OPERATOR, ["--device", "keyboard"], "keyboard", "simulated"),
         (DEMO, ["--link", "dealy 5ms"], "dealy", "delay"),
+        (ROBOT, ["--asymmetry", "12"], "'12'", "50ms"),
+        (OPERATOR, ["--asymmetry=-11s"], "-11s", "10s"),
         (DEMO, ["--duration", "soon"], "soon", "a number"),
         (feelahead.main.command, ["dmeo"], "dmeo", "demo"),
     ],

@@ -107,3 +107,8 @@ def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> No
         parse_settings(OperatorSettings, "operator", arguments)
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("0ms", 0.0), ("12ms", 0.012), ("-12ms", -0.012), ("-2s", -2.0)])
+def test_an_asymmetry_has_a_sign(text: str, seconds: float) -> None:
+    assert OperatorSettings(asymmetry=text).asymmetry_s() == pytest.approx(seconds)
