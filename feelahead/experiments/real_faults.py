@@ -13,6 +13,7 @@ from common.clock import clock_domain
 from common.codec import decode, encode
 from common.link_end import LinkEnd
 from common.messages import Header, LeaseNotice, MotionCommand
+from common.session import OWNING
 from common.sockets import OperatorSockets
 from feelahead.experiments.cable import Cable
 from feelahead.experiments.fault import Outcome
@@ -22,7 +23,6 @@ from robot_side.safety import SafetySettings
 
 T_S = SafetySettings().gap_s
 _AGE_LIMIT_S = SafetySettings().age_s + SafetySettings().jitter_s
-_OWNING = ("disarmed", "ready", "armed", "stopped", "stopped_ready")
 _RESTING_RAD_S = 0.01
 P99_S, MOST_S = T_S + 0.005, T_S + 0.020
 
@@ -68,15 +68,17 @@ def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     passed_s = []
     driver = rig.driver()
     for _ in rig.rounds(repeats, advance, 50.0):
-        rig.drive(driver)
+        rig.until(driver, "session", *OWNING)
         successor = rig.driver()
         rig.until(successor, "session", "observing")
+        rig.drive(driver)
         rig.lines()
         killed_s = rig.clock.now()
         rig.signal(driver, signal.SIGKILL)
         onsets.take(rig)
         rig.wait(0.1)
-        passed_s.append(rig.until(successor, "session", *_OWNING)["time_s"] - killed_s)
+        rig.until(successor, "session", *OWNING)
+        passed_s.append(rig.owned_s[successor.process_id] - killed_s)
         safe &= _stands(rig.figures())
         driver = successor
     _end(rig, driver)

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from common.clock import MonotonicClock
 from common.errors import FeelaheadError
+from common.session import OWNING
 from feelahead.processes import SideProcess
 
 HEALTHY_S = 0.2
@@ -41,6 +42,8 @@ class Rig:
         self._rest = ""
         self._drivers: list[SideProcess] = []
         self._started = 0
+        self.owned_s: dict[int, float] = {}
+        """When each driver, by its process, learnt last that it owns the lease."""
         self._phases: dict[int, dict[str, Any]] = {}
         self._pause = threading.Event()
         self.stops: list[str] = []
@@ -107,6 +110,9 @@ class Rig:
         """What the driver said last of its hands and its session."""
         for event in driver.events():
             if event["event"] == "driver":
+                before = self._phases.get(driver.process_id, {}).get("session")
+                if event["session"] in OWNING and before not in OWNING:
+                    self.owned_s[driver.process_id] = event["time_s"]
                 self._phases[driver.process_id] = event
         return self._phases.get(driver.process_id, {"phase": "start", "session": "none", "time_s": 0.0})
 
@@ -122,7 +128,7 @@ class Rig:
 
     def drive(self, driver: SideProcess) -> None:
         """Have it own, arm and drive, until the arm moves evenly; anew when a busy machine breaks the stream."""
-        self.until(driver, "session", "disarmed", "ready", "armed", "stopped", "stopped_ready")
+        self.until(driver, "session", *OWNING)
         for _ in range(_ATTEMPTS):
             self.signal(driver, signal.SIGUSR1)
             self.until(driver, "phase", "drive")

