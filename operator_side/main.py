@@ -114,12 +114,14 @@ class _Loop:
             self._start_s = self._clock.now()
             self._pacer.restart(self._start_s)
             while not stop.is_set:
+                received, seen = self._sockets.receive(), self._sockets.receive_view()
+                # Read after receiving: what waited while this process was stopped is as old as it is.
                 now_s = self._clock.now()
                 if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
                     break
-                for payload in self._sockets.receive():
+                for payload in received:
                     self._core.receive(payload, now_s)
-                for _, payload in self._sockets.receive_view():
+                for _, payload in seen:
                     self._core.receive_view(payload, now_s)
                 if (output := self._core.output_report(now_s)) is not None:
                     self._device.write(output, now_s)

@@ -122,10 +122,12 @@ class _Loop:
             self._start_s = self._clock.now()
             self._pacer.restart(self._start_s)
             while not stop.is_set:
+                received = self._sockets.receive()
+                # Read after receiving: a process that was stopped in between must not take old commands for new.
                 now_s = self._clock.now()
                 if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
                     break
-                for peer, payload in self._admission.admitted(self._sockets.receive(), self._core.session.owner_peer):
+                for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
                     self._core.receive(peer, payload, now_s)
                 ticked = self._pacer.due(now_s)
                 if ticked:
