@@ -14,12 +14,11 @@ from feelahead.benchmarks.overlap_classes import MAKERS
 from feelahead.benchmarks.overlap_pairs import Pairs, Solid
 from feelahead.benchmarks.overlap_peers import HeaderPeer, PythonPeer
 from feelahead.benchmarks.overlap_report import Report, Table, short
-from feelahead.benchmarks.overlap_timing import available_cores, nanoseconds_each, one_core
+from feelahead.benchmarks.overlap_timing import ROUNDS, available_cores, nanoseconds_each, one_core
 
 TIMED_SOLIDS: tuple[Solid, ...] = ("tetrahedron", "box")
 _ATTEMPTS = 40
 """How often as many pairs again are drawn, to choose from."""
-_ROUNDS = 3
 _CALLS = 500
 """Pairs timed a call each."""
 
@@ -98,7 +97,7 @@ def measure_speed(
 def _measure_in_turns(report: Report, timed: list[Timed], solid: Solid, case: str) -> None:
     """Each method's best round."""
     times: dict[str, float] = {}
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         for measure in timed:
             for method, each_ns in measure().items():
                 times[method] = min(each_ns, times.get(method, each_ns))
@@ -165,7 +164,7 @@ def _table(report: Report, python_peer: PythonPeer, header_peer: HeaderPeer, cou
         "Run time, ns a pair",
         headings,
         rows,
-        f"On one core, but for the threads: the best of {_ROUNDS} rounds of medians, on {count} pairs that are the "
+        f"On one core, but for the threads: the best of {ROUNDS} rounds of medians, on {count} pairs that are the "
         "same for every method. Ours: the kernels are what a tick calls, the checked functions validate and "
         "broadcast their arguments as well. The package: prebuilt objects, building them apart." + absent,
     )

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator
 
 from common.clock import Clock
 
+ROUNDS = 3
+"""So many times each measurement is made, the best of which counts: other work on the machine comes in bursts."""
+
 
 def nanoseconds_each(run: Callable[[], object], count: int, repeats: int, clock: Clock) -> float:
     """The median over `repeats` calls of the time that `run` takes for each of `count` pairs, after one call more."""
