@@ -60,7 +60,8 @@ class Status:
 
     def event(self, kind: str, **values: Value) -> None:
         """One line of JSON, in the JSON mode only, at once."""
-        if self._mode == "json":
+        # Without a standard output, whoever read it has gone.
+        if self._mode == "json" and sys.stdout is not None:
             sys.stdout.write(json.dumps({"event": kind, **values}) + "\n")
             sys.stdout.flush()
 

@@ -76,7 +76,7 @@ def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
     with start("--duration", "60", "--status", "json") as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        assert json.loads(process.stdout.readline())["event"] == "started"
+        assert json.loads(process.stdout.readline())["event"] == "note"
         process.stdout.close()
         complaint = process.stderr.read()
         code = process.wait(timeout=120)
@@ -87,7 +87,12 @@ def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
 def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) -> None:
     with start("--duration", "60", "--status", "json", "--summary", str(tmp_path / "out.json")) as process:
         assert process.stdout is not None
-        assert json.loads(process.stdout.readline())["side"] == "robot"
+        assert json.loads(process.stdout.readline())["event"] == "note"
+        assert json.loads(process.stdout.readline()) | {"process_id": 0} == {
+            "event": "started",
+            "side": "robot",
+            "process_id": 0,
+        }
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=20)
     assert (process.returncode, complaint) == (0, "")

@@ -1,5 +1,6 @@
 """The soak's own judgement; the soak itself is `python -m feelahead.experiments.soak`."""
 
+import re
 import subprocess
 import sys
 
@@ -33,7 +34,10 @@ def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None
     assert command(["--minutes", "0.02", "--virtual"]) == 0
     said = capsys.readouterr().out
     assert "flat" in said.splitlines()[-1]
-    assert "'motion_sent': 290" in said
+    sent = re.search(r"'motion_sent': (\d+)", said)
+    assert sent is not None
+    # At 250 Hz, but for the first round trip.
+    assert 250 < int(sent[1]) <= 300
 
 
 @pytest.mark.parametrize(

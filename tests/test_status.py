@@ -70,7 +70,7 @@ def test_values_are_written_for_people(capsys: pytest.CaptureFixture[str]) -> No
     assert shown(capsys) == ["robot  L2 0.50  R2 0.33  n 12  held –  armed yes  far no  at [up]"]
 
 
-def test_notes_are_for_people_and_events_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_notes_are_for_people_and_programs_and_events_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
     text = "listening at [bold]tcp://127.0.0.1:5555[/bold]" + ", and so on" * 30
     modes: tuple[StatusMode, ...] = ("line", "json", "none")
     of_mode = {}
@@ -80,7 +80,8 @@ def test_notes_are_for_people_and_events_for_programs(capsys: pytest.CaptureFixt
             status.event("listening")
         of_mode[mode] = shown(capsys)
     # Long notes are not broken into lines, and brackets are no markup.
-    assert of_mode == {"line": [f"robot: {text}"], "json": ['{"event": "listening"}'], "none": []}
+    of_programs = [json.dumps({"event": "note", "text": text}), '{"event": "listening"}']
+    assert of_mode == {"line": [f"robot: {text}"], "json": of_programs, "none": []}
 
 
 def test_nothing_is_due_when_nothing_is_shown(capsys: pytest.CaptureFixture[str]) -> None:

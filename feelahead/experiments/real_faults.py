@@ -185,12 +185,14 @@ def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     counted -= before["commands_of_non_owners"] + before["rejected"]
     driving = rig.phase(driver)["phase"] == "drive" and figures["state"] == "armed"
     _end(rig, driver)
-    measured = f"{sent} sent, {counted} counted, 0 applied; the owner drove on: {driving}"
+    # The owner's epoch is known since it began to drive.
+    applied = figures["epochs_applied"] - before["epochs_applied"]
+    measured = f"{sent} sent, {counted} counted, {applied} applied; the owner drove on: {driving}"
     if figures["granted"] != before["granted"]:
         # Starved by the machine, the owner lost its lease, and the observer owns it rightly.
         return Outcome(True, "the owner fell silent by itself: the machine is too busy", in_time=False, tried=False)
-    # The last ones may still be under way.
-    return Outcome(sent > 0 and counted >= sent - 2, measured, in_time=driving)
+    # What comes too fast for a tick is dropped unread, before anything counts it; the last ones may be under way.
+    return Outcome(sent > 0 and applied == 0 and counted >= 0.9 * sent, measured, in_time=driving)
 
 
 def storm(rig: Rig, repeats: int, advance: Advance) -> Outcome:

@@ -40,6 +40,7 @@ class Watch:
         self._previous_s = self._accepted_s = 0.0
         self._oldest_s = 0.0
         self._last_order = (0, 0)
+        self._epochs: set[int] = set()
         self._out_of_order = 0
         self._stops = 0
         self._next_s = 0.0
@@ -99,6 +100,7 @@ class Watch:
         order = (command.header.epoch, command.header.sequence)
         self._out_of_order += order[0] == self._last_order[0] and order[1] <= self._last_order[1]
         self._last_order = order
+        self._epochs.add(order[0])
 
     def _figures(self, core: RobotSide, arm: WatchedArm) -> dict[str, Any]:
         tick_p99_us = 1e6 * float(np.quantile(self._ticks_s, 0.99)) if self._ticks_s else 0.0
@@ -108,6 +110,7 @@ class Watch:
             "state": core.session.safety.state,
             "oldest_accepted_s": self._oldest_s,
             "out_of_order": self._out_of_order,
+            "epochs_applied": len(self._epochs),
             "told_to_move": arm.told_to_move,
             "told_since_pause": arm.told_to_move - self._told_at_pause,
             "not_finite": arm.not_finite,
