@@ -87,6 +87,12 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except FeelaheadError as error:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
+    except OSError as error:
+        if error.filename is None:
+            raise
+        # A file or folder that somebody named, and that the system does not let us at.
+        print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
+        code = 2
     except KeyboardInterrupt:
         code = 0
     # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.

@@ -138,11 +138,21 @@ class KeyFolder:
         if not path.is_file():
             names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
             raise ConfigurationError(f"name {name!r}: no such peer in {self.allowed_path}; valid: {names}")
+        key = _read_key(path, "allowed")
         path.unlink()
+        if (other := self.allowed().get(key)) is not None:
+            raise ConfigurationError(
+                f"{name} is gone, but the same key is still let in as {other}; "
+                f"valid: `{self.command(f'revoke {other}')}`, too"
+            )
 
     def allowed(self) -> dict[str, str]:
         """The name of each key that is let in; ConfigurationError for a file without one or an open folder."""
-        return {_read_key(path, "allowed"): path.stem for path in self._peer_files()}
+        names: dict[str, str] = {}
+        for path in self._peer_files():
+            key = _read_key(path, "allowed")
+            names[key] = f"{names[key]}, {path.stem}" if key in names else path.stem
+        return names
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
         """What changes whenever the peers do: each file's name, time of change and number, without reading any."""
@@ -163,10 +173,17 @@ class KeyFolder:
         return self.allowed_path / f"{checked_name(name)}.public"
 
     def _peer_files(self) -> list[Path]:
-        if not self.allowed_path.is_dir():
+        try:
+            # glob would take a folder that may not be read for an empty one.
+            paths = sorted(self.allowed_path.iterdir())
+        except FileNotFoundError:
             return []
+        except OSError as error:
+            raise ConfigurationError(
+                f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder of this user's, mode 0700"
+            ) from error
         _refuse_writable(self.allowed_path)
-        files = [path for path in self.allowed_path.glob("*.public") if _NAME.fullmatch(path.stem)]
+        files = [path for path in paths if path.suffix == ".public" and _NAME.fullmatch(path.stem)]
         if len(files) > PEER_LIMIT:
             raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
         return files
@@ -209,6 +226,9 @@ class AllowList:
 
 def _read_key(path: Path, what: str) -> str:
     try:
+        # Opening a pipe would wait for ever.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise ConfigurationError(f"{what}: {path} is no file; valid: a key file")
         with path.open(encoding="ascii") as file:
             content = file.read(_FILE_LIMIT_BYTES)
     except (OSError, UnicodeDecodeError) as error:

@@ -38,6 +38,10 @@ Corrupt = Callable[[Item, BitFlip], Item]
 
 _MOST_RETRANSMISSIONS = 1000
 
+_MOST_OUTAGES_ON_END = 1000
+_MOST_SLOTS = 1000
+"""A message due after so many of the shortest slots has a slot of its own: what lies between is not drawn."""
+
 
 class DelayLine(Generic[Item]):
     """Takes messages in, and gives them out when they are due: fewer, more, altered or in another order.
@@ -253,8 +257,8 @@ class DelayLine(Generic[Item]):
         return start_s + max(ends_s) if ends_s else None
 
     def _after_outage_s(self, now_s: float) -> float:
-        # One outage may end within another.
-        for _ in self._outages:
+        # One outage may end within another, and that within the next time of the first.
+        for _ in range(_MOST_OUTAGES_ON_END):
             if (end_s := self._outage_end_s(now_s)) is None or end_s <= now_s:
                 break
             now_s = end_s
@@ -274,6 +278,8 @@ class _Slots:
         times_s = self._times_s
         if not times_s or times_s[-1] < now_s:
             self._times_s = times_s = [now_s + self._gap_s()]
+        if due_s - times_s[-1] > _MOST_SLOTS * self._slot.least_s:
+            times_s.append(due_s)
         while times_s[-1] < due_s:
             times_s.append(times_s[-1] + self._gap_s())
         del times_s[: bisect_left(times_s, now_s)]

@@ -19,6 +19,9 @@ _SHORTEST_SLOT_S = 1e-4
 _RECOVERY_ROUND_TRIPS = 1.25
 _MOST_RETRANSMITTED = 0.99
 
+LONGEST_S = 1e6
+"""No delay or jitter is longer: eleven days."""
+
 
 @dataclass(frozen=True)
 class Chance:
@@ -45,8 +48,8 @@ class Rate:
     cell_overhead_bytes: int = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.bits_per_second < math.inf:
-            raise ValueError(f"bits_per_second = {self.bits_per_second}; valid: above 0")
+        if not 1.0 <= self.bits_per_second < math.inf:
+            raise ValueError(f"bits_per_second = {self.bits_per_second}; valid: 1 or more")
         if self.cell_bytes < 0 or self.cell_bytes + self.cell_overhead_bytes < 0:
             raise ValueError(f"cell_bytes = {self.cell_bytes}, cell_overhead_bytes = {self.cell_overhead_bytes}")
 
@@ -108,9 +111,9 @@ class Outage:
 class LinkProfile:
     """Everything that one direction of one stream does to messages, after netem.
 
-    The model `datagram` loses, doubles and reorders messages, as UDP sees it. `stream` delivers every message
-    once and in order, as TCP does: nothing is due before what was sent earlier; a lost or corrupted message is
-    sent again `recovery_s` later, as often as it takes; duplicates and reordering do not show.
+    The model `datagram` loses, doubles and reorders messages, as UDP sees it. `stream` delivers every message that
+    its queue has room for, once and in order, as TCP does: nothing is due before what was sent earlier; a lost or
+    corrupted message is sent again `recovery_s` later, as often as it takes; duplicates and reordering do not show.
     """
 
     delay_s: float = 0.0
@@ -143,8 +146,8 @@ class LinkProfile:
     def __post_init__(self) -> None:
         for name in ("delay_s", "jitter_s"):
             seconds = getattr(self, name)
-            if not (math.isfinite(seconds) and seconds >= 0.0):
-                raise ValueError(f"{name} = {seconds} is negative or not finite; valid: 0 or more seconds")
+            if not 0.0 <= seconds <= LONGEST_S:
+                raise ValueError(f"{name} = {seconds} is negative, too long or no number; valid: 0 to {LONGEST_S:g} s")
         if not (isinstance(self.distribution, DelayTable) or self.distribution in get_args(Distribution)):
             raise ValueError(f"distribution = {self.distribution!r}; valid: {choices(Distribution)}, or a table")
         for name in ("gap", "limit"):
@@ -154,8 +157,8 @@ class LinkProfile:
             raise ValueError(f"delay_correlation = {self.delay_correlation}; valid: 0 to 1")
         for name in ("retransmit_s", "round_trip_s"):
             optional_s: float | None = getattr(self, name)
-            if optional_s is not None and not 0.0 <= optional_s < math.inf:
-                raise ValueError(f"{name} = {optional_s}; valid: 0 or more seconds, or None")
+            if optional_s is not None and not 0.0 <= optional_s <= 4.0 * LONGEST_S:
+                raise ValueError(f"{name} = {optional_s}; valid: 0 to {4.0 * LONGEST_S:g} s, or None")
         if self.model == "stream" and self.retransmitted_share() > _MOST_RETRANSMITTED:
             raise ValueError("loss of all messages; valid in a stream, which sends lost ones again: below 99%")
         check_seed_and_models(self.seed, self.model, self.correlation_model)

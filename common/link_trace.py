@@ -65,6 +65,10 @@ def read_samples(path: Path, field: str) -> list[Sample]:
         raise ConfigurationError(
             f"{field}: {str(path)!r} cannot be read: {reason}; valid: a CSV with {_COLUMNS}"
         ) from error
+    if max(map(len, lines), default=0) > csv.field_size_limit():
+        raise ConfigurationError(
+            f"{field}: {str(path)!r} has a line of {max(map(len, lines))} characters; valid: a CSV"
+        )
     table = csv.DictReader(lines)
     names = set(table.fieldnames or ())
     if not ("delay_ns" in names or {"sent_ns", "received_ns"} <= names):

@@ -12,6 +12,8 @@ _NICENESS = -10
 _REALTIME_PRIORITY = 20
 """Before every ordinary program, behind the kernel's own interrupt threads (50)."""
 _PR_SET_TIMERSLACK = 29
+_CAP_IPC_LOCK = 14
+"""linux/capability.h"""
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 """linux/prctl.h and asm-generic/mman.h."""
 
@@ -54,10 +56,18 @@ def raise_descriptor_limit() -> None:
 def _lock_memory() -> bool:
     # With a limit, memory that is wanted later could not be had at all: worse than being swapped out.
     unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
-    if not (unlimited or os.geteuid() == 0):
+    if not (unlimited or _may_lock_without_limit()):
         return False
     # Only what is used: the stacks of all threads would be hundreds of megabytes.
     return bool(_libc().mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0)
+
+
+def _may_lock_without_limit() -> bool:
+    """Whether this process has CAP_IPC_LOCK, for which the limit does not count."""
+    for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
+        if line.startswith("CapEff:"):
+            return bool(int(line.split()[1], 16) >> _CAP_IPC_LOCK & 1)
+    return False
 
 
 def _threads() -> list[int]:
@@ -74,5 +84,5 @@ def _permit(capability: str) -> str:
         return f"docker run --cap-add={capability.removeprefix('cap_').upper()} ..."
     return (
         f"echo '{os.environ.get('USER', 'YOU')} - {limit}' | sudo tee -a /etc/security/limits.d/feelahead.conf, "
-        f"then log in again (or: sudo setcap {capability}+ep {Path(sys.executable).resolve()})"
+        f"then log in again (or: sudo setcap cap_sys_nice,cap_ipc_lock+ep {Path(sys.executable).resolve()})"
     )

@@ -1,5 +1,6 @@
 """SIGINT and SIGTERM as a flag that the main loop reads, so that every exit goes the same clean way."""
 
+import os
 import signal
 import sys
 from types import FrameType, TracebackType
@@ -36,3 +37,20 @@ class StopSignal:
 def ignore_broken_output() -> None:
     """After a reader of our standard output went away: keep the interpreter's last flush from complaining."""
     sys.stdout = None
+
+
+def leave_at_once_on_signals() -> None:
+    """Until a `StopSignal` opens, a stop signal ends the process on the spot, with code 0.
+
+    An exception could be lost in a compiler's callback, and the process would go on.
+    """
+    for number in StopSignal._SIGNALS:
+        signal.signal(number, _leave)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    if sys.__stdout__ is not None and sys.__stdout__.isatty():
+        sys.__stdout__.write("\x1b[?25h")  # a live line hides the cursor
+        sys.__stdout__.flush()
+    os._exit(0)

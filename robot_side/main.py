@@ -20,7 +20,7 @@ from common.priority import make_realtime, raise_descriptor_limit, raise_priorit
 from common.sockets import RobotSockets
 from common.statistics import RunningStatistics
 from common.status import Status
-from common.stop_signal import StopSignal, ignore_broken_output
+from common.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
 from robot_side.assembly import build_robot_side
 from robot_side.core import Outgoing, RobotSide
 from robot_side.overlap.kernels import warm_up
@@ -45,6 +45,8 @@ def command(arguments: Sequence[str]) -> int:
     link = settings.link_spec()
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
+    # Nothing moves yet, and a compilation cannot be asked to stop.
+    leave_at_once_on_signals()
     # The sockets first: a port that is taken is found out before the kernels are compiled.
     with (
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
@@ -54,7 +56,6 @@ def command(arguments: Sequence[str]) -> int:
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
-        # Until here a signal ends the process at once, for a compilation cannot be asked to stop.
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             for text in _admission_notes(settings, keys):

@@ -196,3 +196,37 @@ def test_a_folder_that_vanished_lets_nobody_in(folder: KeyFolder) -> None:
     folder.allowed_path.rename(folder.path / "elsewhere")
     assert allowed.refresh() == {KEY}
     assert allowed.names == {}
+
+
+def test_a_pipe_among_the_peers_lets_nobody_in_and_holds_nobody_up(folder: KeyFolder) -> None:
+    folder.allow("alice", KEY)
+    os.mkfifo(folder.allowed_path / "x.public")
+    peers = AllowList(folder)
+    peers.refresh()
+    assert peers.names == {}
+    assert "is no file" in str(peers.unreadable)
+
+
+def test_a_list_that_cannot_be_read_is_not_taken_for_an_empty_one(
+    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.allow("alice", KEY)
+    peers = AllowList(folder)
+    peers.refresh()
+
+    def closed(path: Path) -> list[Path]:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    # Tests may run as root, whom no mode keeps out.
+    monkeypatch.setattr(Path, "iterdir", closed)
+    assert peers.refresh() == {KEY}
+    assert "Permission denied" in str(peers.unreadable)
+
+
+def test_a_key_that_is_let_in_twice_is_named_when_one_name_is_revoked(folder: KeyFolder) -> None:
+    folder.allow("alice", KEY)
+    (folder.allowed_path / "zed.public").write_text(KEY + "\n")
+    assert folder.allowed() == {KEY: "alice, zed"}
+    assert "still let in as zed" in complaint(lambda: folder.revoke("alice"))
+    folder.revoke("zed")
+    assert folder.allowed() == {}

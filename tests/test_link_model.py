@@ -280,3 +280,27 @@ def test_unknown_directions_and_streams_are_refused() -> None:
         LinkSpec.parse("").profile("to_mars")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="'smell'; valid: haptics, telemetry, video"):
         LinkSpec.parse("").profile("to_robot", "smell")  # type: ignore[arg-type]
+
+
+def test_an_outage_that_ends_within_another_is_waited_out_to_the_end() -> None:
+    spec = "outage 2s at 0s every 3s outage 1500ms at 1900ms"
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse(spec, model="stream"))
+    line.push(0.0, b"x")
+    # 0 to 2, 1.9 to 3.4, 3 to 5
+    assert line.next_due() == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("spec", ["rate 1bit slot 0.1ms", "delay 1000000s slot 1ms", "rate 10kbit slot 0.1ms 0.2ms"])
+def test_slots_far_ahead_take_neither_time_nor_memory(spec: str) -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse(spec))
+    for number in range(200):
+        line.push(1e-3 * number, b"x" * 142)
+    due_s = line.next_due()
+    assert due_s is not None
+    assert 0.1 <= due_s < 1e7
+
+
+@pytest.mark.parametrize("spec", ["delay 1e308s", "delay 1s 1e20s 50%", "rate 1e-320bit", "delay 2000000s"])
+def test_what_no_run_outlasts_is_refused(spec: str) -> None:
+    with pytest.raises(ConfigurationError, match="valid: "):
+        LinkProfile.parse(spec)

@@ -124,3 +124,18 @@ def test_a_reader_that_went_away_leaves_no_complaint(handling: str, quiet: bool)
         code = process.wait(timeout=20)
     assert (complaint == "") is quiet
     assert (code == 0) is quiet
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("number", BOTH)
+def test_until_then_a_signal_ends_the_process_even_in_a_callback(number: signal.Signals) -> None:
+    program = (
+        "import ctypes, signal\n"
+        "from common.stop_signal import leave_at_once_on_signals\n"
+        "leave_at_once_on_signals()\n"
+        f"call = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal({int(number)}))\n"
+        "call()\n"
+        "print('went on')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60.0)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

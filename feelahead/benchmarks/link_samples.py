@@ -107,8 +107,13 @@ def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tupl
 
 
 def distance(one: LinkSample, other: LinkSample) -> float:
-    """The Kolmogorov-Smirnov statistic D of their delays: the widest gap between the distribution functions."""
+    """The Kolmogorov-Smirnov statistic D of their delays: the widest gap between the distribution functions.
+
+    1 if nothing arrives of one of them, which then has no distribution.
+    """
     first, second = np.sort(one.arrived_s), np.sort(other.arrived_s)
+    if first.size == 0 or second.size == 0:
+        return 1.0
     values = np.concatenate([first, second])
     return float(
         np.max(
