@@ -15,6 +15,7 @@ import msgspec
 import tyro
 
 from common.errors import ConfigurationError, FeelaheadError
+from common.stop_signal import STOP_SIGNALS
 
 Settings = TypeVar("Settings")
 
@@ -96,7 +97,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         code = 0
     # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
 

@@ -1,6 +1,7 @@
 """The first moments of a command, before anything large is imported: signals, output, and what is not installed.
 
-Only the standard library is imported here, so that a Ctrl-C right after the start meets a handler.
+Only the standard library is imported here, and what itself imports nothing else, so that a Ctrl-C right after the
+start meets a handler.
 """
 
 import importlib.metadata
@@ -10,9 +11,10 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
+from common.stop_signal import STOP_SIGNALS, leave_at_once_on_signals
+
 Command = Callable[[Sequence[str]], int]
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OURS = ("common", "robot_side", "operator_side", "feelahead")
 _BAD_INPUT = 2
 
@@ -24,8 +26,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
     that is not installed becomes one line that names `extra`, the optional dependencies to install. `--version`
     needs no import at all.
     """
-    for number in _SIGNALS:
-        signal.signal(number, _leave_at_once)
+    leave_at_once_on_signals()
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
         sys.stdout.write(f"{program} {importlib.metadata.version('feelahead')}\n")
@@ -40,7 +41,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
         wanted = "feelahead" if extra is None else f"feelahead[{extra}]"
         sys.stderr.write(f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}'\n")
         sys.exit(_BAD_INPUT)
-    for number in _SIGNALS:
+    for number in STOP_SIGNALS:
         signal.signal(number, _interrupt)
     run_command(program, command)
 
@@ -59,12 +60,6 @@ def _write_in_any_locale() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-
-
-def _leave_at_once(number: int, frame: FrameType | None) -> None:
-    # An exception could be caught, or lost, by a module that is half imported; there is nothing to clean up yet.
-    del number, frame
-    os._exit(0)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -5,18 +5,18 @@ import signal
 import sys
 from types import FrameType, TracebackType
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""A closed terminal, too: a controller must not be left with stiff triggers."""
+
 
 class StopSignal:
     """Set by SIGINT or SIGTERM while the context is open; the old handlers come back after it."""
-
-    # A closed terminal, too: a controller must not be left with stiff triggers.
-    _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def __init__(self) -> None:
         self.is_set = False
 
     def __enter__(self) -> "StopSignal":
-        self._previous = {number: signal.signal(number, self._handle) for number in self._SIGNALS}
+        self._previous = {number: signal.signal(number, self._handle) for number in STOP_SIGNALS}
         return self
 
     def __exit__(
@@ -42,9 +42,10 @@ def ignore_broken_output() -> None:
 def leave_at_once_on_signals() -> None:
     """Until a `StopSignal` opens, a stop signal ends the process on the spot, with code 0.
 
-    An exception could be lost in a compiler's callback, and the process would go on.
+    An exception could be caught by a module that is half imported, or lost in a compiler's callback, and the process
+    would go on.
     """
-    for number in StopSignal._SIGNALS:
+    for number in STOP_SIGNALS:
         signal.signal(number, _leave)
 
 

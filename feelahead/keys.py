@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn, get_args
 
-from common.curve_authentication import make_key_pair, public_part
 from common.errors import ConfigurationError
 from common.keys import DEFAULT_FOLDER, KeyFolder, Side, checked_name, read_public_key
+from common.sockets.authentication import make_key_pair, public_part
 
 _STEPS = """\
 Two machines, from nothing to a link that is encrypted and open to nobody else:

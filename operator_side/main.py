@@ -7,13 +7,13 @@ from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
-from common.curve_authentication import OperatorKeys
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
 from common.link_model import DelayLine, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_priority
 from common.sockets import OperatorSockets
+from common.sockets.authentication import OperatorKeys
 from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.core import OperatorSide

@@ -11,13 +11,13 @@ from typing import Any
 from common.admission import Admission
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
-from common.curve_authentication import RobotKeys
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
 from common.link_model import BitFlip, DelayLine, LinkSpec, Stream, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_descriptor_limit, raise_priority
 from common.sockets import RobotSockets
+from common.sockets.authentication import RobotKeys
 from common.statistics import RunningStatistics
 from common.status import Status
 from common.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals

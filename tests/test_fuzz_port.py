@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from common import socket_shell, sockets
-from common.curve_authentication import RobotKeys, make_key_pair
 from common.keys import AllowList, KeyFolder
-from common.socket_shell import CONTROL_LIMIT_BYTES
-from common.sockets import OperatorSockets, RobotSockets
+from common.sockets import OperatorSockets, RobotSockets, shell
+from common.sockets import robot as robot_sockets
+from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.shell import CONTROL_LIMIT_BYTES
 from feelahead.experiments.hostile_inputs import Attacker
 from feelahead.experiments.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
 
@@ -108,7 +108,7 @@ def test_handshakes_cut_off_at_every_byte(robot: RobotSockets, operator: Operato
 
 
 def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(socket_shell, "HANDSHAKE_LIMIT_S", 0.2)
+    monkeypatch.setattr(shell, "HANDSHAKE_LIMIT_S", 0.2)
     with RobotSockets(EPHEMERAL) as robot:
         slow = [RawConnection(port_of(robot.control_endpoint), GREETING[:length]) for length in (0, 1, 10, 63, 64)]
         assert all(connection.ended() for connection in slow)
@@ -162,7 +162,7 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
 def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sockets, "PEER_LIMIT_PER_S", 200)
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
     received = 0
     with contextlib.closing(stranger(robot)) as connection:
         for _ in range(ROUNDS):

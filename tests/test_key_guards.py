@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from common import socket_shell
-from common.curve_authentication import Authenticator, RobotKeys, make_key_pair
 from common.keys import AllowList, KeyFolder
-from common.sockets import OperatorSockets, RobotSockets
+from common.sockets import OperatorSockets, RobotSockets, shell
+from common.sockets.authentication import Authenticator, RobotKeys, make_key_pair
 from tests import test_fuzz_port as port
 from tests import test_keys as files
 from tests import test_keys_on_the_wire as wire
@@ -82,13 +81,13 @@ PORT: dict[str, tuple[object, str, object, Callable[[RobotSockets, OperatorSocke
         port.test_a_peer_that_floods_is_cut_off_and_the_operator_is_not,
     ),
     "the limit of each call": (
-        *(socket_shell, "MESSAGES_PER_RECEIVE", 10**9),
+        *(shell, "MESSAGES_PER_RECEIVE", 10**9),
         lambda robot, operator, _: port.test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
             robot, operator, 20_000
         ),
     ),
     "the limit of a frame": (
-        *(socket_shell, "CONTROL_LIMIT_BYTES", -1),
+        *(shell, "CONTROL_LIMIT_BYTES", -1),
         lambda robot, operator, _: port.test_a_frame_that_claims_too_much_ends_its_connection_alone(
             robot, operator, 10**6
         ),

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from common import keys
-from common.curve_authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
 from common.errors import ConfigurationError
 from common.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
+from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
 
 KEY, OTHER = "ab" * 32, "cd" * 32
 

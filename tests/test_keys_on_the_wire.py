@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from common.clock import MonotonicClock
-from common.curve_authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
 from common.keys import AllowList, KeyFolder
 from common.sockets import OperatorSockets, RobotSockets
+from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0

@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "feelahead": set(PACKAGES),
 }
 IO_ROOMS = {
-    "zmq": {"common/sockets.py", "common/socket_shell.py", "common/curve_authentication.py"},
+    "zmq": {f"common/sockets/{part}.py" for part in ("shell", "authentication", "robot", "operator")},
     "hid": {"operator_side/dualsense/device.py"},
     "hidraw": {"operator_side/dualsense/device.py"},
     "mujoco": {

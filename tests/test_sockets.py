@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 import pytest
 import zmq
 
-from common import socket_shell
 from common.errors import ConfigurationError
-from common.socket_shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
-from common.sockets import OperatorSockets, RobotSockets
+from common.sockets import OperatorSockets, RobotSockets, shell
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
@@ -159,7 +158,7 @@ def test_one_call_receives_a_bounded_number(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     greet(robot, operator)
-    monkeypatch.setattr(socket_shell, "MESSAGES_PER_RECEIVE", 3)
+    monkeypatch.setattr(shell, "MESSAGES_PER_RECEIVE", 3)
     for number in range(8):
         send_until_connected(operator, b"%d" % number)
     batches: list[list[bytes]] = []
@@ -472,6 +471,6 @@ def test_closing_twice_and_with_unsent_messages_ends(robot: RobotSockets, operat
     peer = greet(robot, operator)
     for _ in range(5000):
         robot.send(peer, bytes(1000))
-    for shell in (robot, operator):
-        shell.close()
-        shell.close()
+    for end in (robot, operator):
+        end.close()
+        end.close()

@@ -14,6 +14,7 @@ from typing import Any, TextIO
 import numpy as np
 
 import robot_side.main
+from common.admission import Admission
 from common.clock import MonotonicClock
 from common.command_line import run_command
 from common.errors import ConfigurationError
@@ -41,6 +42,7 @@ class Watch:
         self._oldest_s = 0.0
         self._last_order = (0, 0)
         self._epochs: set[int] = set()
+        self.admission = Admission()
         self._out_of_order = 0
         self._stops = 0
         self._next_s = 0.0
@@ -117,6 +119,7 @@ class Watch:
             "speed_rad_s": speed,
             "tick_p99_us": tick_p99_us,
             "rejected": core.session.rejected,
+            "unread": self.admission.unread,
             "motion_received": core.session.motion_received,
         }
 
@@ -149,6 +152,7 @@ def main() -> None:
         with Path(own[0].removeprefix("--log=")).open("w", encoding="utf-8") as log:
             watched = Watch(log)
             robot_side.main.build_robot_side = watched.build  # type: ignore[assignment,attr-defined]
+            robot_side.main.Admission = lambda: watched.admission  # type: ignore[assignment,attr-defined]
             return robot_side.main.command([argument for argument in arguments if argument not in own])
 
     run_command(PROGRAM, lambda arguments: command(list(arguments)))

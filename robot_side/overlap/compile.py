@@ -69,7 +69,7 @@ class _ForCallers(LoweringPass):
         """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
         entry_point = object().__reduce_ex__
         state["cr"] = state["cr"]._replace(cfunc=entry_point)
-        state.targetctx.insert_user_function(entry_point, state["cr"].fndesc, [state.library])
+        state.targetctx.insert_user_function(entry_point, state["cr"].fndesc, [state["library"]])
         return True
 
 

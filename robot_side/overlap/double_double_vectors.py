@@ -6,7 +6,6 @@ from robot_side.overlap.double_double import (
     DoubleDouble,
     divided,
     minus,
-    multiple,
     negated,
     plus,
     square_root,
@@ -76,12 +75,6 @@ def precise_subtract(a: PreciseVector, b: PreciseVector) -> PreciseVector:
 def precise_scale(factor: DoubleDouble, a: PreciseVector) -> PreciseVector:
     """The multiple factor · a."""
     return times(factor, a[0]), times(factor, a[1]), times(factor, a[2])
-
-
-@inlined
-def precise_multiple(factor: float, a: PreciseVector) -> PreciseVector:
-    """The multiple of `a` by a float."""
-    return multiple(factor, a[0]), multiple(factor, a[1]), multiple(factor, a[2])
 
 
 @building_block

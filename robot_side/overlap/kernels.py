@@ -139,10 +139,11 @@ def _many(
             return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own)
 
         try:
-            parts = list(_pool().map(part_of, ends[:-1], ends[1:]))
+            shared = _pool().map(part_of, ends[:-1], ends[1:])
         except RuntimeError:
             # The interpreter is ending, and starts no threads any more.
-            parts = list(map(part_of, ends[:-1], ends[1:]))
+            shared = map(part_of, ends[:-1], ends[1:])
+        parts = list(shared)
     if counts is not None:
         counts.pairs += total
         counts.early += total - sum(partial for partial, _ in parts)

@@ -45,7 +45,7 @@ class GeomMeshes:
         self._shapes: dict[tuple[Any, ...], tuple[int, GeomMesh] | None] = {}
 
     def add(self, geom: int) -> tuple[int, float] | None:
-        """The index into `library` of the geom's mesh and its volume error; None where no mesh can be made.
+        """The index into `mesh_library` of the geom's mesh and its volume error; None where no mesh can be made.
 
         A round shape gets a mesh around it. A mesh geom is itself where its surface is closed and each part of it is
         oriented consistently, else its convex hull, as it is in the simulation's contacts.
@@ -60,7 +60,7 @@ class GeomMeshes:
         shape = self._shapes[key]
         return None if shape is None else (shape[0], shape[1].volume_error)
 
-    def library(self) -> MeshLibrary | None:
+    def mesh_library(self) -> MeshLibrary | None:
         """All the meshes so far; None for none."""
         meshes = [shape[1].mesh for shape in self._shapes.values() if shape is not None]
         return MeshLibrary(meshes) if meshes else None

@@ -154,7 +154,7 @@ def _meshes(
 
     shapes = GeomMeshes(model)
     found = {geom: shape for geom in candidates if (shape := shapes.add(geom)) is not None}
-    return shapes.library(), found, frozenset(geoms) - found.keys()
+    return shapes.mesh_library(), found, frozenset(geoms) - found.keys()
 
 
 def _columns(pairs: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:

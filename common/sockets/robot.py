@@ -1,26 +1,19 @@
-"""A control and a view socket for each of the two processes, over ZeroMQ.
-
-Control (ROUTER and DEALER) carries small messages both ways, view (PUB and SUB) frames and telemetry to
-the operator, apart so that a frame never delays a stiffness. No call but `wait` blocks; a message that cannot
-leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
-"""
+"""The robot side's end: it binds, tells its peers apart, and sends floods and revoked keys away."""
 
 import contextlib
 import socket
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import zmq
 
-from common.curve_authentication import Authenticator, HandshakeWatch, OperatorKeys, RobotKeys
-from common.endpoints import Endpoint, following, parse_bind, parse_connect, refuse_open
+from common.endpoints import Endpoint, following, parse_bind, refuse_open
 from common.errors import ConfigurationError
-from common.socket_shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket, connect_socket
+from common.sockets.authentication import Authenticator, RobotKeys
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket
 
 PEER_LIMIT_PER_S = 5000
 """A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
 _REMEMBERED_PEERS = 1024
-_RETRY_S = 0.5
 
 
 @dataclass
@@ -203,104 +196,6 @@ class RobotSockets(SocketShell):
             return
         with contextlib.suppress(OSError), socket.fromfd(descriptor, socket.AF_INET, socket.SOCK_STREAM) as connection:
             connection.shutdown(socket.SHUT_RDWR)
-
-
-class OperatorSockets(SocketShell):
-    """The operator side's end: it connects, and reconnects by itself."""
-
-    def __init__(
-        self,
-        connect: str,
-        view_connect: str | None = None,
-        *,
-        topics: Sequence[bytes] = (b"",),
-        keys: OperatorKeys | None = None,
-        heartbeat_timeout_s: float = 3.0,
-    ) -> None:
-        """Connect control to `connect` and view to `view_connect`, by default the port after.
-
-        `topics` are prefixes of the topics to receive; the empty one means all. The robot side need not be
-        there yet. `heartbeat_timeout_s` as in RobotSockets. ConfigurationError when an address is malformed
-        or its host unknown.
-        """
-        control = parse_connect(connect, "--connect")
-        view = (
-            following(control, connect, "--view-connect")
-            if view_connect is None
-            else parse_connect(view_connect, "--view-connect")
-        )
-        super().__init__(zmq.DEALER, zmq.SUB, heartbeat_timeout_s)
-        try:
-            # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
-            self._control.setsockopt(zmq.IMMEDIATE, 1)
-            for topic in topics:
-                self._view.setsockopt(zmq.SUBSCRIBE, topic)
-            self._reader, self._view_reader = Reader(frames=1), Reader(frames=2)
-            self._watched = []
-            self._next_look_s = 0.0
-            for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
-                if keys is not None:
-                    keys.secure(part)
-                self._watched.append((part, endpoint, HandshakeWatch(part, keys)))
-                connect_socket(part, endpoint, flag)
-        except BaseException:
-            self.close()
-            raise
-
-    @property
-    def trouble(self) -> str | None:
-        """Why the robot side does not let us in, and what to do about it; None as far as we know."""
-        return next((watch.trouble for _, _, watch in self._watched if watch.trouble is not None), None)
-
-    def receive(self) -> list[bytes]:
-        """Every control message that has arrived, oldest first."""
-        self._look_after_handshakes()
-        return [payload.bytes for (payload,) in self._whole(self._reader.read(self._control), 1)]
-
-    def receive_view(self) -> list[tuple[bytes, bytes]]:
-        """(topic, payload) of every view message that has arrived, oldest first."""
-        messages = self._whole(self._view_reader.read(self._view), 2)
-        return [(topic.bytes, payload.bytes) for topic, payload in messages]
-
-    def send(self, payload: bytes) -> bool:
-        """Send to the robot side; False, and counted in `dropped`, when it is gone or does not keep up.
-
-        ValueError for more than CONTROL_LIMIT_BYTES.
-        """
-        return self.send_frames(self._control, [payload], CONTROL_LIMIT_BYTES)
-
-    def wait(self, timeout_s: float | None) -> bool:
-        """Wait for a control or view message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self.wait_for(timeout_s, [self._control, self._view])
-
-    def close(self) -> None:
-        """Close at once, whatever has not left yet; closing twice does no harm."""
-        if not self._context.closed:
-            for _, _, watch in self._watched:
-                watch.close()
-        super().close()
-
-    def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:
-        """The messages of that many frames; others are rejected and counted."""
-        for message in messages:
-            if len(message) == frames:
-                yield message
-            else:
-                self.rejected += 1
-
-    def _look_after_handshakes(self) -> None:
-        """After a refused handshake ZeroMQ gives up; we knock again, for the key may be allowed by then."""
-        now_s = self._clock.now()
-        if now_s < self._next_look_s:
-            return
-        self._next_look_s = now_s + _RETRY_S
-        for part, endpoint, watch in self._watched:
-            watch.look()
-            if watch.failed:
-                watch.failed = False
-                with contextlib.suppress(zmq.ZMQError):
-                    part.disconnect(endpoint.address)
-                part.connect(endpoint.address)
 
 
 def _property(frame: zmq.Frame, name: str) -> str:
