@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -8,44 +7,9 @@ from hypothesis import strategies as st
 
 from common.clock_offset import MAX_SKEW, ClockOffset
 from common.difference_blocks import MOST_BLOCKS
+from tests.clock_exchanges import ahead, error_s, exchange, talk
 
 repeatable = settings(derandomize=True, deadline=None)
-Clock = Callable[[float], float]
-
-
-def ahead(by_s: float, skew: float = 0.0) -> Clock:
-    """A peer's clock by ours."""
-    return lambda now_s: now_s * (1.0 + skew) + by_s
-
-
-def exchange(offset: ClockOffset, start_s: float, there_s: float, held_s: float, back_s: float, clock: Clock) -> float:
-    """One exchange with a peer that has `clock`; when its answer was received, by our clock."""
-    peer_received_s, peer_sent_s = clock(start_s + there_s), clock(start_s + there_s + held_s)
-    received_s = start_s + there_s + held_s + back_s
-    offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, received_s)
-    return received_s
-
-
-def talk(
-    offset: ClockOffset,
-    clock: Clock,
-    there_s: np.ndarray,
-    back_s: np.ndarray,
-    start_s: float = 0.0,
-    period_s: float = 0.004,
-) -> float:
-    """An exchange each `period_s`, received in order of arrival; when the last one was, by our clock."""
-    sent_s = start_s + period_s * np.arange(there_s.size)
-    received_s = sent_s + there_s + 0.001 + back_s
-    for k in np.argsort(received_s):
-        exchange(offset, float(sent_s[k]), float(there_s[k]), 0.001, float(back_s[k]), clock)
-    return float(received_s.max())
-
-
-def error_s(offset: ClockOffset, clock: Clock, now_s: float) -> float:
-    estimate_s = offset.offset_at(now_s)
-    assert estimate_s is not None
-    return estimate_s - (clock(now_s) - now_s)
 
 
 def test_nothing_is_known_before_the_first_exchange() -> None:
@@ -187,78 +151,6 @@ def test_the_same_echo_many_times_and_in_any_order_is_one_sample() -> None:
     assert often.estimator == once.estimator == "mean"
     sampled = [sum(block.count for block in offset._tracking.to_peer.blocks) for offset in (once, often)]
     assert sampled[0] == pytest.approx(sampled[1], abs=20)
-
-
-# The bound
-
-delay = st.floats(0.0, 0.5) | st.floats(0.0, 1e-4) | st.just(0.0)
-drift = st.floats(-MAX_SKEW, MAX_SKEW) | st.sampled_from([-MAX_SKEW, MAX_SKEW, 0.0])
-rounds = st.lists(
-    st.tuples(delay, delay, delay, st.floats(0.0, 2.0) | st.just(0.004), drift, st.booleans()), max_size=60
-)
-
-
-@repeatable
-@given(rounds, st.floats(-1e6, 1e6), st.floats(-0.5, 0.5) | st.just(0.0))
-def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
-    steps: list[tuple[float, float, float, float, float, bool]], apart_s: float, asymmetry_s: float
-) -> None:
-    offset = ClockOffset(shared_clock=False, asymmetry_s=asymmetry_s)
-    now_s, peer_s = 5.0, 5.0 + apart_s
-    for there_s, held_s, back_s, pause_s, skew, lost in steps:
-        rate, start_s = 1.0 + skew, now_s
-        peer_received_s = peer_s + rate * there_s
-        peer_sent_s = peer_received_s + rate * held_s
-        now_s += there_s + held_s + back_s
-        peer_s = peer_sent_s + rate * back_s
-        if not lost:
-            offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, now_s)
-        now_s, peer_s = now_s + pause_s, peer_s + rate * pause_s
-        estimate_s, bound_s = offset.offset_at(now_s), offset.bound_at(now_s)
-        if estimate_s is not None and bound_s is not None:
-            assert abs(estimate_s - (peer_s - now_s)) <= bound_s
-    assert offset.jumps == 0
-
-
-@settings(repeatable, max_examples=40)
-@given(st.integers(0, 1000), st.floats(-0.05, 0.05), st.sampled_from(["normal", "exponential", "constant"]), drift)
-def test_the_bound_holds_while_lines_are_fitted(seed: int, asymmetry_s: float, shape: str, skew: float) -> None:
-    generator, clock = np.random.default_rng(seed), ahead(-40.0, skew)
-    offset = ClockOffset(shared_clock=False)
-    base_s, spread_s = generator.uniform(0.0, 0.05), generator.uniform(0.0, 0.02)
-    shapes = {
-        "normal": generator.standard_normal((2, 400)),
-        "exponential": generator.standard_exponential((2, 400)),
-        "constant": np.zeros((2, 400)),
-    }
-    there_s, back_s = np.maximum(0.0, base_s + spread_s * shapes[shape])
-    there_s += max(0.0, asymmetry_s)
-    back_s += max(0.0, -asymmetry_s)
-    for k in np.argsort(0.05 * np.arange(400) + there_s + back_s):
-        received_s = exchange(offset, 0.05 * k, float(there_s[k]), 0.001, float(back_s[k]), clock)
-        bound_s = offset.bound_at(received_s)
-        assert bound_s is not None
-        assert abs(error_s(offset, clock, received_s)) <= bound_s
-    assert offset.jumps == 0
-
-
-def test_the_bound_is_half_the_least_round_trip_and_loosens_with_time() -> None:
-    offset = ClockOffset(shared_clock=False)
-    exchange(offset, 0.0, 0.040, 0.0, 0.040, ahead(9.0))
-    received_s = exchange(offset, 0.1, 0.010, 0.0, 0.010, ahead(9.0))
-    assert offset.bound_at(received_s) == pytest.approx(0.010, abs=MAX_SKEW * 0.02)
-    assert offset.bound_at(received_s + 100.0) == pytest.approx(0.010 + MAX_SKEW * 100.0, abs=MAX_SKEW * 0.02)
-
-
-@pytest.mark.parametrize("asymmetry_s", [-0.5, 0.0, 0.5])
-def test_one_way_delays_are_never_negative(asymmetry_s: float) -> None:
-    generator, clock = np.random.default_rng(21), ahead(0.0, 100e-6)
-    offset = ClockOffset(shared_clock=False, asymmetry_s=asymmetry_s)
-    for k, (there_s, back_s) in enumerate(generator.exponential(0.010, (1000, 2))):
-        received_s = exchange(offset, 0.5 * k, there_s, 0.0, back_s, clock)
-        one_way_s = offset.one_way_from_peer_s(clock(received_s - back_s), received_s)
-        assert one_way_s is not None
-        assert one_way_s >= -1e-9
 
 
 # Clocks that are one, and clocks that jump

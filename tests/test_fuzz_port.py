@@ -14,10 +14,7 @@ from common.sockets.authentication import RobotKeys, make_key_pair
 from common.sockets.shell import CONTROL_LIMIT_BYTES
 from feelahead.experiments.hostile_inputs import Attacker
 from feelahead.experiments.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
-
-EPHEMERAL = "tcp://127.0.0.1:0"
-PATIENT_S = 20.0
-ROUNDS = 1000
+from tests.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS
 
 
 @pytest.fixture

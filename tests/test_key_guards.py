@@ -12,6 +12,7 @@ from common.sockets.authentication import Authenticator, RobotKeys, make_key_pai
 from tests import test_fuzz_port as port
 from tests import test_keys as files
 from tests import test_keys_on_the_wire as wire
+from tests.socket_talk import EPHEMERAL, PATIENT_S
 
 FAILURES = (AssertionError, pytest.fail.Exception)
 
@@ -103,8 +104,8 @@ def test_without_its_guard_at_the_port_a_test_fails(guard: str, monkeypatch: pyt
     monkeypatch.setattr(port, "ROUNDS", 100)
     with (
         # Heartbeats would end a connection too, only later.
-        RobotSockets(port.EPHEMERAL, heartbeat_timeout_s=port.PATIENT_S) as robot,
-        OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=port.PATIENT_S) as operator,
+        RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot,
+        OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator,
     ):
         assert port.is_heard(robot, operator)
         with pytest.raises(FAILURES):

@@ -1,0 +1,44 @@
+"""Exchanges of stamps between two clocks whose offset is known."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from common.clock_offset import ClockOffset
+
+Clock = Callable[[float], float]
+
+
+def ahead(by_s: float, skew: float = 0.0) -> Clock:
+    """A peer's clock by ours."""
+    return lambda now_s: now_s * (1.0 + skew) + by_s
+
+
+def exchange(offset: ClockOffset, start_s: float, there_s: float, held_s: float, back_s: float, clock: Clock) -> float:
+    """One exchange with a peer that has `clock`; when its answer was received, by our clock."""
+    peer_received_s, peer_sent_s = clock(start_s + there_s), clock(start_s + there_s + held_s)
+    received_s = start_s + there_s + held_s + back_s
+    offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, received_s)
+    return received_s
+
+
+def talk(
+    offset: ClockOffset,
+    clock: Clock,
+    there_s: np.ndarray,
+    back_s: np.ndarray,
+    start_s: float = 0.0,
+    period_s: float = 0.004,
+) -> float:
+    """An exchange each `period_s`, received in order of arrival; when the last one was, by our clock."""
+    sent_s = start_s + period_s * np.arange(there_s.size)
+    received_s = sent_s + there_s + 0.001 + back_s
+    for k in np.argsort(received_s):
+        exchange(offset, float(sent_s[k]), float(there_s[k]), 0.001, float(back_s[k]), clock)
+    return float(received_s.max())
+
+
+def error_s(offset: ClockOffset, clock: Clock, now_s: float) -> float:
+    estimate_s = offset.offset_at(now_s)
+    assert estimate_s is not None
+    return estimate_s - (clock(now_s) - now_s)

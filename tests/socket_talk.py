@@ -1,0 +1,54 @@
+"""Real sockets on loopback that find each other, and say something."""
+
+from collections.abc import Callable
+
+import pytest
+
+from common.sockets import OperatorSockets, RobotSockets
+
+EPHEMERAL = "tcp://127.0.0.1:0"
+PATIENT_S = 20.0
+"""A heartbeat time-out that a busy machine does not trip."""
+ROUNDS = 1000
+"""At most so many waits of 10 ms until a test gives up."""
+
+
+def send_until_connected(operator: OperatorSockets, payload: bytes) -> None:
+    for _ in range(ROUNDS):
+        if operator.send(payload):
+            return
+        operator.wait(0.01)
+    pytest.fail("no connection")
+
+
+def receive_one(robot: RobotSockets) -> tuple[bytes, bytes]:
+    assert robot.wait(10.0)
+    (message,) = robot.receive()
+    return message
+
+
+def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
+    """Connect, and tell by what name the robot side knows `operator`."""
+    send_until_connected(operator, b"hello")
+    peer, payload = receive_one(robot)
+    assert payload == b"hello"
+    return peer
+
+
+def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: bytes) -> None:
+    """Publish until the subscription has reached the robot side and a message has come back."""
+    for _ in range(ROUNDS):
+        robot.publish(topic, b"probe")
+        if operator.wait(0.01):
+            return
+    pytest.fail("no subscription")
+
+
+def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], bool], last: bytes) -> list[bytes]:
+    messages: list[bytes] = []
+    for _ in range(ROUNDS):
+        messages += received()
+        if messages and messages[-1] == last:
+            return messages
+        wait(0.01)
+    return pytest.fail(f"{last!r} did not arrive")
