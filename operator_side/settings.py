@@ -18,7 +18,7 @@ class OperatorSettings(RunOptions):
     It connects to a robot side, sends what the hands do, and lets the fingers feel what is ahead. L1 held: the
     arm may move. Options: arm it, with released triggers. R2 advances, L2 retreats, the left stick moves
     across, the right one turns. Cross closes and square opens the gripper, triangle changes the target, circle
-    stops everything.
+    stops everything, and create hands the robot over to whoever has waited longest.
     """
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
