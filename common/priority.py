@@ -37,13 +37,18 @@ def make_realtime() -> list[str]:
     """
     notes = []
     try:
-        for thread in _threads():
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
+        schedule_realtime()
     except PermissionError:
         notes.append(f"--realtime: real-time scheduling is not permitted; to permit it: {_permit('cap_sys_nice')}")
     if not _lock_memory():
         notes.append(f"--realtime: locking memory is not permitted; to permit it: {_permit('cap_ipc_lock')}")
     return notes
+
+
+def schedule_realtime() -> None:
+    """First-in-first-out scheduling for every thread so far; PermissionError where that takes more rights."""
+    for thread in _threads():
+        os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
 
 
 def raise_descriptor_limit() -> None:

@@ -5,10 +5,8 @@ sent or released, or something arrives.
 """
 
 import contextlib
-import ctypes
 import math
 import multiprocessing
-import os
 import resource
 import signal
 import struct
@@ -22,7 +20,7 @@ import numpy as np
 
 from common.clock import MonotonicClock
 from common.link_model import DelayLine, Direction, LinkSpec
-from common.priority import raise_priority
+from common.priority import raise_priority, schedule_realtime
 from common.sockets import OperatorSockets, RobotSockets
 from feelahead.benchmarks.link_samples import LinkSample
 
@@ -32,7 +30,6 @@ _HELLO, _END = -1, -2
 _START_DELAY_S = 0.3
 _PATIENCE_S = 10.0
 _GLANCE_S = 0.2
-_PR_SET_TIMERSLACK = 29
 
 
 class Link(Protocol):
@@ -183,7 +180,9 @@ def _guarded(plan: Plan, run: Callable[[], None], results: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         # Before there are sockets, so that their threads inherit it.
-        _go_first(realtime=plan.realtime)
+        raise_priority()
+        if plan.realtime:
+            schedule_realtime()
         run()
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -269,15 +268,6 @@ def _meet(direction: Direction, link: Link, clock: MonotonicClock) -> float:
                 link.send(HEADER.pack(_HELLO, start_s))
                 return float(start_s)
     raise TimeoutError("the other end of the link did not appear")
-
-
-def _go_first(*, realtime: bool) -> None:
-    """Before other work on the machine, as the sides themselves go; PermissionError where SCHED_FIFO is refused."""
-    # The kernel may wake a sleeper up to 50 us late to save wake-ups, unless it is asked not to.
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_TIMERSLACK, 1)
-    raise_priority()
-    if realtime:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
 
 def cpu_s() -> float:
