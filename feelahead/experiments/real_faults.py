@@ -67,7 +67,7 @@ def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     onsets, safe = Onsets(), True
     passed_s = []
     driver = rig.driver()
-    for _ in rig.rounds(repeats, advance, 50.0):
+    for _ in rig.rounds(repeats, advance, 120.0):
         rig.until(driver, "session", *OWNING)
         successor = rig.driver()
         rig.until(successor, "session", "observing")
@@ -79,7 +79,7 @@ def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
         rig.wait(0.1)
         rig.until(successor, "session", *OWNING)
         passed_s.append(rig.owned_s[successor.process_id] - killed_s)
-        safe &= _stands(rig.figures())
+        safe &= stands(rig.figures())
         driver = successor
     _end(rig, driver)
     outcome = onsets.outcome(safe=safe)
@@ -91,7 +91,7 @@ def stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     """SIGSTOP of the operator side for half a second, then SIGCONT: its backlog moves nothing."""
     onsets, safe = Onsets(), True
     driver = rig.driver()
-    for _ in rig.rounds(repeats, advance, 70.0):
+    for _ in rig.rounds(repeats, advance, 180.0):
         rig.drive(driver)
         rig.lines()
         rig.signal(driver, signal.SIGSTOP)
@@ -101,7 +101,7 @@ def stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
         rig.signal(driver, signal.SIGCONT)
         rig.until(driver, "phase", "rest")
         figures = rig.figures()
-        safe &= figures["told_to_move"] == told and _stands(figures)
+        safe &= figures["told_to_move"] == told and stands(figures)
         safe &= figures["oldest_accepted_s"] <= _AGE_LIMIT_S
     _end(rig, driver)
     return onsets.outcome(safe=safe)
@@ -113,7 +113,7 @@ def cut(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     ports = [urlsplit(rig.listening[name]).port or 0 for name in ("control", "view")]
     with Cable(ports[0]) as control, Cable(ports[1]) as view:
         driver = rig.driver(f"tcp://127.0.0.1:{control.port}", f"tcp://127.0.0.1:{view.port}")
-        for _ in rig.rounds(repeats, advance, 40.0):
+        for _ in rig.rounds(repeats, advance, 120.0):
             rig.drive(driver)
             rig.lines()
             control.cut()
@@ -124,7 +124,7 @@ def cut(rig: Rig, repeats: int, advance: Advance) -> Outcome:
             rig.wait(0.15)
             figures = rig.figures()
             oldest_s = max(oldest_s, figures["oldest_accepted_s"])
-            safe &= figures["told_to_move"] == told and _stands(figures)
+            safe &= figures["told_to_move"] == told and stands(figures)
             rig.until(driver, "phase", "rest")
         _end(rig, driver)
     outcome = onsets.outcome(safe=safe and oldest_s <= _AGE_LIMIT_S)
@@ -134,7 +134,7 @@ def cut(rig: Rig, repeats: int, advance: Advance) -> Outcome:
 def robot_stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     """SIGSTOP of the robot side for two seconds while the operator goes on pulling, then SIGCONT."""
     applied, safe, oldest_s = 0, True, 0.0
-    for _ in rig.rounds(repeats, advance, 15.0):
+    for _ in rig.rounds(repeats, advance, 30.0):
         driver = rig.driver()
         rig.drive(driver)
         rig.signal(rig.robot, signal.SIGSTOP)
@@ -147,7 +147,7 @@ def robot_stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
         figures = rig.figures()
         oldest_s = max(oldest_s, figures["oldest_accepted_s"])
         applied += figures["told_since_pause"]
-        safe &= _stands(figures)
+        safe &= stands(figures)
         safe &= stop["stop"] >= resumed_s - 0.1
         _end(rig, driver)
     safe &= applied == 0 and oldest_s <= _AGE_LIMIT_S
@@ -227,7 +227,8 @@ def resident_kb(process: SideProcess) -> int:
     raise ValueError(f"process {process.process_id} tells no VmRSS; valid: a running process on Linux")
 
 
-def _stands(figures: dict[str, Any]) -> bool:
+def stands(figures: dict[str, Any]) -> bool:
+    """Whether the robot is disarmed and at rest."""
     return bool(figures["state"] == "disarmed" and figures["speed_rad_s"] < _RESTING_RAD_S)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from common.errors import FeelaheadError
 from feelahead.experiments.fault import Outcome
-from feelahead.experiments.real_faults import Onsets
+from feelahead.experiments.real_faults import Advance, Onsets, stands
 from feelahead.experiments.rig import Rig
 
 _ROBOT, _OPERATOR = "10.91.83.1", "10.91.83.2"
@@ -22,22 +22,23 @@ class NotPermittedError(FeelaheadError):
     """Network namespaces cannot be had here."""
 
 
-def unplugged() -> Outcome:
-    """Both sides in namespaces of their own, and the link between them set down while the arm moves."""
-    onsets = Onsets()
+def unplugged(repeats: int, advance: Advance) -> Outcome:
+    """Both sides in namespaces of their own; the link between them is set down while the arm moves, then up again."""
+    onsets, safe = Onsets(), True
     try:
         with _namespaces() as (robot, operator), Rig(f"tcp://{_ROBOT}:5555", ["--insecure"], robot) as rig:
             driver = rig.driver(before=operator)
-            rig.drive(driver)
-            rig.lines()
-            _ip("-n", robot[-1], "link", "set", "robot0", "down")
-            onsets.take(rig)
-            rig.wait(0.5)
-            told = rig.figures()["told_to_move"]
-            _ip("-n", robot[-1], "link", "set", "robot0", "up")
-            rig.wait(2.0)
-            figures = rig.figures()
-            safe = figures["told_to_move"] == told and figures["state"] == "disarmed"
+            for _ in rig.rounds(repeats, advance, 120.0):
+                rig.drive(driver)
+                rig.lines()
+                _ip("-n", robot[-1], "link", "set", "robot0", "down")
+                onsets.take(rig)
+                rig.wait(0.5)
+                told = rig.figures()["told_to_move"]
+                _ip("-n", robot[-1], "link", "set", "robot0", "up")
+                rig.until(driver, "phase", "rest")
+                figures = rig.figures()
+                safe &= figures["told_to_move"] == told and stands(figures)
     except NotPermittedError as error:
         return Outcome(True, f"skipped: {error}", tried=False)
     return onsets.outcome(safe=safe)
