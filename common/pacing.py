@@ -73,20 +73,17 @@ class Pacer:
 
 def wait_for_turn(
     pacer: Pacer, clock: Clock, wait: Callable[[float], bool], other_s: float | None = None, spin_s: float = SPIN_S
-) -> None:
-    """Return when a message has come, at the pacer's deadline, or at `other_s` if that is earlier.
+) -> bool:
+    """Return when a message has come, at the pacer's deadline, or at `other_s` if that is earlier; whether one has.
 
-    `wait(timeout_s)` waits for a message and says whether there is one. The last `spin_s` before the deadline are
-    spent asking it without waiting, so that the turn begins in time and a message is still noticed at once.
+    `wait(timeout_s)` waits for a message and says whether there is one. The last `spin_s` are spent asking it
+    without waiting, so that what is due happens in time and a message is still noticed at once.
     """
-    asleep_until_s = pacer.deadline_s - spin_s
-    if other_s is not None and other_s < asleep_until_s:
-        wait(max(0.0, other_s - clock.now()))
-        return
-    asleep_s = asleep_until_s - clock.now()
+    due_s = pacer.deadline_s if other_s is None else min(pacer.deadline_s, other_s)
+    asleep_s = due_s - spin_s - clock.now()
     if asleep_s > 0.0 and wait(asleep_s):
-        return
-    until_s = pacer.deadline_s if other_s is None else min(pacer.deadline_s, other_s)
-    while clock.now() < until_s:
+        return True
+    while clock.now() < due_s:
         if wait(0.0):
-            return
+            return True
+    return False

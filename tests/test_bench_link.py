@@ -72,6 +72,8 @@ def test_a_comparison_prints_every_seed_and_a_verdict(capsys: pytest.CaptureFixt
         (["--count", "1"], "--count 1", "2 to"),
         (["--bytes", "3"], "--bytes 3", "16 to"),
         (["--seed", "-1"], "--seed -1", "0 or more"),
+        (["--seeds", "3"], "--seeds 3", "--virtual --against"),
+        (["--spin", "-1"], "--spin -1.0", "microseconds"),
         (["--sends", "x.csv"], "--sends x.csv", "--virtual"),
         (["--against", "nowhere.csv"], "nowhere.csv", "delay_ns"),
         (["--csv", "/nowhere/x.csv"], "/nowhere/x.csv", "a file in a folder"),

@@ -2,6 +2,7 @@
 
 import os
 import select
+import weakref
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Self
@@ -50,6 +51,7 @@ class SocketShell:
         self._clock = MonotonicClock()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
+        self._descriptors: weakref.WeakKeyDictionary[zmq.Socket[bytes], int] = weakref.WeakKeyDictionary()
         self._control = self._open_control(control_type)
         self._view = self._open_view(view_type)
 
@@ -115,7 +117,7 @@ class SocketShell:
         """
         if timeout_s is not None and not timeout_s >= 0.0:
             raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
-        descriptors = [part.fileno() for part in awaited]
+        descriptors = [self._descriptor(part) for part in awaited]
         if served is not None:
             descriptors.append(served.fileno())
         deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
@@ -129,6 +131,13 @@ class SocketShell:
                 if remaining_s <= 0.0:
                     return False
             select.select(descriptors, [], [], 0.0 if pending else remaining_s)
+
+    def _descriptor(self, part: "zmq.Socket[bytes]") -> int:
+        """The one to wait for, which is a socket's for life."""
+        descriptor = self._descriptors.get(part)
+        if descriptor is None:
+            descriptor = self._descriptors[part] = part.fileno()
+        return descriptor
 
     def send_frames(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
         """Send without waiting; False, and counted in `dropped`, when it cannot leave; ValueError when too long."""

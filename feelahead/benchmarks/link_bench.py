@@ -16,6 +16,7 @@ from common.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
 from common.link_figures import report_lines
 from common.link_model import CorrelationModel, LinkModel, LinkProfile, LinkSpec
+from common.pacing import SPIN_S
 from feelahead.benchmarks.link_real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link_reference import compare, independent_delays, judge, measure_band, table
 from feelahead.benchmarks.link_samples import LinkSample, play, read_link_sample
@@ -27,6 +28,7 @@ _RELEASE_LIMIT_US = 200.0
 _CPU_LIMIT = 0.20
 _BASELINE = 3000
 """Messages without a link, to tell the emulation's cost from that of sockets and pacing."""
+_SEEDS, _PAIRS = 20, 200
 _REAL_MOMENT_LIMIT_MS = 0.5
 
 
@@ -35,7 +37,8 @@ class LinkBenchSettings:
     """What the emulated link does to messages, beside what was asked, and beside a recording of a real link.
 
     In real time: two processes on this machine send to each other over ZeroMQ, each delaying what it sends. Shown are
-    how late messages were released, the processor time, and the delays from sending to reception. With --virtual,
+    how late messages were released, the delays from sending to reception, and the processor time, beside that of bare
+    ZeroMQ and bare UDP sockets which do the same. With --virtual,
     nothing waits: the model alone, message by message, the same on every machine but for the time taken.
 
     Try: feelahead bench link --link "delay 50ms 10ms distribution normal loss 1%" --count 3000
@@ -57,16 +60,19 @@ class LinkBenchSettings:
     """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Write every message there: seq, sent_ns, received_ns; a lost one has no received_ns."""
+    spin: Annotated[float, tyro.conf.arg(metavar="US")] = 1e6 * SPIN_S
+    """How long the processor is kept busy before a message is due: 0 costs least, more is more exact."""
     realtime: bool = False
     """Run both ends under SCHED_FIFO, where that is permitted: the figures of a machine without other work."""
     virtual: bool = False
     """In virtual time, without sockets."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Of the run that is shown and written."""
-    seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 20
-    """With --virtual --against: how many runs, with the seeds 0 to N-1."""
-    pairs: Annotated[int, tyro.conf.arg(metavar="N")] = 200
-    """With --virtual --against, where delays or losses depend on the past: pairs of runs for the model's own band."""
+    seeds: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """With --virtual --against: how many runs, with the seeds 0 to N-1; 20 unless given."""
+    pairs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """With --virtual --against, where delays or losses depend on the past: pairs of runs for the model's own band; 200
+    unless given."""
     sends: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """With --virtual: send times from the sent_ns of a recording, instead of --rate and --count."""
     against: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
@@ -82,8 +88,13 @@ class LinkBenchSettings:
             ("seeds", 1, 10_000),
             ("pairs", 2, 10_000),
         ):
-            if not least <= getattr(self, name) <= most:
+            if getattr(self, name) is not None and not least <= getattr(self, name) <= most:
                 raise ValueError(f"--{name} {getattr(self, name)}: valid: {least} to {most}")
+        for name in ("seeds", "pairs"):
+            if getattr(self, name) is not None and not (self.virtual and self.against is not None):
+                raise ValueError(f"--{name} {getattr(self, name)}: valid with --virtual --against alone")
+        if not 0.0 <= self.spin <= 1e5:
+            raise ValueError(f"--spin {self.spin}: valid: 0 to 100000 microseconds")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
         if self.sends is not None and not self.virtual:
@@ -150,12 +161,13 @@ def _virtual(
     if reference is None:
         return sample
     kept, stalls = reference.without_stalls(profile)
-    bar = progress.add_task("seeds", total=settings.seeds)
-    results = compare(profile, kept, settings.seeds, settings.bytes, lambda: progress.advance(bar))
+    seeds, pairs = settings.seeds or _SEEDS, settings.pairs or _PAIRS
+    bar = progress.add_task("seeds", total=seeds)
+    results = compare(profile, kept, seeds, settings.bytes, lambda: progress.advance(bar))
     band = None
     if profile.loss is not None or not independent_delays(profile):
-        bar = progress.add_task("the model's own band", total=settings.pairs)
-        band = measure_band(profile, kept, settings.pairs, settings.bytes, lambda: progress.advance(bar))
+        bar = progress.add_task("the model's own band", total=pairs)
+        band = measure_band(profile, kept, pairs, settings.bytes, lambda: progress.advance(bar))
     show(console, table(kept, stalls, results))
     show_goals(console, judge(profile, kept, results, band))
     return sample
@@ -168,12 +180,30 @@ def _real(
     console: Console,
     progress: Progress,
 ) -> LinkSample:
-    plan = Plan(settings.spec, settings.count, 1.0 / settings.rate, settings.bytes, settings.realtime)
-    without = dataclasses.replace(plan, link=LinkSpec(), count=min(settings.count, _BASELINE))
-    bar = progress.add_task("messages", total=(plan.count + without.count) * plan.period_s)
+    plan = Plan(
+        settings.spec,
+        settings.count,
+        1.0 / settings.rate,
+        settings.bytes,
+        spin_s=1e-6 * settings.spin,
+        realtime=settings.realtime,
+    )
+    # What rests instead of spinning, with and without parts of it: where the processor time goes.
+    resting = dataclasses.replace(plan, count=min(settings.count, _BASELINE), spin_s=0.0)
+    without = dataclasses.replace(resting, link=LinkSpec())
+    costs = {
+        "without spinning": resting,
+        "without a link either": without,
+        "bare ZeroMQ": dataclasses.replace(without, transport="bare ZeroMQ"),
+        "bare UDP": dataclasses.replace(without, transport="bare UDP"),
+    }
+    bar = progress.add_task("messages", total=(plan.count + len(costs) * resting.count) * plan.period_s)
     try:
         run = run_real(plan, lambda passed_s: progress.advance(bar, passed_s))
-        baseline = run_real(without, lambda passed_s: progress.advance(bar, passed_s))
+        shares = {
+            name: run_real(one, lambda passed_s: progress.advance(bar, passed_s)).cpu_share
+            for name, one in costs.items()
+        }
     except TimeoutError as error:
         raise FeelaheadError(f"{error}; is the machine too busy?") from error
     except PermissionError as error:
@@ -187,12 +217,10 @@ def _real(
         Goal(f"release error p99 of {name}, us", end["achieved"]["release_error_us"]["p99"], _RELEASE_LIMIT_US)
         for name, end in ends.items()
     ]
-    detail = (
-        f"robot's end {run.robot.cpu_share:.3f}, operator's end {run.operator.cpu_share:.3f}; "
-        f"the same messages without a link: {baseline.cpu_share:.3f}"
-    )
+    detail = "; ".join(f"{name}: {share:.3f}" for name, share in shares.items())
     goals.append(Goal("share of one core, both ends together", run.cpu_share, _CPU_LIMIT, detail=detail))
-    goals.append(Goal("share of one core that the emulation adds", run.cpu_share - baseline.cpu_share, _CPU_LIMIT))
+    added = shares["without spinning"] - shares["without a link either"]
+    goals.append(Goal("share of one core that the emulation adds, without spinning", added, _CPU_LIMIT))
     sample = run.sample("to_operator")
     if reference is not None:
         kept, stalls = reference.without_stalls(profile)

@@ -1,7 +1,7 @@
 """The emulated link in real time: two processes on loopback, each of which sends, delays and receives.
 
-Messages are paced by absolute deadlines in a loop of its own: sleep in the sockets until the next one is due to be
-sent or released, or something arrives.
+Messages are paced as the sides pace theirs: sleep in the sockets until shortly before the next one is due to be sent
+or released, or something arrives.
 """
 
 import contextlib
@@ -14,14 +14,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
 from common.clock import MonotonicClock
 from common.link_model import DelayLine, Direction, LinkSpec
+from common.pacing import SPIN_S, Pacer, wait_for_turn
 from common.priority import raise_priority, schedule_realtime
 from common.sockets import OperatorSockets, RobotSockets
+from feelahead.benchmarks.link_peers import BareZeroMQLink, DatagramLink, Link
 from feelahead.benchmarks.link_samples import LinkSample
 
 HEADER = struct.Struct("<qd")
@@ -30,22 +32,6 @@ _HELLO, _END = -1, -2
 _START_DELAY_S = 0.3
 _PATIENCE_S = 10.0
 _GLANCE_S = 0.2
-
-
-class Link(Protocol):
-    """One end's sockets, reduced to what a measurement needs."""
-
-    def receive(self) -> list[bytes]:
-        """Everything that has arrived."""
-        ...
-
-    def send(self, payload: bytes) -> bool:
-        """Send to the other end; whether that could be done at once."""
-        ...
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; whether it has."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -58,8 +44,12 @@ class Plan:
     period_s: float
     size_bytes: int
     """Of a message as the link counts it."""
+    spin_s: float = SPIN_S
+    """How long both ends keep the processor busy before what is due."""
     realtime: bool = False
     """Whether both ends ask for SCHED_FIFO."""
+    transport: Literal["sides", "bare ZeroMQ", "bare UDP"] = "sides"
+    """The sides' own sockets, or what they are compared with."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +115,8 @@ def run_real(plan: Plan, waiting: Callable[[float], object]) -> RealRun:
     children = [robot]
     robot.start()
     try:
-        addresses = _next(pipes[0][0], robot, waiting, _PATIENCE_S)
-        operator = context.Process(target=_operator_process, args=(plan, addresses, pipes[1][1]), daemon=True)
+        address = _next(pipes[0][0], robot, waiting, _PATIENCE_S)
+        operator = context.Process(target=_operator_process, args=(plan, address, pipes[1][1]), daemon=True)
         children.append(operator)
         operator.start()
         patience_s = plan.count * plan.period_s + 6.0 * _PATIENCE_S
@@ -159,17 +149,26 @@ def _next(pipe: Connection, child: BaseProcess, waiting: Callable[[float], objec
 
 def _robot_process(plan: Plan, results: Connection) -> None:
     def run() -> None:
-        with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
-            results.send((sockets.control_endpoint, sockets.view_endpoint))
-            _run_and_stay(plan, "to_operator", _RobotLink(sockets), results)
+        if plan.transport == "sides":
+            with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
+                results.send((sockets.control_endpoint, sockets.view_endpoint))
+                _run_and_stay(plan, "to_operator", _RobotLink(sockets), results)
+            return
+        with DatagramLink() if plan.transport == "bare UDP" else BareZeroMQLink() as link:
+            results.send(link.address)
+            _run_and_stay(plan, "to_operator", link, results)
 
     _guarded(plan, run, results)
 
 
-def _operator_process(plan: Plan, addresses: tuple[str, str], results: Connection) -> None:
+def _operator_process(plan: Plan, address: Any, results: Connection) -> None:
     def run() -> None:
-        with OperatorSockets(*addresses) as sockets:
-            _run_and_stay(plan, "to_robot", sockets, results)
+        if plan.transport == "sides":
+            with OperatorSockets(*address) as sockets:
+                _run_and_stay(plan, "to_robot", sockets, results)
+            return
+        with DatagramLink(address) if plan.transport == "bare UDP" else BareZeroMQLink(address) as link:
+            _run_and_stay(plan, "to_robot", link, results)
 
     _guarded(plan, run, results)
 
@@ -207,8 +206,8 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
     received_s = [math.nan] * plan.count
     padding = bytes(max(0, plan.size_bytes - HEADER.size))
     before_s = cpu_s()
+    pacer = Pacer(plan.period_s, start_s)
     number = 0
-    next_send_s = start_s
     last_s = start_s + plan.count * plan.period_s + _PATIENCE_S
     unsent = 0
     arrived = True
@@ -226,11 +225,13 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
                 peer_ended = True
             elif 0 <= place < plan.count and math.isnan(received_s[place]):
                 received_s[place] = received_now_s
-        if number < plan.count and now_s >= next_send_s:
+        # A burst makes up for turns that were missed: every message is to be sent.
+        while number < plan.count and now_s >= start_s + number * plan.period_s:
             sent_s[number] = now_s
             line.push(now_s, HEADER.pack(number, now_s) + padding, plan.size_bytes)
             number += 1
-            next_send_s = start_s + number * plan.period_s
+        if pacer.due(now_s):
+            pacer.begin(now_s)
         now_s = clock.now()
         for message in line.pop(now_s):
             unsent += not link.send(message)
@@ -245,10 +246,7 @@ def run_end(plan: Plan, direction: Direction, link: Link) -> EndResult:
                     break
                 link.wait(0.01)
             last_s = now_s + _PATIENCE_S
-        wake_s = min(
-            due_s if due_s is not None else last_s, next_send_s if number < plan.count else last_s, now_s + 0.1
-        )
-        arrived = link.wait(max(0.0, wake_s - clock.now()))
+        arrived = wait_for_turn(pacer, clock, link.wait, due_s, plan.spin_s)
     return EndResult(np.array(sent_s), np.array(received_s), line.summary(), unsent, cpu_share if ended else math.nan)
 
 
