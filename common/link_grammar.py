@@ -8,17 +8,11 @@ from typing import Any, TypeVar, cast, get_args
 from common.delay_distribution import DelayTable, Distribution
 from common.errors import ConfigurationError
 from common.link_loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.link_profile import QUEUE_LIMIT, Chance, LinkModel, LinkProfile, Outage, Rate, Slot
+from common.link_profile import Chance, LinkModel, LinkProfile, Outage, Rate
 from common.link_randomness import CorrelationModel
+from common.link_slots import Slot, SlotShape
 from common.link_trace import Trace
-from common.units import (
-    format_duration,
-    format_rate,
-    format_share,
-    parse_duration,
-    parse_rate,
-    parse_share,
-)
+from common.units import parse_duration, parse_rate, parse_share
 
 GRAMMAR = {
     "delay": "delay TIME [JITTER [CORRELATION%]] "
@@ -30,7 +24,8 @@ GRAMMAR = {
     "reorder": "reorder P% [CORRELATION%] [gap N]",
     "rate": "rate RATE [PACKETOVERHEAD [CELLSIZE [CELLOVERHEAD]]]",
     "limit": "limit MESSAGES",
-    "slot": "slot MIN [MAX]",
+    "slot": "slot MIN [MAX] [packets N] [bytes N] | "
+    "slot distribution uniform|normal|pareto|paretonormal|exponential|TABLEFILE GAP JITTER [packets N] [bytes N]",
     "trace": "trace FILE.csv",
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
@@ -126,16 +121,17 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
     if words.take_if("distribution"):
         if "jitter_s" not in settings:
             raise words.error("'distribution' without a jitter to shape", "delay")
-        name = words.take() or ""
-        field = f"link {words.spec!r}: distribution"
-        if name in get_args(Distribution):
-            settings["distribution"] = cast(Distribution, name)
-        elif name in ("", *GRAMMAR):
-            raise ConfigurationError(
-                f"{field} {name!r} is unknown; valid: {', '.join(get_args(Distribution))}, TABLEFILE"
-            )
-        else:
-            settings["distribution"] = DelayTable.read(Path(name), field)
+        settings["distribution"] = _read_shape(words)
+
+
+def _read_shape(words: _Words) -> Distribution | DelayTable:
+    name = words.take() or ""
+    field = f"link {words.spec!r}: distribution"
+    if name in get_args(Distribution):
+        return cast(Distribution, name)
+    if name in ("", *GRAMMAR):
+        raise ConfigurationError(f"{field} {name!r} is unknown; valid: {', '.join(get_args(Distribution))}, TABLEFILE")
+    return DelayTable.read(Path(name), field)
 
 
 def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
@@ -181,9 +177,16 @@ def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
 
 
 def _read_slot(words: _Words, settings: dict[str, Any]) -> None:
-    least_s = words.value(parse_duration, "slot", "least time")
-    most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
-    settings["slot"] = Slot(least_s, most_s)
+    shape = None
+    if words.take_if("distribution"):
+        distribution = _read_shape(words)
+        least_s = most_s = words.value(parse_duration, "slot", "gap")
+        shape = SlotShape(least_s, words.value(parse_duration, "slot", "jitter"), distribution)
+    else:
+        least_s = words.value(parse_duration, "slot", "least time")
+        most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
+    budgets = {name: words.value(_positive, "slot", name) for name in ("packets", "bytes") if words.take_if(name)}
+    settings["slot"] = Slot(least_s, most_s, shape, budgets.get("packets"), budgets.get("bytes"))
 
 
 def _read_trace(words: _Words, settings: dict[str, Any]) -> None:
@@ -229,55 +232,3 @@ def _small_integer(text: str, field: str) -> int:
     if not (digits.isascii() and digits.isdigit() and len(digits) < 6):
         raise ConfigurationError(f"{field}: {text!r}; valid: a whole number of bytes, up to five digits")
     return int(text)
-
-
-def format_profile(profile: LinkProfile) -> str:
-    """The profile in the words that `parse_profile` reads."""
-    clauses = [_format_delay(profile)]
-    if profile.loss is not None:
-        clauses.append(profile.loss.words())
-    clauses += [f"{name} {_format_chance(getattr(profile, name))}" for name in ("duplicate", "corrupt", "reorder")]
-    clauses = [clause for clause in clauses if not clause.endswith(" ")]
-    if profile.reorder is not None and profile.gap > 1:
-        clauses.append(f"gap {profile.gap}")
-    if profile.rate is not None:
-        rate = profile.rate
-        numbers = [rate.overhead_bytes, rate.cell_bytes, rate.cell_overhead_bytes]
-        while numbers and numbers[-1] == 0:
-            numbers.pop()
-        clauses.append(" ".join(["rate", format_rate(rate.bits_per_second), *map(str, numbers)]))
-    if profile.limit != QUEUE_LIMIT:
-        clauses.append(f"limit {profile.limit}")
-    if profile.slot is not None:
-        clauses.append(f"slot {format_duration(profile.slot.least_s)} {format_duration(profile.slot.most_s)}")
-    if profile.trace is not None:
-        clauses.append(f"trace {shlex.quote(profile.trace.name)}")
-    for outage in profile.outages:
-        every = "" if outage.every_s is None else f" every {format_duration(outage.every_s)}"
-        clauses.append(f"outage {format_duration(outage.duration_s)} at {format_duration(outage.at_s)}{every}")
-    if profile.retransmit_s is not None:
-        clauses.append(f"retransmit {format_duration(profile.retransmit_s)}")
-    return " ".join(filter(None, clauses))
-
-
-def _format_delay(profile: LinkProfile) -> str:
-    if profile.delay_s == 0.0 and profile.jitter_s == 0.0:
-        return ""
-    words = ["delay", format_duration(profile.delay_s)]
-    shape = profile.distribution
-    if profile.jitter_s or profile.delay_correlation or shape != "uniform":
-        words.append(format_duration(profile.jitter_s))
-        if profile.delay_correlation:
-            words.append(format_share(profile.delay_correlation))
-        if isinstance(shape, DelayTable):
-            words += ["distribution", shlex.quote(shape.name)]
-        elif shape != "uniform":
-            words += ["distribution", shape]
-    return " ".join(words)
-
-
-def _format_chance(chance: Chance | None) -> str:
-    if chance is None:
-        return ""
-    correlation = f" {format_share(chance.correlation)}" if chance.correlation else ""
-    return format_share(chance.share) + correlation

@@ -5,7 +5,6 @@
 
 import heapq
 import math
-from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Generic, TypeVar, cast
 
@@ -14,8 +13,9 @@ import numpy as np
 from common.delay_distribution import cells, delays_at
 from common.link_expectation import expected
 from common.link_figures import LinkFigures
-from common.link_profile import QUEUE_LIMIT, Chance, LinkModel, LinkProfile, Slot
+from common.link_profile import QUEUE_LIMIT, Chance, LinkModel, LinkProfile
 from common.link_randomness import CorrelationModel, decisions, uniform_blocks
+from common.link_slots import SlotTimes
 from common.link_spec import Direction, LinkSpec, Stream, unused_clauses
 
 __all__ = [
@@ -39,8 +39,6 @@ Corrupt = Callable[[Item, BitFlip], Item]
 _MOST_RETRANSMISSIONS = 1000
 
 _MOST_OUTAGES_ON_END = 1000
-_MOST_SLOTS = 1000
-"""A message due after so many of the shortest slots has a slot of its own: what lies between is not drawn."""
 
 
 class DelayLine(Generic[Item]):
@@ -89,7 +87,7 @@ class DelayLine(Generic[Item]):
         self._duplicates = None if self._in_order else chances(profile.duplicate, 2)
         self._corruptions = chances(profile.corrupt, 3)
         self._reorders = chances(profile.reorder, 4)
-        self._slots = None if profile.slot is None else _Slots(profile.slot, generator(5))
+        self._slots = None if profile.slot is None else SlotTimes(profile.slot, generator(5))
         self._bits = generator(6)
         self._lost_again = decisions(generator(7), profile.retransmitted_share(), 0.0, "proper")
 
@@ -225,7 +223,7 @@ class DelayLine(Generic[Item]):
         return due_s
 
     def _enqueue(self, now_s: float, due_s: float, item: Item, number: int, size_bytes: int, *, copy: bool) -> None:
-        leaves_s = due_s if self._slots is None else self._slots.first_from(due_s, now_s)
+        leaves_s = due_s if self._slots is None else self._slots.take(due_s, now_s, size_bytes)
         heapq.heappush(self._queue, (leaves_s, due_s, self._entered, item, now_s, number, size_bytes, copy))
         self._entered += 1
 
@@ -263,30 +261,6 @@ class DelayLine(Generic[Item]):
                 break
             now_s = end_s
         return now_s
-
-
-class _Slots:
-    """The times at which messages leave."""
-
-    def __init__(self, slot: Slot, generator: np.random.Generator) -> None:
-        self._slot = slot
-        self._generator = generator
-        self._times_s: list[float] = []
-
-    def first_from(self, due_s: float, now_s: float) -> float:
-        """The first slot at or after `due_s`. After a time without messages slots begin anew, as in netem."""
-        times_s = self._times_s
-        if not times_s or times_s[-1] < now_s:
-            self._times_s = times_s = [now_s + self._gap_s()]
-        if due_s - times_s[-1] > _MOST_SLOTS * self._slot.least_s:
-            times_s.append(due_s)
-        while times_s[-1] < due_s:
-            times_s.append(times_s[-1] + self._gap_s())
-        del times_s[: bisect_left(times_s, now_s)]
-        return times_s[bisect_left(times_s, due_s)]
-
-    def _gap_s(self) -> float:
-        return float(self._generator.uniform(self._slot.least_s, self._slot.most_s))
 
 
 def _endless_delays(profile: LinkProfile, generator: np.random.Generator) -> Iterator[float]:

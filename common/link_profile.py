@@ -8,6 +8,7 @@ from common.delay_distribution import DelayTable, Distribution, moments
 from common.errors import ConfigurationError
 from common.link_loss import LossModel
 from common.link_randomness import CorrelationModel
+from common.link_slots import Slot
 from common.link_trace import Trace
 
 LinkModel = Literal["datagram", "stream"]
@@ -15,7 +16,6 @@ LinkModel = Literal["datagram", "stream"]
 QUEUE_LIMIT = 1000
 """netem's own limit, in messages: what comes on top is dropped."""
 _SHORTEST_RECOVERY_S = 1e-3
-_SHORTEST_SLOT_S = 1e-4
 _RECOVERY_ROUND_TRIPS = 1.25
 _MOST_RETRANSMITTED = 0.99
 
@@ -60,21 +60,6 @@ class Rate:
             cells = -(-size_bytes // self.cell_bytes)
             size_bytes = cells * (self.cell_bytes + self.cell_overhead_bytes)
         return 8.0 * size_bytes / self.bits_per_second
-
-
-@dataclass(frozen=True)
-class Slot:
-    """Times at which alone messages leave, each `least_s` to `most_s` after the one before."""
-
-    least_s: float
-    most_s: float
-
-    def __post_init__(self) -> None:
-        if not _SHORTEST_SLOT_S <= self.least_s <= self.most_s < math.inf:
-            raise ValueError(
-                f"from {1e3 * self.least_s:g}ms to {1e3 * self.most_s:g}ms; "
-                f"valid: {1e3 * _SHORTEST_SLOT_S:g}ms or more, the shorter one first"
-            )
 
 
 @dataclass(frozen=True)
@@ -183,7 +168,7 @@ class LinkProfile:
 
     def words(self) -> str:
         """The profile in the words that `parse` reads; empty where nothing is asked for."""
-        from common.link_grammar import format_profile  # noqa: PLC0415
+        from common.link_words import format_profile  # noqa: PLC0415
 
         return format_profile(self)
 

@@ -164,6 +164,31 @@ def test_slots_of_random_length() -> None:
     assert gaps_s.mean() == pytest.approx(0.020, abs=0.5e-3)
 
 
+def test_a_slot_has_room_for_so_many_messages() -> None:
+    run = Run("slot 10ms packets 4", 2000)
+    times_s, counts = np.unique([due_s for due_s, _ in run.deliveries], return_counts=True)
+    # 10 messages come in the time of 4: all slots are full, and the rest waits for the next.
+    assert set(counts[:-1]) == {4}
+    assert np.diff(times_s) == pytest.approx(0.010)
+    assert [number for _, number in run.deliveries] == [number for number, lost in enumerate(run.lost) if not lost]
+
+
+def test_a_slot_ends_with_the_message_that_fills_its_bytes() -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse("slot 10ms bytes 250"))
+    for size_bytes in (100, 100, 100, 100):
+        line.push(0.0, bytes(size_bytes))
+    # As in netem, a slot with a byte left takes a whole message.
+    assert [len(line.pop(now_s)) for now_s in (0.0101, 0.0201)] == [3, 1]
+
+
+def test_gaps_of_slots_follow_a_distribution() -> None:
+    run = Run("slot distribution normal 20ms 2ms", 40_000)
+    gaps_s = np.diff(sorted({due_s for due_s, _ in run.deliveries}))
+    # A slot begins anew with the next message when nothing waits: half a period later on average.
+    assert gaps_s.mean() == pytest.approx(0.020 + 0.5 * PERIOD_S, abs=0.2e-3)
+    assert gaps_s.std() == pytest.approx(0.002, abs=0.2e-3)
+
+
 def test_an_outage_loses_datagrams() -> None:
     run = Run("delay 5ms outage 0.2s at 0.5s every 1s", 3000)
     gone = [number for number, lost in enumerate(run.lost) if lost]
@@ -242,6 +267,8 @@ CLAUSES = (
     "rate 500kbit 10",
     "limit 4",
     "slot 2ms 5ms",
+    "slot 5ms packets 3 bytes 300",
+    "slot distribution pareto 5ms 1ms packets 9",
     "outage 10ms at 5ms every 30ms",
 )
 

@@ -11,7 +11,8 @@ from common.delay_distribution import DelayTable
 from common.errors import ConfigurationError
 from common.link_loss import GilbertElliott, LossModel, RandomLoss, StateLoss
 from common.link_model import LinkProfile, LinkSpec
-from common.link_profile import Chance, Outage, Rate, Slot
+from common.link_profile import Chance, Outage, Rate
+from common.link_slots import Slot, SlotShape
 
 repeatable = settings(derandomize=True, deadline=None)
 
@@ -46,6 +47,11 @@ repeatable = settings(derandomize=True, deadline=None)
         ("limit 7", LinkProfile(limit=7)),
         ("slot 800us 1ms", LinkProfile(slot=Slot(0.0008, 0.001))),
         ("slot 2ms", LinkProfile(slot=Slot(0.002, 0.002))),
+        ("slot 2ms 3ms packets 5 bytes 900", LinkProfile(slot=Slot(0.002, 0.003, None, 5, 900))),
+        (
+            "slot distribution normal 2ms 1ms bytes 900",
+            LinkProfile(slot=Slot.shaped(SlotShape(0.002, 0.001, "normal"), None, 900)),
+        ),
         ("outage 2s at 10s", LinkProfile(outages=(Outage(2.0, 10.0),))),
         (
             "outage 2s at 10s every 30s outage 1s at 0s",
@@ -170,6 +176,10 @@ WORDS = (
         ("slot", "'slot' without", "slot MIN"),
         ("slot 0ms", "from 0ms", "0.1ms"),
         ("slot 2ms 1ms", "from 2ms to 1ms", "shorter one first"),
+        ("slot 2ms packets 0", "packets: '0'", "from 1"),
+        ("slot 2ms bytes", "'slot' without bytes", "slot MIN"),
+        ("slot distribution odd", "distribution: 'odd' is no distribution", "uniform"),
+        ("slot distribution normal 0ms 1ms", "gaps of 0ms", "0.1ms"),
         ("trace", "'trace' without", "trace FILE"),
         ("trace nowhere.csv", "'nowhere.csv'", "delay_ns"),
         ("trace /dev/zero", "'/dev/zero'", "delay_ns"),

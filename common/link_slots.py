@@ -1,0 +1,107 @@
+"""netem's slots: times at which alone messages leave, each with room for so many messages or bytes."""
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.delay_distribution import DelayTable, Distribution, delays_at
+
+SHORTEST_SLOT_S = 1e-4
+_MOST_SLOTS = 1000
+"""A message due after so many of the shortest slots has a slot of its own: what lies between is not drawn."""
+
+
+@dataclass(frozen=True)
+class SlotShape:
+    """Gaps between slots that follow a distribution, as a delay's jitter does."""
+
+    mean_s: float
+    jitter_s: float
+    distribution: Distribution | DelayTable
+
+    def __post_init__(self) -> None:
+        if not (SHORTEST_SLOT_S <= self.mean_s < math.inf and 0.0 <= self.jitter_s < math.inf):
+            raise ValueError(
+                f"gaps of {1e3 * self.mean_s:g}ms, jitter {1e3 * self.jitter_s:g}ms; "
+                f"valid: {1e3 * SHORTEST_SLOT_S:g}ms or more, and 0ms or more"
+            )
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Times at which alone messages leave, each `least_s` to `most_s` after the one before, or as `shape` says."""
+
+    least_s: float
+    most_s: float
+    shape: SlotShape | None = None
+    packets: int | None = None
+    """At most so many messages leave in one slot; None: any number."""
+    size_bytes: int | None = None
+    """The slot ends with the message that brings it to so many bytes; None: never."""
+
+    def __post_init__(self) -> None:
+        if not SHORTEST_SLOT_S <= self.least_s <= self.most_s < math.inf:
+            raise ValueError(
+                f"from {1e3 * self.least_s:g}ms to {1e3 * self.most_s:g}ms; "
+                f"valid: {1e3 * SHORTEST_SLOT_S:g}ms or more, the shorter one first"
+            )
+        for name in ("packets", "size_bytes"):
+            if (value := getattr(self, name)) is not None and value < 1:
+                raise ValueError(f"{name} = {value}; valid: 1 or more")
+
+    @classmethod
+    def shaped(cls, shape: SlotShape, packets: int | None = None, size_bytes: int | None = None) -> "Slot":
+        """Slots whose gaps follow `shape`."""
+        return cls(shape.mean_s, shape.mean_s, shape, packets, size_bytes)
+
+
+class SlotTimes:
+    """The slots of one line, drawn as they are needed, and the room that is left in each."""
+
+    def __init__(self, slot: Slot, generator: np.random.Generator) -> None:
+        self._slot = slot
+        self._generator = generator
+        self._times_s: list[float] = []
+        self._packets_left: list[float] = []
+        self._bytes_left: list[float] = []
+
+    def take(self, due_s: float, now_s: float, size_bytes: int) -> float:
+        """The first slot at or after `due_s` that has room, which a message of that size takes.
+
+        After a time without messages slots begin anew, as in netem. Room is given in the order of asking.
+        """
+        times_s = self._times_s
+        if not times_s or times_s[-1] < now_s:
+            self._forget(len(times_s))
+            self._add(now_s + self._gap_s())
+        if due_s - times_s[-1] > _MOST_SLOTS * self._slot.least_s:
+            self._add(due_s)
+        while times_s[-1] < due_s:
+            self._add(times_s[-1] + self._gap_s())
+        self._forget(bisect_left(times_s, now_s))
+        place = bisect_left(times_s, due_s)
+        while self._packets_left[place] <= 0.0 or self._bytes_left[place] <= 0.0:
+            place += 1
+            if place == len(times_s):
+                self._add(times_s[-1] + self._gap_s())
+        self._packets_left[place] -= 1.0
+        self._bytes_left[place] -= size_bytes
+        return times_s[place]
+
+    def _add(self, time_s: float) -> None:
+        self._times_s.append(time_s)
+        self._packets_left.append(math.inf if self._slot.packets is None else self._slot.packets)
+        self._bytes_left.append(math.inf if self._slot.size_bytes is None else self._slot.size_bytes)
+
+    def _forget(self, count: int) -> None:
+        for values in (self._times_s, self._packets_left, self._bytes_left):
+            del values[:count]
+
+    def _gap_s(self) -> float:
+        shape = self._slot.shape
+        if shape is None:
+            return float(self._generator.uniform(self._slot.least_s, self._slot.most_s))
+        drawn_s = delays_at(self._generator.random(1), shape.mean_s, shape.jitter_s, shape.distribution)
+        return max(float(drawn_s[0]), SHORTEST_SLOT_S)
