@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NoReturn, get_args
 
 from common.errors import ConfigurationError
-from common.keys import DEFAULT_FOLDER, KeyFolder, Side, checked_name, read_public_key
+from common.keys import DEFAULT_FOLDER, KeyFolder, Side, checked_name, passed_over_note, read_public_key
 from common.sockets.authentication import make_key_pair, public_part
 
 _STEPS = """\
@@ -103,6 +103,7 @@ def _listed(folder: KeyFolder) -> list[str]:
         if folder.secret_path(side).exists():
             lines.append(f"own      {side:<32} {public_part(folder.secret(side))}")
     lines += [f"allowed  {name:<32} {key}" for key, name in sorted(folder.allowed().items(), key=lambda item: item[1])]
+    lines += passed_over_note(folder)
     if len(lines) == 1:
         lines.append(f"empty; to begin: {folder.command('make robot')}, or make operator")
     return lines

@@ -13,6 +13,7 @@ from common.clock import MonotonicClock, clock_domain
 from common.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
+from common.keys import passed_over_note
 from common.link_model import BitFlip, DelayLine, LinkSpec, Stream, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_descriptor_limit, raise_priority
@@ -85,10 +86,10 @@ def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[st
     """What a person should know about who may come in."""
     if keys is None:
         return ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
+    folder = keys.allowed.folder
     names = ", ".join(sorted(keys.allowed.names.values()))
-    if names:
-        return [f"keys: lets in {names}"]
-    return [f"keys: nobody is let in yet; to change that: {keys.allowed.folder.command('allow NAME OPERATOR-KEY')}"]
+    who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {folder.command('allow NAME KEY')}"
+    return [f"keys: {text}" for text in (who, *passed_over_note(folder))]
 
 
 def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:

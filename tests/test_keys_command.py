@@ -33,6 +33,20 @@ def test_the_printed_commands_lead_from_nothing_to_an_allowed_operator(
     assert "anna" not in said(capsys, "list", *robot)
 
 
+def test_a_key_whose_file_is_named_as_no_peer_is_pointed_out(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    folder = ["--folder", str(tmp_path / "robot")]
+    key = re.findall(r"[0-9a-f]{64}", said(capsys, "make", "operator", "--folder", str(tmp_path / "operator")))[0]
+    said(capsys, "allow", "anna", key, *folder)
+    assert "passed over" not in said(capsys, "list", *folder)
+    (tmp_path / "robot" / "allowed" / "alice.smith.public").write_text(key)
+    (tmp_path / "robot" / "allowed" / ".hidden.public").write_text(key)
+    listed = said(capsys, "list", *folder)
+    assert "passed over, for its name is no peer's: alice.smith.public; valid: letters" in listed
+    assert "hidden" not in listed
+
+
 def test_a_public_file_may_be_handed_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     said(capsys, "make", "operator", "--folder", str(tmp_path / "operator"))
     handed = str(tmp_path / "operator" / "operator.public")
