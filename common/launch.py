@@ -41,9 +41,13 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
         wanted = "feelahead" if extra is None else f"feelahead[{extra}]"
         sys.stderr.write(f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}'\n")
         sys.exit(_BAD_INPUT)
-    for number in STOP_SIGNALS:
-        signal.signal(number, _interrupt)
-    run_command(program, command)
+    try:
+        for number in STOP_SIGNALS:
+            signal.signal(number, _interrupt)
+        run_command(program, command)
+    except KeyboardInterrupt:
+        # Just before or after what run_command looks after itself; unhandled, it would end us with SIGINT's status.
+        sys.exit(0)
 
 
 def single_threaded_algebra() -> None:

@@ -43,14 +43,27 @@ def command(arguments):
 launch("command", lambda: command)
 """
 
+# Past the command's own care, as a signal between two statements would be.
+SLOW_END = """
+import sys, time
+sys.argv = ["command"]
+import common.command_line
+from common.launch import launch
+def run_command(program, command):
+    print("ending", flush=True)
+    time.sleep(60)
+common.command_line.run_command = run_command
+launch("command", lambda: None)
+"""
+
 
 @pytest.mark.processes
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("code", [SLOW_IMPORT, SLOW_START])
+@pytest.mark.parametrize("code", [SLOW_IMPORT, SLOW_START, SLOW_END])
 def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Signals) -> None:
     with start("-c", code) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() in ("importing\n", "building\n")
+        assert process.stdout.readline() in ("importing\n", "building\n", "ending\n")
         process.send_signal(number)
         _, complaint = process.communicate(timeout=20)
     assert (process.returncode, complaint) == (0, "")
