@@ -15,7 +15,8 @@ from common.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, 
 from common.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.dualsense.effects import Off, TriggerEffect
-from operator_side.dualsense.report import Rumble, build_output_report, parse_input_report
+from operator_side.dualsense.input_report import parse_input_report
+from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
 from operator_side.trigger_effect import EffectSelector
 from operator_side.trigger_motion import OperatorIntent, TravelCalibration, operator_intent
 
@@ -182,9 +183,14 @@ class OperatorSide:
         written = (*effects, rumble)
         if written == self._written:
             return None
-        l2, r2, motors = (new if new != old else None for new, old in zip(written, self._written, strict=True))
-        self._written = written
-        return build_output_report(l2=l2, r2=r2, rumble=motors)  # type: ignore[arg-type]
+        before, self._written = self._written, written
+        return build_output_report(
+            OutputReport(
+                l2=effects[0] if effects[0] != before[0] else None,
+                r2=effects[1] if effects[1] != before[1] else None,
+                rumble=rumble if rumble != before[2] else None,
+            )
+        )
 
     def status(self, now_s: float) -> dict[str, float | str | None]:
         """A few figures for the status line."""

@@ -10,7 +10,7 @@ import msgspec
 from common.messages import Header, Telemetry, Vector3
 from operator_side.dualsense.controller_state import Button, Stick
 from operator_side.dualsense.effects import TriggerEffect
-from operator_side.dualsense.report import build_output_report
+from operator_side.dualsense.output_report import OutputReport, build_output_report
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.trigger_model import SENSED_TRAVEL, SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.simulated_operator import PersonSettings, Phase, SimulatedOperator
@@ -128,7 +128,7 @@ class Desk:
 
     def resist(self, r2: TriggerEffect, l2: TriggerEffect | None = None) -> None:
         off = stiffness_to_effect(0.0)
-        report = build_output_report(l2=l2 or off, r2=r2)
+        report = build_output_report(OutputReport(l2=l2 or off, r2=r2))
         self.device.write(report, self.now_s)
 
     def _frames(self, screen: Telemetry | None) -> Iterator[Telemetry | None]:

@@ -9,9 +9,11 @@ from typing import Any
 import pytest
 
 from common.errors import DeviceError
+from operator_side.dualsense.controller_state import ControllerState
 from operator_side.dualsense.device import HidDualSense, HidHandle, load_backend
 from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.report import ControllerState, Rumble, build_input_report, build_output_report
+from operator_side.dualsense.input_report import build_input_report
+from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report
 
 IDLE = build_input_report(ControllerState())
 
@@ -141,7 +143,7 @@ def test_bluetooth_is_recognised_by_id_and_length(report: bytes) -> None:
 def test_writing() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
-    report = build_output_report(r2=Feedback(3, 6))
+    report = build_output_report(OutputReport(r2=Feedback(3, 6)))
     device.write(report, 0.0)
     assert handle.written == [report]
 
@@ -151,7 +153,7 @@ def test_no_debug_code_and_no_nonsense_leaves() -> None:
     device = open_fake(handle)
     for place in (11, 22):
         for code in (0xFC, 0xFD, 0xFE):
-            report = bytearray(build_output_report(Off(), Off()))
+            report = bytearray(build_output_report(OutputReport(Off(), Off())))
             report[place] = code
             with pytest.raises(ValueError, match=f"0x{code:02x}"):
                 device.write(bytes(report), 0.0)
@@ -173,7 +175,7 @@ def test_unplugged_while_writing() -> None:
     device = open_fake(handle)
     handle.plugged_in = False
     with pytest.raises(DeviceError, match=r"gone .*: plug it in"):
-        device.write(build_output_report(Off()), 0.0)
+        device.write(build_output_report(OutputReport(Off())), 0.0)
     device.close()
     assert handle.closed
 
@@ -181,15 +183,15 @@ def test_unplugged_while_writing() -> None:
 def test_close_releases_what_was_written() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
-    device.write(build_output_report(r2=Feedback(0, 8)), 0.0)
+    device.write(build_output_report(OutputReport(r2=Feedback(0, 8))), 0.0)
     device.close()
     device.close()
-    assert handle.written[1:] == [build_output_report(Off(), Off(), Rumble())]
+    assert handle.written[1:] == [build_output_report(RELEASED)]
     assert handle.closed
     with pytest.raises(DeviceError, match="closed"):
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
-        device.write(build_output_report(), 1.0)
+        device.write(build_output_report(OutputReport()), 1.0)
 
 
 def test_close_leaves_a_controller_alone_that_was_only_read() -> None:

@@ -5,16 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DeviceError
+from operator_side.dualsense.controller_state import Button, ControllerState, TriggerFeedback
 from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off
+from operator_side.dualsense.input_report import parse_input_report
+from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.port import Device
-from operator_side.dualsense.report import (
-    Button,
-    ControllerState,
-    Rumble,
-    TriggerFeedback,
-    build_output_report,
-    parse_input_report,
-)
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
 from operator_side.trigger_effect import stiffness_to_effect
@@ -82,7 +77,7 @@ def test_a_pull_is_full_when_free_and_less_when_stiff() -> None:
     assert free.pressed == {Button.L2, Button.R2}
     assert free.r2_feedback == TriggerFeedback()
 
-    device.write(build_output_report(r2=Feedback(0, 8)), 1.0)
+    device.write(build_output_report(OutputReport(r2=Feedback(0, 8))), 1.0)
     stiff = settled(device, 1.0)
     assert stiff.l2 == 1.0
     assert 0.25 <= stiff.r2 <= 0.6
@@ -101,7 +96,7 @@ def test_travel_falls_over_the_whole_range_of_stiffness() -> None:
     for level in range(81):
         device = SimulatedDualSense()
         device.set_finger_force(0.0, NORMAL_FINGER_FORCE_N)
-        device.write(build_output_report(r2=stiffness_to_effect(level / 80)), 0.0)
+        device.write(build_output_report(OutputReport(r2=stiffness_to_effect(level / 80))), 0.0)
         travels.append(newest(device, 2.0).r2)
     assert travels == sorted(travels, reverse=True)
     # It is felt from the lightest level on, and in more steps than strengths: the finger also rests on the
@@ -113,14 +108,14 @@ def test_travel_falls_over_the_whole_range_of_stiffness() -> None:
 def test_output_reports_change_only_what_they_set() -> None:
     device = SimulatedDualSense()
     assert device.released
-    device.write(build_output_report(l2=Feedback(3, 6), rumble=Rumble(1.0, 0.2)), 0.0)
+    device.write(build_output_report(OutputReport(l2=Feedback(3, 6), rumble=Rumble(1.0, 0.2))), 0.0)
     assert device.effects == (Feedback(3, 6), Off())
     assert device.rumble == Rumble(1.0, 0.2)
     assert not device.released
-    device.write(build_output_report(r2=MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0))), 0.001)
+    device.write(build_output_report(OutputReport(r2=MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0)))), 0.001)
     assert device.effects == (Feedback(3, 6), MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0)))
     assert device.rumble == Rumble(1.0, 0.2)
-    device.write(build_output_report(l2=Off(), r2=Feedback(2, 0)), 0.002)
+    device.write(build_output_report(OutputReport(l2=Off(), r2=Feedback(2, 0))), 0.002)
     assert device.released
     assert device.write_count == 3
 
@@ -128,10 +123,10 @@ def test_output_reports_change_only_what_they_set() -> None:
 @pytest.mark.parametrize("report", [b"", b"\x31" + bytes(77), b"\x02" + bytes(46)])
 def test_a_bad_output_report_changes_nothing(report: bytes) -> None:
     device = SimulatedDualSense()
-    device.write(build_output_report(l2=Feedback(3, 6)), 0.0)
+    device.write(build_output_report(OutputReport(l2=Feedback(3, 6))), 0.0)
     with pytest.raises(ValueError, match="report"):
         device.write(report, 0.1)
-    half_good = bytearray(build_output_report(Off(), Off()))
+    half_good = bytearray(build_output_report(OutputReport(Off(), Off())))
     half_good[11] = 0xFC
     with pytest.raises(ValueError, match="0xfc"):
         device.write(bytes(half_good), 0.1)
@@ -157,7 +152,7 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, int, int
         for device in (coarse, fine):
             device.set_finger_force(force_n, force_n / 2)
             if writes:
-                device.write(build_output_report(stiffness_to_effect(level / 80), Off()), tick * 0.0025)
+                device.write(build_output_report(OutputReport(stiffness_to_effect(level / 80), Off())), tick * 0.0025)
         reports = [fine.read((tick + step / 12) * 0.0025) for step in range(1, ticks * 12)]
         tick += ticks
         reports.append(fine.read(tick * 0.0025))
@@ -171,7 +166,7 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, int, int
 
 def test_close_releases_and_ends() -> None:
     device = SimulatedDualSense()
-    device.write(build_output_report(Feedback(0, 8), Feedback(0, 8), Rumble(1.0, 1.0)), 0.0)
+    device.write(build_output_report(OutputReport(Feedback(0, 8), Feedback(0, 8), Rumble(1.0, 1.0))), 0.0)
     device.close()
     device.close()
     assert device.released
@@ -180,7 +175,7 @@ def test_close_releases_and_ends() -> None:
     with pytest.raises(DeviceError, match="closed"):
         device.read(0.1)
     with pytest.raises(DeviceError, match="closed"):
-        device.write(build_output_report(), 0.1)
+        device.write(build_output_report(OutputReport()), 0.1)
 
 
 def test_arguments_out_of_range() -> None:
@@ -190,7 +185,7 @@ def test_arguments_out_of_range() -> None:
         with pytest.raises(ValueError, match="now_s"):
             device.read(now_s)
         with pytest.raises(ValueError, match="now_s"):
-            device.write(build_output_report(), now_s)
+            device.write(build_output_report(OutputReport()), now_s)
     with pytest.raises(ValueError, match="left_stick"):
         device.set_sticks(left=(1.5, 0.0))
     with pytest.raises(ValueError, match="L2"):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.report import Button, ControllerState
+from operator_side.dualsense.controller_state import Button, ControllerState
 from operator_side.trigger_motion import (
     BUTTON_OF,
     Action,

@@ -25,7 +25,7 @@ from common.status import Status, StatusMode
 from common.stop_signal import StopSignal
 from operator_side.core import OperatorSide
 from operator_side.dualsense.controller_state import Button, ControllerState
-from operator_side.dualsense.report import build_input_report
+from operator_side.dualsense.input_report import build_input_report
 from operator_side.main import MOTION_PERIOD_S
 
 PROGRAM = "python -m feelahead.experiments.driver"

@@ -5,12 +5,18 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from operator_side.dualsense.attachments import CHARGED, ON_USB, Battery, Connections, TouchPoint
+
 Stick = tuple[float, float]
+Vector3 = tuple[float, float, float]
 
 SENSOR_TICKS_PER_S: Final = 3_000_000
 """The sensor timestamp counts thirds of a microsecond."""
 SENSOR_TIME_SPAN_S: Final = 2**32 / SENSOR_TICKS_PER_S
 """The sensor timestamp starts again at 0 after this long: 1431.7 s."""
+STANDARD_GRAVITY_M_S2: Final = 9.80665
+AT_REST_M_S2: Final[Vector3] = (0.0, STANDARD_GRAVITY_M_S2, 0.0)
+"""What the accelerometer says of a controller that lies flat: the table pushes it up, along y (SDL)."""
 
 
 class Button(Enum):
@@ -51,7 +57,7 @@ class TriggerFeedback:
     stop_location: int = 0
     """0 to 9 in every report seen so far."""
     status: int = 0
-    """Under a feedback effect: 0 no load, 1 load."""
+    """Feedback and vibration: 0 no load, 1 load; weapon: 0 ready, 1 firing, 2 fired (controllers wiki)."""
     active_effect: int = 0
     """0 other, 1 feedback, 2 weapon, 3 vibration."""
 
@@ -67,7 +73,10 @@ class TriggerFeedback:
 
 @dataclass(frozen=True, slots=True)
 class ControllerState:
-    """One input report; the defaults are a controller that nobody touches."""
+    """One input report; the defaults are a controller that nobody touches, flat on a table, charged, on USB.
+
+    Bluetooth's simple reports lack most of it: what a report does not say is None.
+    """
 
     left_stick: Stick = (0.0, 0.0)
     """(x, y), -1 to 1 each: right and up are positive. No dead zone is taken off."""
@@ -77,11 +86,21 @@ class ControllerState:
     r2: float = 0.0
     pressed: frozenset[Button] = frozenset()
     sequence: int = 0
-    """0 to 255, one more with each report."""
-    sensor_time_s: float = 0.0
+    """0 to 255, one more with each report on USB. On Bluetooth always 1 (controllers wiki), to 63 in simple reports."""
+    sensor_time_s: float | None = 0.0
     """The controller's clock, which wraps after SENSOR_TIME_SPAN_S."""
-    l2_feedback: TriggerFeedback = TriggerFeedback()
-    r2_feedback: TriggerFeedback = TriggerFeedback()
+    l2_feedback: TriggerFeedback | None = TriggerFeedback()
+    r2_feedback: TriggerFeedback | None = TriggerFeedback()
+    gyro_rad_s: Vector3 | None = (0.0, 0.0, 0.0)
+    """Turning about x (pitch), y (yaw) and z (roll)."""
+    acceleration_m_s2: Vector3 | None = AT_REST_M_S2
+    """Along x, y and z, gravity's reaction included."""
+    touches: tuple[TouchPoint, ...] | None = ()
+    """The fingers on the pad, two at most."""
+    battery: Battery | None = CHARGED
+    connections: Connections | None = ON_USB
+    device_timestamp: int | None = 0
+    """A counter of 32 bits whose unit is not known."""
 
     def __post_init__(self) -> None:
         for name, stick in (("left_stick", self.left_stick), ("right_stick", self.right_stick)):
@@ -92,8 +111,16 @@ class ControllerState:
                 raise ValueError(f"{name} = {travel}; valid: 0 to 1")
         if not 0 <= self.sequence <= 255:
             raise ValueError(f"sequence = {self.sequence}; valid: 0 to 255")
-        if not (math.isfinite(self.sensor_time_s) and 0.0 <= self.sensor_time_s < SENSOR_TIME_SPAN_S):
-            raise ValueError(f"sensor_time_s = {self.sensor_time_s}; valid: from 0 to below {SENSOR_TIME_SPAN_S}")
+        time_s = self.sensor_time_s
+        if time_s is not None and not (math.isfinite(time_s) and 0.0 <= time_s < SENSOR_TIME_SPAN_S):
+            raise ValueError(f"sensor_time_s = {time_s}; valid: from 0 to below {SENSOR_TIME_SPAN_S}")
         for one, opposite in ((Button.UP, Button.DOWN), (Button.LEFT, Button.RIGHT)):
             if one in self.pressed and opposite in self.pressed:
                 raise ValueError(f"pressed has {one.value} and {opposite.value}; valid: one of the two")
+        for name, vector in (("gyro_rad_s", self.gyro_rad_s), ("acceleration_m_s2", self.acceleration_m_s2)):
+            if vector is not None and not (len(vector) == 3 and all(math.isfinite(axis) for axis in vector)):
+                raise ValueError(f"{name} = {vector}; valid: three finite numbers")
+        if self.touches is not None and len(self.touches) > 2:
+            raise ValueError(f"touches has {len(self.touches)} points; valid: two at most")
+        if self.device_timestamp is not None and not 0 <= self.device_timestamp < 2**32:
+            raise ValueError(f"device_timestamp = {self.device_timestamp}; valid: 0 to below 2^32")

@@ -6,21 +6,12 @@ from pathlib import Path
 from typing import Any, Final, Protocol, cast
 
 from common.errors import DeviceError, RemoteProtocolError
-from operator_side.dualsense.effects import Off
-from operator_side.dualsense.report import (
-    INPUT_REPORT_ID,
-    INPUT_REPORT_LENGTH,
-    Rumble,
-    build_output_report,
-    parse_output_report,
-)
+from operator_side.dualsense.output_report import RELEASED, build_output_report, parse_output_report
+from operator_side.dualsense.transport import Transport, transport_of_input
 
 SONY_VENDOR_ID: Final = 0x054C
 PRODUCT_IDS: Final = {0x0CE6: "DualSense", 0x0DF2: "DualSense Edge"}
 
-_BLUETOOTH_REPORT_ID = 0x31
-_BLUETOOTH_SIMPLE_LENGTH = 10
-"""Until something is written, a controller on Bluetooth sends a short report under the id that USB uses."""
 _READ_LENGTH = 128  # longer than any report, so that Bluetooth's 78 bytes are seen as what they are
 _MAX_DRAINED = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
 
@@ -134,12 +125,10 @@ class HidDualSense:
             raise DeviceError(_gone(str(error))) from error
         if not newest:
             return None
-        if newest[0] == _BLUETOOTH_REPORT_ID or (
-            newest[0] == INPUT_REPORT_ID and len(newest) == _BLUETOOTH_SIMPLE_LENGTH
-        ):
+        if _is_bluetooth(bytes(newest)):
             raise DeviceError(
                 f"the controller is connected by Bluetooth (report id 0x{newest[0]:02x}, {len(newest)} bytes), "
-                f"which is not supported yet: connect it by USB cable ({INPUT_REPORT_LENGTH}-byte reports)"
+                f"which is not supported yet: connect it by USB cable (64-byte reports)"
             )
         return bytes(newest)
 
@@ -165,7 +154,7 @@ class HidDualSense:
             return
         try:
             if self._written:
-                self._send(handle, build_output_report(Off(), Off(), Rumble()))
+                self._send(handle, build_output_report(RELEASED))
         except DeviceError:
             pass  # it is gone: nothing more can be told to it
         finally:
@@ -184,6 +173,13 @@ class HidDualSense:
             raise DeviceError(_gone(str(error))) from error
         if written < len(report):
             raise DeviceError(_gone(handle.error() or f"{written} of {len(report)} bytes written"))
+
+
+def _is_bluetooth(report: bytes) -> bool:
+    try:
+        return transport_of_input(report) is Transport.BLUETOOTH
+    except RemoteProtocolError:
+        return False  # whoever parses it says what is wrong
 
 
 def _find(backend: HidBackend) -> bytes:

@@ -1,4 +1,7 @@
-"""The Device port: what feelahead asks of a controller, real or simulated. Bytes only; report.py reads them."""
+"""The Device port: what feelahead asks of a controller, real or simulated.
+
+Bytes only: input_report.py and output_report.py know what is in them.
+"""
 
 from typing import Protocol
 
@@ -11,7 +14,7 @@ class Device(Protocol):
         ...
 
     def write(self, report: bytes, now_s: float) -> None:
-        """Send an output report; ValueError, and nothing sent, for one that report.py cannot read."""
+        """Send an output report; ValueError, and nothing sent, for one that output_report.py cannot read."""
         ...
 
     def close(self) -> None:

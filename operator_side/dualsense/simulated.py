@@ -12,7 +12,8 @@ from operator_side.dualsense.controller_state import (
     TriggerFeedback,
 )
 from operator_side.dualsense.effects import Off, TriggerEffect
-from operator_side.dualsense.report import Rumble, build_input_report, parse_output_report
+from operator_side.dualsense.input_report import build_input_report
+from operator_side.dualsense.output_report import Rumble, parse_output_report
 from operator_side.dualsense.trigger_model import SimulatedTrigger
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
