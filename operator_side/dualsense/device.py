@@ -106,6 +106,12 @@ class HidDualSense:
             raise DeviceError(_why_not_opened(path, handle.error() or str(error))) from error
         self._handle: HidHandle | None = handle
         self._written = False
+        self._released = True
+
+    @property
+    def released(self) -> bool:
+        """Nothing was ever written, or the triggers have been released by `close`."""
+        return self._released
 
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, or None when there is no new one; never waits.
@@ -144,7 +150,7 @@ class HidDualSense:
             parse_output_report(report)
         except RemoteProtocolError as error:
             raise ValueError(f"report: {error}") from error
-        self._written = True
+        self._written, self._released = True, False
         self._send(handle, report)
 
     def close(self) -> None:
@@ -155,6 +161,7 @@ class HidDualSense:
         try:
             if self._written:
                 self._send(handle, build_output_report(RELEASED))
+                self._released = True
         except DeviceError:
             pass  # it is gone: nothing more can be told to it
         finally:
@@ -180,6 +187,18 @@ def _is_bluetooth(report: bytes) -> bool:
         return transport_of_input(report) is Transport.BLUETOOTH
     except RemoteProtocolError:
         return False  # whoever parses it says what is wrong
+
+
+def write_once(path: bytes, report: bytes) -> None:
+    """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
+    handle = load_backend().device()
+    try:
+        handle.open_path(path)
+        handle.write(report)
+    except OSError as error:
+        raise DeviceError(_why_not_opened(path, handle.error() or str(error))) from error
+    finally:
+        handle.close()
 
 
 def _find(backend: HidBackend) -> bytes:
