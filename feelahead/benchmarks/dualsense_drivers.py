@@ -11,8 +11,8 @@ from typing import Any, Final, Protocol
 from common.errors import NoDeviceError, RemoteProtocolError
 from feelahead.benchmarks.dualsense_player import CythonBackend, Player, ctypes_binding
 from operator_side.core import OperatorSide
-from operator_side.dualsense.connection import Connection, ConnectionState
 from operator_side.dualsense.attachments import TouchPoint
+from operator_side.dualsense.connection import Connection, ConnectionState
 from operator_side.dualsense.controller_state import ControllerState
 from operator_side.dualsense.device import HidDualSense
 from operator_side.dualsense.effects import DEBUG_CODES, Feedback
@@ -38,6 +38,7 @@ _OUR_FLAGS: Final = (0x0F, 0x00)
 _FIRST_COMMON: Final = {0x02: 1, 0x31: 2}
 _FIRST_EFFECTS: Final = {Transport.USB: (11, 22), Transport.BLUETOOTH: (12, 23)}
 _PLAYED_REPORTS: Final = 64
+_PLUGGED_AGAIN_S: Final = 3.05
 _READS_PER_S: Final = round(1.0 / REPORT_PERIOD_S)
 
 
@@ -115,19 +116,19 @@ class Ours:
         return player.written
 
     def _after_unplug(self) -> str:
-        """Unplugged after a second, plugged in again at 3 s: when it reads on."""
+        """Unplugged after a second, plugged in again just after a look: when it reads on."""
         search = _Plugged()
         connection = Connection(search, _Nobody())
         now_s = 0.0
         lost_s = None
         while now_s < 10.0:
-            search.plugged = now_s < 1.0 or now_s >= 3.0
+            search.plugged = now_s < 1.0 or now_s >= _PLUGGED_AGAIN_S
             connection.update(now_s)
             connection.read(now_s)
             if connection.state is ConnectionState.LOST and lost_s is None:
                 lost_s = now_s
             if lost_s is not None and connection.state is ConnectionState.CONNECTED:
-                return f"says so, and reads on {now_s - 3.0:.1f} s after it is plugged in again"
+                return f"says so, and reads on {now_s - _PLUGGED_AGAIN_S:.1f} s after it is plugged in again"
             now_s += REPORT_PERIOD_S
         return "does not read on"
 
@@ -162,7 +163,7 @@ class PyDualSense:
             parse_s[transport] = best_time_s(reader.readInput, _varied(transport), rounds)
             readers[transport], _ = self._run([build_input_report(PULLED, transport)] * 2)
         count = round(1.0 / REPORT_PERIOD_S)
-        _, at_rest = self._run([build_input_report(PULLED)] * (count + 1))
+        _, at_rest = self._run([build_input_report(PULLED)] * (count + 2))
         ended, left = self._left_at_close()
         bluetooth, _ = self._run([build_input_report(ControllerState(), Transport.BLUETOOTH)] * 2 + [corrupted()])
         return Conduct(
@@ -173,7 +174,7 @@ class PyDualSense:
             corrupted_refused=bluetooth.state.R2_value == 0,
             foreign_flags=any(_foreign(report) for report in at_rest),
             released_at_close=_ends_released(left, effect_places=(11, 22)),
-            debug_codes=any(int(mode) in DEBUG_CODES for mode in self._modes()),
+            debug_codes=any(int(mode) in DEBUG_CODES for mode in self._modes().__members__.values()),
             after_unplug="says nothing, and reads no more" if not ended.connected else "goes on",
         )
 
