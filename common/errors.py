@@ -5,7 +5,9 @@
     │                        as one line and ends with exit code 2
     ├── RemoteProtocolError  the peer sent what is no valid message; it is counted and dropped whole
     │   └── OtherVersionError    the peer speaks another version of the protocol
-    └── DeviceError          the controller is missing, unreadable or gone; the text says what to do about it
+    └── DeviceError          the controller is unreadable or gone; the text says what to do about it
+        ├── NoDeviceError        there is none; one may be plugged in at any time
+        └── NoDriverError        what reads controllers is missing (also a ConfigurationError): no waiting mends that
 
 Arguments of public functions that are out of range raise a plain ValueError that names the argument.
 """
@@ -29,3 +31,11 @@ class OtherVersionError(RemoteProtocolError):
 
 class DeviceError(FeelaheadError):
     """The controller cannot be opened, read or written."""
+
+
+class NoDeviceError(DeviceError):
+    """No controller is connected."""
+
+
+class NoDriverError(DeviceError, ConfigurationError):
+    """hidapi is missing, broken or shadowed by another package."""

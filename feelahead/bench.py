@@ -18,6 +18,12 @@ def _link(arguments: Sequence[str]) -> int:
     return bench_link(arguments)
 
 
+def _dualsense(arguments: Sequence[str]) -> int:
+    from feelahead.benchmarks.dualsense_bench import bench_dualsense  # noqa: PLC0415
+
+    return bench_dualsense(arguments)
+
+
 _BENCHMARKS: dict[str, tuple[Callable[[Sequence[str]], int], str, str]] = {
     "overlap": (
         _overlap,
@@ -28,6 +34,11 @@ _BENCHMARKS: dict[str, tuple[Callable[[Sequence[str]], int], str, str]] = {
         _link,
         "the emulated link beside what was asked, and beside recordings of the kernel's netem",
         "pip install feelahead",
+    ),
+    "dualsense": (
+        _dualsense,
+        "our driver of the controller beside pydualsense, on the same simulated reports",
+        "pip install 'feelahead[operator,bench]'",
     ),
 }
 """Each name with what it runs, what that measures, and what brings it; imported only when it is asked for."""

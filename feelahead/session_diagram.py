@@ -12,11 +12,11 @@ from pathlib import Path
 from common.command_line import run_command
 from common.errors import ConfigurationError
 from common.session import OWNING, TRANSITIONS, SessionState, Transition
+from feelahead.generated_part import with_generated_part
 
 PROGRAM = "python -m feelahead.session_diagram"
 DOCUMENT = Path(__file__).parents[1] / "docs" / "session.md"
 _OWNER = "owner"
-BEGIN, END = "<!-- begin of the generated part -->", "<!-- end of the generated part -->"
 
 
 def diagram(transitions: Sequence[Transition] = TRANSITIONS) -> str:
@@ -76,22 +76,14 @@ def _rows(transitions: Sequence[Transition]) -> Iterator[str]:
 
 def generated() -> str:
     """What stands between the two marks of docs/session.md."""
-    return f"{BEGIN}\n```mermaid\n{diagram()}\n```\n\n{table()}\n{END}"
-
-
-def updated(document: str) -> str:
-    """`document` with its generated part made anew; ValueError when the marks are missing."""
-    before, found, rest = document.partition(BEGIN)
-    _, closed, after = rest.partition(END)
-    if not (found and closed):
-        raise ValueError(f"document lacks its marks; valid: one line {BEGIN} and, further down, one line {END}")
-    return before + generated() + after
+    return f"```mermaid\n{diagram()}\n```\n\n{table()}"
 
 
 def command(arguments: Sequence[str]) -> int:
     """Print the generated part, or with --write put it into the document."""
     if list(arguments) == ["--write"]:
-        DOCUMENT.write_text(updated(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+        document = with_generated_part(DOCUMENT.read_text(encoding="utf-8"), generated())
+        DOCUMENT.write_text(document, encoding="utf-8")
         return 0
     if list(arguments) in (["-h"], ["--help"]):
         sys.stdout.write(f"usage: {PROGRAM} [--write]\n\n{__doc__}")

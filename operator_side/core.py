@@ -16,7 +16,7 @@ from common.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.dualsense.effects import Off, TriggerEffect
 from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble, build_output_report
 from operator_side.trigger_effect import EffectSelector
 from operator_side.trigger_motion import OperatorIntent, TravelCalibration, operator_intent
 
@@ -69,7 +69,8 @@ class OperatorSide:
         self._lease_s = 0.0
         self._screen_order = (-1, -1)
         self._selectors = (EffectSelector(), EffectSelector())
-        self._written: tuple[TriggerEffect, TriggerEffect, Rumble] = (Off(), Off(), Rumble())
+        self._written: OutputReport | None = RELEASED
+        self._lost_s: float | None = None
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
@@ -123,6 +124,15 @@ class OperatorSide:
             return
         self._intent, self._intent_s = operator_intent(state, self._calibration), now_s
 
+    def controller_found(self, now_s: float) -> None:
+        """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
+        del now_s
+        self._written = None if self._haptics else RELEASED
+
+    def controller_lost(self, now_s: float) -> None:
+        """The controller went: what the hands did last counts no more, and not again before the arm has stopped."""
+        self._intent, self._lost_s = None, now_s
+
     def motion(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
         if self.lease is not None and now_s - self._lease_s > NOTICE_EXPIRES_S:
@@ -145,6 +155,8 @@ class OperatorSide:
             return None
         if lease is None or lease.session not in OWNING:
             return None
+        if self._must_stop_first() and not intent.emergency_stop:
+            return None
         return MotionCommand(
             self.link.stamp(now_s),
             l2=intent.l2,
@@ -159,6 +171,14 @@ class OperatorSide:
             hand_over=intent.hand_over,
             token=lease.token,
         )
+
+    def _must_stop_first(self) -> bool:
+        """Whether the arm may still be armed from before the controller was lost: then silence disarms it."""
+        if self._lost_s is None:
+            return False
+        if self.stiffness is not None and self._stiffness_s > self._lost_s and self.stiffness.state != "armed":
+            self._lost_s = None
+        return self._lost_s is not None
 
     def _follow_lease(self, notice: LeaseNotice, now_s: float) -> None:
         standing = "owner" if notice.session in OWNING else str(notice.session)
@@ -180,15 +200,18 @@ class OperatorSide:
             effects = (self._selectors[0].select(felt.l2), self._selectors[1].select(felt.r2))
             drive = round(felt.rumble * 8) / 8  # coarse steps: a motor needs no more, and each is a write
             rumble = Rumble(left=drive)
-        written = (*effects, rumble)
-        if written == self._written:
+        if self._written is None:
+            self._written = RELEASED
+            return build_output_report(RELEASED)
+        before, wanted = self._written, OutputReport(*effects, rumble)
+        if wanted == before:
             return None
-        before, self._written = self._written, written
+        self._written = wanted
         return build_output_report(
             OutputReport(
-                l2=effects[0] if effects[0] != before[0] else None,
-                r2=effects[1] if effects[1] != before[1] else None,
-                rumble=rumble if rumble != before[2] else None,
+                l2=wanted.l2 if wanted.l2 != before.l2 else None,
+                r2=wanted.r2 if wanted.r2 != before.r2 else None,
+                rumble=rumble if rumble != before.rumble else None,
             )
         )
 

@@ -3,6 +3,7 @@
 import json
 import secrets
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
@@ -17,8 +18,12 @@ from common.sockets.authentication import OperatorKeys
 from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.core import OperatorSide
-from operator_side.dualsense.device import HidDualSense
-from operator_side.dualsense.port import Device
+from operator_side.dualsense.connection import Connection
+from operator_side.dualsense.device import load_backend
+from operator_side.dualsense.finding import find_controller
+from operator_side.dualsense.port import OpenController
+from operator_side.dualsense.release_guard import ReleaseGuard
+from operator_side.dualsense.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import SimulatedOperator
@@ -32,7 +37,10 @@ def main() -> None:
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out."""
+    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out.
+
+    A real controller need not be there: it is waited for, and so is one that was unplugged.
+    """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
     core = OperatorSide(
@@ -52,35 +60,41 @@ def command(arguments: Sequence[str]) -> int:
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
-        device: Device
         person: SimulatedOperator | None = None
-        if settings.device == "simulated":
-            device = simulated = SimulatedDualSense()
-            person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
-        else:
-            device = HidDualSense()
-        raise_priority()
-        for text in make_realtime() if settings.realtime else ():
-            status.note(text)
-        loop = _Loop(settings, core, line, sockets, device, person, status)
-        failure: FeelaheadError | None = None
-        try:
-            loop.run(stop)
-        except BrokenPipeError:
-            ignore_broken_output()
-        except FeelaheadError as error:
-            failure = error
-        finally:
-            device.close()
-        # A real controller cannot be asked, but closing it raises when the release cannot be written.
-        released = device.released if isinstance(device, SimulatedDualSense) else True
+        with ExitStack() as stack:
+            if settings.device == "simulated":
+                simulated = SimulatedDualSense()
+                person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
+                connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
+            else:
+                connection = _real_controller(settings, core, stack)
+            stack.callback(connection.close)
+            raise_priority()
+            for text in make_realtime() if settings.realtime else ():
+                status.note(text)
+            loop = _Loop(settings, core, line, sockets, connection, person, status)
+            failure: FeelaheadError | None = None
+            try:
+                loop.run(stop)
+            except BrokenPipeError:
+                ignore_broken_output()
+            except FeelaheadError as error:
+                failure = error
         errors = [] if failure is None else [str(failure)]
-        summary = core.summary() | loop.summary() | {"triggers_released": released, "errors": errors}
+        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors}
         if settings.summary is not None:
             settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         if failure is not None:
             raise failure
     return 0
+
+
+def _real_controller(settings: OperatorSettings, core: OperatorSide, stack: ExitStack) -> Connection:
+    """Whatever real controller is there or comes; NoDriverError when none ever could."""
+    backend = load_backend()
+    search = BackgroundSearch(lambda preferred: find_controller(backend, preferred))
+    guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
+    return Connection(search, core, guard)
 
 
 class _Loop:
@@ -92,7 +106,7 @@ class _Loop:
         core: OperatorSide,
         line: DelayLine[bytes],
         sockets: OperatorSockets,
-        device: Device,
+        connection: Connection,
         person: SimulatedOperator | None,
         status: Status,
     ) -> None:
@@ -100,7 +114,7 @@ class _Loop:
         self._core = core
         self._line = line
         self._sockets = sockets
-        self._device = device
+        self._connection = connection
         self._person = person
         self._status = status
         self._clock = MonotonicClock()
@@ -124,7 +138,7 @@ class _Loop:
                 for _, payload in seen:
                     self._core.receive_view(payload, now_s)
                 if (output := self._core.output_report(now_s)) is not None:
-                    self._device.write(output, now_s)
+                    self._connection.write(output, now_s)
                 moved = self._pacer.due(now_s)
                 if moved:
                     self._move(now_s)
@@ -137,6 +151,7 @@ class _Loop:
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
         return {
+            "controller": {"found": self._connection.found, "state": str(self._connection.state)},
             "pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}},
             "link": link_summary("to_robot", {"haptics": self._line}),
         }
@@ -145,17 +160,21 @@ class _Loop:
         self._pacer.begin(now_s)
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
-        if (report := self._device.read(now_s)) is not None:
+        self._connection.update(now_s)
+        if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
         for payload in self._core.motion(now_s):
             self._line.push(now_s, payload)
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
+        for text in self._connection.take_notes():
+            self._status.note(text)
         if self._status.due(now_s):
             values: dict[str, Value] = dict(self._core.status(now_s))
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble
+            values["controller"] = self._connection.state
             if self._person is not None:
                 values["person"] = self._person.phase
             self._status.show(now_s, values | {"motion_overruns": self._pacer.overruns})

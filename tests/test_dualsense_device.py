@@ -1,4 +1,4 @@
-"""The HID driver against a stand-in for hidapi that behaves as measured: [] and OSError, -1 on a dead write."""
+"""The HID driver against a stand-in for hidapi."""
 
 import builtins
 import sys
@@ -8,96 +8,87 @@ from typing import Any
 
 import pytest
 
-from common.errors import DeviceError
+from common.errors import ConfigurationError, DeviceError, NoDriverError
 from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidDualSense, HidHandle, load_backend
+from operator_side.dualsense.device import HidDualSense, load_backend
 from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.input_report import build_input_report
-from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report
+from operator_side.dualsense.input_report import build_simple_input_report
+from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
+from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.transport import Transport
+from tests.fake_hid import ADDRESS, BLUETOOTH, CALIBRATION, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
 
-IDLE = build_input_report(ControllerState())
-
-
-class FakeHandle:
-    def __init__(self, opens: bool = True, reason: str = "") -> None:
-        self.opens = opens
-        self.reason = reason
-        self.opened: bytes | None = None
-        self.nonblocking = 0
-        self.waiting: list[bytes] = []
-        self.written: list[bytes] = []
-        self.plugged_in = True
-        self.closed = False
-
-    def open_path(self, path: bytes) -> None:
-        if not self.opens:
-            raise OSError("open failed")
-        self.opened = path
-
-    def set_nonblocking(self, flag: int) -> int:
-        self.nonblocking = flag
-        return 0
-
-    def read(self, max_length: int) -> list[int]:
-        assert self.nonblocking == 1
-        if not self.plugged_in:
-            raise OSError("read error")
-        return list(self.waiting.pop(0)[:max_length]) if self.waiting else []
-
-    def write(self, data: bytes) -> int:
-        if not self.plugged_in:
-            return -1
-        self.written.append(data)
-        return len(data)
-
-    def close(self) -> None:
-        self.closed = True
-
-    def error(self) -> str:
-        return self.reason
-
-
-class FakeBackend:
-    def __init__(self, handle: FakeHandle, found: dict[int, list[bytes]]) -> None:
-        self.handle = handle
-        self.found = found
-
-    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
-        assert vendor_id == 0x054C
-        return [{"path": path} for path in self.found.get(product_id, [])]
-
-    def device(self) -> HidHandle:
-        return self.handle
+PATH = b"/dev/hidraw3"
+BOTH = [USB, BLUETOOTH]
+STIFF = OutputReport(r2=Feedback(3, 6))
 
 
 def open_fake(handle: FakeHandle) -> HidDualSense:
-    return HidDualSense(FakeBackend(handle, {0x0CE6: [b"/dev/hidraw3"]}))
+    return HidDualSense(FakeBackend({0x0CE6: {PATH: handle}}), PATH)
 
 
-@pytest.mark.parametrize("product_id", [0x0CE6, 0x0DF2])
-def test_either_model_is_found_and_opened_without_waiting(product_id: int) -> None:
-    handle = FakeHandle()
-    HidDualSense(FakeBackend(handle, {product_id: [b"/dev/hidraw3", b"/dev/hidraw4"]}))
-    assert handle.opened == b"/dev/hidraw3"
+@pytest.mark.parametrize("transport", BOTH)
+def test_what_it_is_is_asked_and_nothing_is_written(transport: Transport) -> None:
+    handle = FakeHandle(transport)
+    identity = open_fake(handle).identity
+    assert handle.opened == PATH
     assert handle.nonblocking == 1
     assert handle.written == []
+    assert (identity.transport, identity.address, identity.firmware) == (transport, ADDRESS, FIRMWARE)
+    assert identity.motion == MotionCalibration.of(CALIBRATION)
+    assert identity.first_report == handle.report()
 
 
-def test_no_controller() -> None:
-    with pytest.raises(DeviceError, match=r"no DualSense .*054C:0CE6.*0DF2.*USB cable.*--device simulated"):
-        HidDualSense(FakeBackend(FakeHandle(), {}))
+def test_bluetooth_is_switched_to_full_reports_by_asking() -> None:
+    handle = FakeHandle(BLUETOOTH)
+    open_fake(handle)
+    assert handle.full_mode
 
 
-def test_permission_denied_gives_the_udev_rule() -> None:
+def test_bluetooth_is_told_even_from_a_short_report() -> None:
+    handle = FakeHandle(BLUETOOTH, waiting=[build_simple_input_report(ControllerState())])
+    assert open_fake(handle).identity.transport is BLUETOOTH
+
+
+def test_a_feature_that_comes_garbled_is_asked_for_again() -> None:
+    identity = open_fake(FakeHandle(BLUETOOTH, garbled=3)).identity
+    assert (identity.address, identity.firmware) == (ADDRESS, FIRMWARE)
+
+
+@pytest.mark.parametrize("transport", BOTH)
+def test_a_controller_that_tells_nothing_of_itself_works(transport: Transport) -> None:
+    identity = open_fake(FakeHandle(transport, answers=False)).identity
+    assert (identity.transport, identity.address, identity.firmware) == (transport, None, None)
+    assert identity.motion == NOMINAL_MOTION
+
+
+def test_one_that_sends_nothing() -> None:
+    handle = FakeHandle(silent=True)
+    with pytest.raises(DeviceError, match="hidraw3 sends nothing: press its PS button"):
+        open_fake(handle)
+    assert handle.closed == 1
+
+
+def test_one_that_is_no_dualsense() -> None:
+    handle = FakeHandle(waiting=[b"\x11" + bytes(63)])
+    with pytest.raises(DeviceError, match=r"does not speak as a DualSense does \(.*id 0x11, 64 bytes"):
+        open_fake(handle)
+    assert handle.closed == 1
+
+
+def test_one_that_goes_away_while_it_is_asked() -> None:
+    handle = FakeHandle(plugged_in=False)
+    with pytest.raises(DeviceError, match="gone"):
+        open_fake(handle)
+    assert handle.closed == 1
+
+
+def test_permission_denied() -> None:
     handle = FakeHandle(opens=False, reason="Failed to open a device with path '/x': Permission denied")
     with pytest.raises(DeviceError) as caught:
         open_fake(handle)
-    text = str(caught.value)
     if sys.platform == "linux":
-        assert "no permission" in text
-        for product in ("0ce6", "0df2"):
-            assert f'ATTRS{{idVendor}}=="054c", ATTRS{{idProduct}}=="{product}", MODE="0660", TAG+="uaccess"' in text
-        assert "udevadm" in text
+        assert "no permission to open the controller at /dev/hidraw3: `feelahead doctor`" in str(caught.value)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="device nodes of Linux")
@@ -106,50 +97,54 @@ def test_permission_is_seen_even_where_hidapi_does_not_say(tmp_path: Path, monke
     node.touch()
     monkeypatch.setattr("os.access", lambda path, _mode: path != str(node))
     with pytest.raises(DeviceError, match="no permission"):
-        HidDualSense(FakeBackend(FakeHandle(opens=False), {0x0CE6: [bytes(node)]}))
+        HidDualSense(FakeBackend({0x0CE6: {bytes(node): FakeHandle(opens=False)}}), bytes(node))
 
 
 def test_another_reason_for_not_opening() -> None:
-    with pytest.raises(DeviceError, match=r"/dev/nowhere cannot be opened \(open failed\)"):
-        HidDualSense(FakeBackend(FakeHandle(opens=False), {0x0CE6: [b"/dev/nowhere"]}))
+    with pytest.raises(DeviceError, match=r"/dev/nowhere cannot be opened \(No such file or directory\)"):
+        HidDualSense(FakeBackend({}), b"/dev/nowhere")
 
 
-def test_reading_drains_to_the_newest() -> None:
-    handle = FakeHandle()
+@pytest.mark.parametrize("transport", BOTH)
+def test_reading_drains_to_the_newest(transport: Transport) -> None:
+    handle = FakeHandle(transport)
     device = open_fake(handle)
     assert device.read(0.0) is None
-    handle.waiting = [build_input_report(ControllerState(sequence=number)) for number in range(5)]
-    assert device.read(0.1) == build_input_report(ControllerState(sequence=4))
+    handle.waiting = [handle.report(number) for number in range(5)]
+    assert device.read(0.1) == handle.report(4)
     assert device.read(0.2) is None
 
 
 def test_draining_is_bounded() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
-    handle.waiting = [IDLE] * 1000
-    assert device.read(0.0) == IDLE
+    handle.waiting = [handle.report()] * 1000
+    assert device.read(0.0) == handle.report()
     assert len(handle.waiting) > 900
 
 
-@pytest.mark.parametrize("report", [b"\x31" + bytes(77), b"\x01" + bytes(9)])
-def test_bluetooth_is_recognised_by_id_and_length(report: bytes) -> None:
-    handle = FakeHandle()
+@pytest.mark.parametrize("given", BOTH)
+@pytest.mark.parametrize("transport", BOTH)
+def test_what_is_written_goes_out_in_its_own_framing(transport: Transport, given: Transport) -> None:
+    handle = FakeHandle(transport)
+    open_fake(handle).write(build_output_report(STIFF, given), 0.0)
+    [report] = handle.written
+    assert (report[0], len(report)) == ((0x02, 48) if transport is USB else (0x31, 78))
+    assert parse_output_report(report) == STIFF
+
+
+def test_each_report_over_bluetooth_has_the_next_number_and_a_checksum() -> None:
+    handle = FakeHandle(BLUETOOTH)
     device = open_fake(handle)
-    handle.waiting = [report]
-    with pytest.raises(DeviceError, match=rf"Bluetooth \(report id 0x{report[0]:02x}, {len(report)} bytes\)"):
-        device.read(0.0)
+    for _ in range(20):
+        device.write(build_output_report(STIFF), 0.0)
+    assert [report[1] >> 4 for report in handle.written] == [number % 16 for number in range(20)]
+    assert all(valid_checksum(report) for report in handle.written)
 
 
-def test_writing() -> None:
-    handle = FakeHandle()
-    device = open_fake(handle)
-    report = build_output_report(OutputReport(r2=Feedback(3, 6)))
-    device.write(report, 0.0)
-    assert handle.written == [report]
-
-
-def test_no_debug_code_and_no_nonsense_leaves() -> None:
-    handle = FakeHandle()
+@pytest.mark.parametrize("transport", BOTH)
+def test_no_debug_code_and_no_nonsense_leaves(transport: Transport) -> None:
+    handle = FakeHandle(transport)
     device = open_fake(handle)
     for place in (11, 22):
         for code in (0xFC, 0xFD, 0xFE):
@@ -160,6 +155,7 @@ def test_no_debug_code_and_no_nonsense_leaves() -> None:
     with pytest.raises(ValueError, match="no bytes"):
         device.write(b"", 0.0)
     assert handle.written == []
+    assert device.released
 
 
 def test_unplugged_while_reading() -> None:
@@ -170,24 +166,28 @@ def test_unplugged_while_reading() -> None:
         device.read(0.0)
 
 
-def test_unplugged_while_writing() -> None:
+def test_unplugged_while_writing_it_is_not_released() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
     handle.plugged_in = False
     with pytest.raises(DeviceError, match=r"gone .*: plug it in"):
-        device.write(build_output_report(OutputReport(Off())), 0.0)
+        device.write(build_output_report(STIFF), 0.0)
     device.close()
-    assert handle.closed
+    assert handle.closed == 1
+    assert not device.released
 
 
-def test_close_releases_what_was_written() -> None:
-    handle = FakeHandle()
+@pytest.mark.parametrize("transport", BOTH)
+def test_close_releases_what_was_written(transport: Transport) -> None:
+    handle = FakeHandle(transport)
     device = open_fake(handle)
-    device.write(build_output_report(OutputReport(r2=Feedback(0, 8))), 0.0)
+    device.write(build_output_report(STIFF), 0.0)
+    assert not device.released
     device.close()
     device.close()
-    assert handle.written[1:] == [build_output_report(RELEASED)]
-    assert handle.closed
+    assert handle.written[1:] == [build_output_report(RELEASED, transport, 1)]
+    assert handle.closed == 1
+    assert device.released
     with pytest.raises(DeviceError, match="closed"):
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
@@ -200,7 +200,8 @@ def test_close_leaves_a_controller_alone_that_was_only_read() -> None:
     device.read(0.0)
     device.close()
     assert handle.written == []
-    assert handle.closed
+    assert handle.closed == 1
+    assert device.released
 
 
 def test_hidapi_missing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,8 +213,10 @@ def test_hidapi_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         return real_import(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without_hidapi)
-    with pytest.raises(DeviceError, match=r"No module named .*pip install 'feelahead\[operator\]'"):
+    with pytest.raises(NoDriverError, match=r"No module named .*pip install 'feelahead\[operator\]'") as caught:
         load_backend()
+    assert isinstance(caught.value, ConfigurationError)  # no waiting mends it: the command ends with code 2
+    assert "\n" not in str(caught.value)
 
 
 def test_the_other_package_called_hid(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,7 +224,7 @@ def test_the_other_package_called_hid(monkeypatch: pytest.MonkeyPatch) -> None:
     module.enumerate = list  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "hid", module)
     monkeypatch.setattr(sys, "platform", "darwin")
-    with pytest.raises(DeviceError, match="pip uninstall hid"):
+    with pytest.raises(NoDriverError, match="pip uninstall hid"):
         load_backend()
 
 
@@ -231,7 +234,7 @@ def test_the_installed_hidapi_has_what_is_used() -> None:
     backend = load_backend()
     assert backend is hidraw
     handle = backend.device()
-    for name in ("open_path", "set_nonblocking", "read", "write", "close", "error"):
+    for name in ("open_path", "set_nonblocking", "read", "write", "get_feature_report", "close", "error"):
         assert callable(getattr(handle, name))
     assert backend.enumerate(0x054C, 0xFFFF) == []
     with pytest.raises(OSError, match="open failed"):

@@ -147,6 +147,56 @@ def test_hello_is_repeated_until_the_robot_answers(bench: Bench) -> None:
     assert hellos() == 1
 
 
+def test_what_the_hands_did_last_counts_no_more_without_a_controller(bench: Bench) -> None:
+    bench.read()
+    assert len(bench.commands()) == 1
+    bench.side.controller_lost(bench.now_s)
+    assert bench.commands() == []
+
+
+def test_a_controller_that_is_back_commands_nothing_before_the_arm_has_stopped(bench: Bench) -> None:
+    bench.feel(0.5)
+    bench.side.controller_lost(bench.now_s)
+    for state, commands in (("armed", 0), ("armed", 0), ("disarmed", 1), ("armed", 1)):
+        bench.now_s += 0.01
+        bench.side.controller_found(bench.now_s)
+        bench.feel(0.5, state)  # type: ignore[arg-type]
+        bench.notice(SessionState.DISARMED)
+        bench.read()
+        assert len(bench.commands()) == commands, state
+
+
+def test_its_emergency_stop_counts_at_once(bench: Bench) -> None:
+    bench.feel(0.5)
+    bench.side.controller_lost(bench.now_s)
+    bench.side.controller_found(bench.now_s)
+    bench.device.set_buttons(frozenset({Button.CIRCLE}))
+    bench.now_s += 0.01
+    bench.feel(0.5)
+    bench.read()
+    [command] = bench.commands()
+    assert command.emergency_stop
+
+
+def test_a_controller_that_is_found_is_released_before_it_is_told_anew(bench: Bench) -> None:
+    bench.feel(0.8)
+    stiff = bench.device.effects
+    bench.side.controller_lost(bench.now_s)
+    bench.side.controller_found(bench.now_s)
+    bench.write()
+    assert bench.device.released
+    bench.write()
+    assert bench.device.effects == stiff
+    assert bench.device.write_count == 3
+
+
+def test_without_haptics_a_controller_that_is_found_is_left_alone() -> None:
+    bench = Bench(haptics=False)
+    bench.side.controller_found(bench.now_s)
+    bench.feel(1.0)
+    assert bench.device.write_count == 0
+
+
 def telemetry(robot: LinkEnd, now_s: float, speed: float) -> bytes:
     return encode(
         Telemetry(

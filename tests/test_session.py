@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
-from feelahead.session_diagram import BEGIN, DOCUMENT, END, diagram, table, updated
+from feelahead.generated_part import BEGIN, END, with_generated_part
+from feelahead.session_diagram import DOCUMENT, diagram, generated, table
 
 CHANGING = [row for row in TRANSITIONS if row.after is not row.before]
 WAYS_IN = (SessionEvent.ASKED_WHILE_FREE, SessionEvent.LEASE_PASSED)
@@ -107,7 +108,7 @@ def test_the_reason_is_that_of_the_last_row() -> None:
 
 def test_the_document_shows_the_table_as_it_is() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert updated(text) == text, "out of date: python -m feelahead.session_diagram --write"
+    assert with_generated_part(text, generated()) == text, "out of date: python -m feelahead.session_diagram --write"
 
 
 def test_a_changed_row_changes_the_document() -> None:
@@ -117,7 +118,7 @@ def test_a_changed_row_changes_the_document() -> None:
 
 def test_a_document_without_marks_is_refused() -> None:
     with pytest.raises(ValueError, match="marks"):
-        updated(f"{END} the wrong way round {BEGIN}")
+        with_generated_part(f"{END} the wrong way round {BEGIN}", "text")
 
 
 @pytest.mark.parametrize(("flag", "code"), [("--writ", 2), ("--help", 0)])

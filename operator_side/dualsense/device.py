@@ -1,27 +1,33 @@
-"""A real DualSense over HID: the only file that imports hidapi, and only when a controller is opened."""
+"""A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
 
-import os
 import sys
-from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Protocol, TypeVar, cast
 
-from common.errors import DeviceError, RemoteProtocolError
-from operator_side.dualsense.output_report import RELEASED, build_output_report, parse_output_report
+from common.errors import DeviceError, NoDriverError, RemoteProtocolError
+from operator_side.dualsense.device_messages import INSTALL, gone, no_dualsense, not_opened, silent
+from operator_side.dualsense.feature_report import (
+    ADDRESS_ID,
+    CALIBRATION_ID,
+    FEATURE_LENGTHS,
+    FIRMWARE_ID,
+    Firmware,
+    parse_address,
+)
+from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
+from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report, parse_output_report
 from operator_side.dualsense.transport import Transport, transport_of_input
 
-SONY_VENDOR_ID: Final = 0x054C
-PRODUCT_IDS: Final = {0x0CE6: "DualSense", 0x0DF2: "DualSense Edge"}
+Read = TypeVar("Read")
 
-_READ_LENGTH = 128  # longer than any report, so that Bluetooth's 78 bytes are seen as what they are
-_MAX_DRAINED = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
-
-_INSTALL = "install it with: pip install 'feelahead[operator]'"
-_WITHOUT = "or run without a controller: --device simulated"
-_UDEV_RULES = "\n".join(
-    f'  KERNEL=="hidraw*", ATTRS{{idVendor}}=="{SONY_VENDOR_ID:04x}", ATTRS{{idProduct}}=="{product:04x}", '
-    'MODE="0660", TAG+="uaccess"'
-    for product in PRODUCT_IDS
-)
+_READ_LENGTH: Final = 128  # longer than any report, so that each is seen as long as it is
+_MAX_DRAINED: Final = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
+_FIRST_REPORT_MS: Final = 100
+_FIRST_REPORT_ATTEMPTS: Final = 5
+_FEATURE_ATTEMPTS: Final = 3
+"""A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
+_SEQUENCES: Final = 16
 
 
 class HidHandle(Protocol):
@@ -35,12 +41,16 @@ class HidHandle(Protocol):
         """1: `read` returns an empty list rather than wait."""
         ...
 
-    def read(self, max_length: int) -> list[int]:
-        """One report; OSError when the device is gone."""
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        """One report; empty after the timeout, which 0 leaves to set_nonblocking. OSError when the device is gone."""
         ...
 
     def write(self, data: bytes) -> int:
         """The number of bytes written; -1 when the device is gone."""
+        ...
+
+    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
+        """One feature report, with its id; OSError when the device does not answer."""
         ...
 
     def close(self) -> None:
@@ -65,7 +75,7 @@ class HidBackend(Protocol):
 
 
 def load_backend() -> HidBackend:
-    """Import hidapi; DeviceError when it is missing, broken or shadowed by the other package called `hid`.
+    """Import hidapi; NoDriverError when it is missing, broken or shadowed by the other package called `hid`.
 
     hidapi's wheel for Linux has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which
     goes through libusb and does not. Elsewhere there is only `hid`.
@@ -76,42 +86,65 @@ def load_backend() -> HidBackend:
         else:
             import hid as module  # noqa: PLC0415
     except ImportError as error:
-        raise DeviceError(
-            f"hidapi cannot be imported ({error}): uninstall the other package called hid if it is there, and"
-            f" {_INSTALL}, {_WITHOUT}"
+        raise NoDriverError(
+            f"hidapi cannot be imported ({error}): uninstall the other package called hid if it is there (pip uninstall"
+            f" hid), then {INSTALL}; or run without a controller: --device simulated"
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
-        raise DeviceError(
-            f"the module {module.__name__} is not hidapi's but another package's: pip uninstall hid, then {_INSTALL}"
+        raise NoDriverError(
+            f"the module {module.__name__} is not hidapi's but another package's: pip uninstall hid, then {INSTALL}"
+            " --force-reinstall"
         )
     return cast(HidBackend, module)
 
 
+@dataclass(frozen=True)
+class Identity:
+    """What a controller says of itself; None for what it does not tell."""
+
+    transport: Transport
+    address: str | None
+    """Its Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    firmware: Firmware | None
+    motion: MotionCalibration
+    first_report: bytes
+    """The input report by which the transport was told."""
+
+
 class HidDualSense:
-    """The Device port on the first DualSense or DualSense Edge that is found on USB."""
+    """The Device port on a controller that is open, on USB or Bluetooth."""
 
-    def __init__(self, backend: HidBackend | None = None) -> None:
-        """Find and open a controller; DeviceError says what to do when there is none or it may not be opened.
+    def __init__(self, backend: HidBackend, path: bytes) -> None:
+        """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
 
-        `backend`: hidapi unless given.
+        On Bluetooth, asking is also what switches it to full reports.
         """
-        if backend is None:
-            backend = load_backend()
-        path = _find(backend)
         handle = backend.device()
         try:
             handle.open_path(path)
+        except OSError as error:
+            raise not_opened(path, handle.error() or str(error)) from error
+        try:
+            self.identity: Final = _ask(handle, path)
             handle.set_nonblocking(1)
         except OSError as error:
-            raise DeviceError(_why_not_opened(path, handle.error() or str(error))) from error
+            handle.close()
+            raise gone(str(error)) from error
+        except DeviceError:
+            handle.close()
+            raise
         self._handle: HidHandle | None = handle
+        self._sequence = 0
         self._written = False
+        self._released = True
+
+    @property
+    def released(self) -> bool:
+        """Nothing was ever written, or the triggers have been released by `close`."""
+        return self._released
 
     def read(self, now_s: float) -> bytes | None:
-        """The newest input report, or None when there is no new one; never waits.
-
-        DeviceError when the controller is gone, or on Bluetooth.
-        """
+        """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone."""
         del now_s  # a real controller has a clock of its own
         handle = self._require_open()
         newest: list[int] = []
@@ -122,18 +155,11 @@ class HidDualSense:
                     break
                 newest = report
         except OSError as error:
-            raise DeviceError(_gone(str(error))) from error
-        if not newest:
-            return None
-        if _is_bluetooth(bytes(newest)):
-            raise DeviceError(
-                f"the controller is connected by Bluetooth (report id 0x{newest[0]:02x}, {len(newest)} bytes), "
-                f"which is not supported yet: connect it by USB cable (64-byte reports)"
-            )
-        return bytes(newest)
+            raise gone(str(error)) from error
+        return bytes(newest) if newest else None
 
     def write(self, report: bytes, now_s: float) -> None:
-        """Send a USB output report.
+        """Send an output report, of whichever transport, in this controller's framing.
 
         ValueError, and nothing sent, for bytes that parse_output_report refuses: this is the last gate before
         the controller, and no debug effect code passes it. DeviceError when the controller is gone.
@@ -141,11 +167,11 @@ class HidDualSense:
         del now_s
         handle = self._require_open()
         try:
-            parse_output_report(report)
+            output = parse_output_report(report)
         except RemoteProtocolError as error:
             raise ValueError(f"report: {error}") from error
-        self._written = True
-        self._send(handle, report)
+        self._written, self._released = True, False
+        self._send(handle, output)
 
     def close(self) -> None:
         """Take effects and rumble off if any were written and the controller still answers; let it go."""
@@ -154,7 +180,8 @@ class HidDualSense:
             return
         try:
             if self._written:
-                self._send(handle, build_output_report(RELEASED))
+                self._send(handle, RELEASED)
+                self._released = True
         except DeviceError:
             pass  # it is gone: nothing more can be told to it
         finally:
@@ -165,50 +192,61 @@ class HidDualSense:
             raise DeviceError("the controller is closed; open a new one")
         return self._handle
 
-    @staticmethod
-    def _send(handle: HidHandle, report: bytes) -> None:
+    def _send(self, handle: HidHandle, output: OutputReport) -> None:
+        report = build_output_report(output, self.identity.transport, self._sequence)
+        self._sequence = (self._sequence + 1) % _SEQUENCES
         try:
             written = handle.write(report)
         except OSError as error:
-            raise DeviceError(_gone(str(error))) from error
+            raise gone(str(error)) from error
         if written < len(report):
-            raise DeviceError(_gone(handle.error() or f"{written} of {len(report)} bytes written"))
+            raise gone(handle.error() or f"{written} of {len(report)} bytes written")
 
 
-def _is_bluetooth(report: bytes) -> bool:
+def write_once(path: bytes, report: bytes) -> None:
+    """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
+    handle = load_backend().device()
     try:
-        return transport_of_input(report) is Transport.BLUETOOTH
-    except RemoteProtocolError:
-        return False  # whoever parses it says what is wrong
+        handle.open_path(path)
+        handle.write(report)
+    except OSError as error:
+        raise not_opened(path, handle.error() or str(error)) from error
+    finally:
+        handle.close()
 
 
-def _find(backend: HidBackend) -> bytes:
-    for product_id in PRODUCT_IDS:
-        for found in backend.enumerate(SONY_VENDOR_ID, product_id):
-            path = found["path"]
-            if isinstance(path, bytes) and path:
-                return path
-    wanted = " or ".join(f"{name} ({SONY_VENDOR_ID:04X}:{pid:04X})" for pid, name in PRODUCT_IDS.items())
-    raise DeviceError(
-        f"no {wanted} found: connect one by USB cable (a cable that carries data), {_WITHOUT};"
-        " in a container or virtual machine, pass the device through"
+def _ask(handle: HidHandle, path: bytes) -> Identity:
+    """What the controller is; OSError when it goes away meanwhile."""
+    # Bluetooth starts with short reports: this is what ends them, so it comes before the first one is awaited.
+    _feature(handle, FIRMWARE_ID, bytes)
+    first_report = _first_report(handle, path)
+    try:
+        transport = transport_of_input(first_report)
+    except RemoteProtocolError as error:
+        raise no_dualsense(path, str(error)) from error
+    motion = _feature(handle, CALIBRATION_ID, lambda report: MotionCalibration.parse(report, transport))
+    return Identity(
+        transport=transport,
+        address=_feature(handle, ADDRESS_ID, lambda report: parse_address(report, transport)),
+        firmware=_feature(handle, FIRMWARE_ID, lambda report: Firmware.parse(report, transport)),
+        motion=NOMINAL_MOTION if motion is None else motion,
+        first_report=first_report,
     )
 
 
-def _why_not_opened(path: bytes, reason: str) -> str:
-    name = os.fsdecode(path)
-    denied = Path(name).exists() and not os.access(name, os.R_OK | os.W_OK)
-    if sys.platform == "linux" and (denied or "permission denied" in reason.lower()):
-        return (
-            f"no permission to open the controller at {name}: put these lines into"
-            f" /etc/udev/rules.d/70-dualsense.rules\n{_UDEV_RULES}\n"
-            "then run: sudo udevadm control --reload && sudo udevadm trigger; and plug the controller in again"
-        )
-    return (
-        f"the controller at {name} cannot be opened ({reason}): close other programs that use it (Steam Input),"
-        f" plug it in again, {_WITHOUT}"
-    )
+def _first_report(handle: HidHandle, path: bytes) -> bytes:
+    for _ in range(_FIRST_REPORT_ATTEMPTS):
+        report = handle.read(_READ_LENGTH, _FIRST_REPORT_MS)
+        if report:
+            return bytes(report)
+    raise silent(path)
 
 
-def _gone(reason: str) -> str:
-    return f"the controller is gone ({reason}): plug it in again and start anew"
+def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
+    """One feature, read as `parse` does; None when the controller does not answer, or not rightly."""
+    for _ in range(_FEATURE_ATTEMPTS):
+        try:
+            return parse(bytes(handle.get_feature_report(report_id, FEATURE_LENGTHS[report_id])))
+        except (OSError, RemoteProtocolError):
+            continue
+    return None

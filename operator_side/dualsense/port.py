@@ -3,11 +3,17 @@
 Bytes only: input_report.py and output_report.py know what is in them.
 """
 
+from dataclasses import dataclass
 from typing import Protocol
 
 
 class Device(Protocol):
     """A controller that is open. Any method may raise DeviceError; the text says what to do about it."""
+
+    @property
+    def released(self) -> bool:
+        """Both triggers are free of any effect, as far as anybody can know."""
+        ...
 
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
@@ -23,3 +29,18 @@ class Device(Protocol):
         Safe to call again; everything else raises DeviceError afterwards.
         """
         ...
+
+
+@dataclass(frozen=True)
+class OpenController:
+    """A controller that a search has found and opened."""
+
+    device: Device
+    name: str
+    """For people: what it is and how it is connected."""
+    address: str | None = None
+    """Its own, "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not tell."""
+    path: bytes | None = None
+    """Where the system has it; None for what is no hardware."""
+    release: bytes = b""
+    """The output report, as it goes over the wire, that takes every effect off; for the watchdog."""

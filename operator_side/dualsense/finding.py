@@ -1,0 +1,77 @@
+"""Which of the controllers that are there to use: the one from before, on USB rather than Bluetooth."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from common.errors import DeviceError
+from operator_side.dualsense.device import HidBackend, HidDualSense, Identity
+from operator_side.dualsense.device_messages import none_found
+from operator_side.dualsense.models import PRODUCT_IDS, SONY_VENDOR_ID
+from operator_side.dualsense.output_report import RELEASED, build_output_report
+from operator_side.dualsense.port import OpenController
+from operator_side.dualsense.transport import Transport
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A place where the system has a controller."""
+
+    path: bytes
+    model: str
+
+
+def sightings(backend: HidBackend) -> list[Sighting]:
+    """Every place once, in the system's order; nothing is opened."""
+    return list(dict.fromkeys(_listed(backend)))  # one that serves several purposes is listed for each
+
+
+def find_controller(backend: HidBackend, preferred: str | None = None) -> OpenController:
+    """Open the controller of the address `preferred`, else the first; NoDeviceError and DeviceError say why none.
+
+    A controller that is there on USB and on Bluetooth at once is one: USB is taken, the other way is left alone.
+    """
+    seen = sightings(backend)
+    if not seen:
+        raise none_found()
+    opened: list[tuple[Sighting, HidDualSense]] = []
+    failure: DeviceError | None = None
+    for sighting in seen:
+        try:
+            opened.append((sighting, HidDualSense(backend, sighting.path)))
+        except DeviceError as error:
+            failure = failure or error
+    if failure is not None and not opened:
+        raise failure
+    sighting, chosen = min(opened, key=lambda pair: _rank(pair[1].identity, preferred))
+    for _, other in opened:
+        if other is not chosen:
+            other.close()
+    transport = chosen.identity.transport
+    return OpenController(
+        device=chosen,
+        name=described(sighting.model, chosen.identity),
+        address=chosen.identity.address,
+        path=sighting.path,
+        release=build_output_report(RELEASED, transport),
+    )
+
+
+def described(model: str, identity: Identity) -> str:
+    """A controller in a few words."""
+    address = "" if identity.address is None else f" ({identity.address})"
+    return f"{model} on {identity.transport.value}{address}"
+
+
+def _listed(backend: HidBackend) -> Iterator[Sighting]:
+    for product_id, model in PRODUCT_IDS.items():
+        for found in backend.enumerate(SONY_VENDOR_ID, product_id):
+            path = found["path"]
+            if isinstance(path, bytes) and path:
+                yield Sighting(path, model)
+
+
+def _rank(identity: Identity, preferred: str | None) -> tuple[bool, bool]:
+    return (
+        preferred is not None and identity.address != preferred,
+        identity.transport is Transport.BLUETOOTH,
+    )

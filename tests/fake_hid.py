@@ -1,0 +1,145 @@
+"""A stand-in for hidapi that behaves as measured: `[]` and OSError, -1 on a dead write, [] on a silent read."""
+
+import zlib
+from dataclasses import dataclass, field
+from typing import Any
+
+from operator_side.dualsense.controller_state import ControllerState
+from operator_side.dualsense.device import HidHandle
+from operator_side.dualsense.feature_report import (
+    ADDRESS_ID,
+    CALIBRATION_ID,
+    FIRMWARE_ID,
+    CalibrationReport,
+    Firmware,
+    build_address,
+)
+from operator_side.dualsense.input_report import build_input_report, build_simple_input_report
+from operator_side.dualsense.transport import Transport
+
+ADDRESS = "a4:5e:60:01:02:03"
+FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
+CALIBRATION = CalibrationReport(
+    gyro_bias=(1, -2, 3),
+    gyro_plus=(8861, 8800, 8900),
+    gyro_minus=(-8861, -8800, -8900),
+    speed_plus=540,
+    speed_minus=540,
+    acceleration_plus=(8192, 8200, 8180),
+    acceleration_minus=(-8192, -8180, -8200),
+)
+USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
+
+
+@dataclass
+class FakeHandle:
+    """One controller, and the handle on it."""
+
+    transport: Transport = USB
+    address: str = ADDRESS
+    opens: bool = True
+    reason: str = ""
+    answers: bool = True
+    """Whether it answers feature reports."""
+    garbled: int = 0
+    """So many feature reports come over the air with a wrong bit."""
+    silent: bool = False
+    plugged_in: bool = True
+    waiting: list[bytes] = field(default_factory=list)
+    written: list[bytes] = field(default_factory=list)
+    opened: bytes | None = None
+    nonblocking: int = 0
+    closed: int = 0
+    full_mode: bool = False
+
+    def report(self, sequence: int = 0) -> bytes:
+        return build_input_report(ControllerState(sequence=sequence), self.transport)
+
+    def open_path(self, path: bytes) -> None:
+        if not self.opens:
+            raise OSError("open failed")
+        self.opened = path
+
+    def set_nonblocking(self, flag: int) -> int:
+        self.nonblocking = flag
+        return 0
+
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        assert timeout_ms > 0 or self.nonblocking == 1, "the loop would wait"
+        if not self.plugged_in:
+            raise OSError("read error")
+        if timeout_ms > 0 and not self.waiting and not self.silent:
+            return list(self._first_report())
+        return list(self.waiting.pop(0)[:max_length]) if self.waiting else []
+
+    def write(self, data: bytes) -> int:
+        if not self.plugged_in:
+            return -1
+        self.written.append(data)
+        return len(data)
+
+    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
+        if not (self.answers and self.plugged_in):
+            raise OSError("read error")
+        report = bytearray(
+            {
+                CALIBRATION_ID: CALIBRATION.build(self.transport),
+                ADDRESS_ID: build_address(self.address, self.transport),
+                FIRMWARE_ID: FIRMWARE.build(self.transport),
+            }[report_num]
+        )
+        self.full_mode = self.full_mode or report_num in (ADDRESS_ID, FIRMWARE_ID)
+        if self.garbled > 0:
+            self.garbled -= 1
+            report[3] ^= 0x10
+        return list(report[:max_length])
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def error(self) -> str:
+        return self.reason
+
+    def _first_report(self) -> bytes:
+        if self.transport is BLUETOOTH and not self.full_mode:
+            return build_simple_input_report(ControllerState())
+        return self.report()
+
+
+class FakeBackend:
+    """The system's controllers by product id and path; one that is opened again is the same."""
+
+    def __init__(self, found: dict[int, dict[bytes, FakeHandle]]) -> None:
+        self.found = found
+
+    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
+        assert vendor_id == 0x054C
+        return [{"path": path} for path in self.found.get(product_id, {})]
+
+    def device(self) -> HidHandle:
+        return _Unopened(self)
+
+
+class _Unopened(FakeHandle):
+    """A handle that becomes the controller's own when it is opened."""
+
+    def __init__(self, backend: FakeBackend) -> None:
+        super().__init__()
+        self._backend = backend
+
+    def open_path(self, path: bytes) -> None:
+        for controllers in self._backend.found.values():
+            if path in controllers:
+                controller = controllers[path]
+                self.reason = controller.reason
+                controller.open_path(path)
+                self.__class__ = FakeHandle  # type: ignore[assignment]
+                self.__dict__ = controller.__dict__
+                return
+        self.reason = "No such file or directory"
+        raise OSError("open failed")
+
+
+def valid_checksum(report: bytes) -> bool:
+    """Whether an output report over Bluetooth is one that hardware would take; written out apart from our own code."""
+    return zlib.crc32(b"\xa2" + report[:-4]) == int.from_bytes(report[-4:], "little")

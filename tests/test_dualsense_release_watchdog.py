@@ -1,0 +1,246 @@
+"""The watchdog as a real process, with a FIFO in the place of the controller's device node."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+import pytest
+
+from operator_side.dualsense.release_guard import ReleaseGuard
+from operator_side.dualsense.release_watchdog import LinuxTarget
+
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it needs a controller that hidapi finds"),
+]
+LIMIT_S = 20.0
+REPORT = bytes(range(48))
+
+
+class FakeController:
+    """A device node that remembers what is written to it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = os.fsencode(path)
+        os.mkfifo(path)
+        self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+
+    def written(self, within_s: float) -> bytes:
+        """What has been written, after waiting for the first of it; nothing after so long."""
+        readable, _, _ = select.select([self._file], [], [], within_s)
+        return os.read(self._file, 65536) if readable else b""
+
+    def __enter__(self) -> "FakeController":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+
+@pytest.fixture
+def controller(tmp_path: Path) -> Iterator[FakeController]:
+    with FakeController(tmp_path / "hidraw3") as made:
+        yield made
+
+
+# An operator side as the watchdog sees it: it says what it is asked to, then waits until it is ended.
+PARENT = """
+import sys
+from operator_side.dualsense.release_guard import ReleaseGuard
+report = bytes(range(48))
+with ReleaseGuard() as guard:
+    print(guard.process_id, flush=True)
+    for line in sys.stdin:
+        action, _, path = line.strip().partition(" ")
+        if action == "hold":
+            guard.hold(path.encode(), report)
+        elif action == "let-go":
+            guard.let_go()
+        elif action == "leave":
+            break
+        print("done", flush=True)
+"""
+
+
+class Parent:
+    """A real process with a watchdog."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", PARENT],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+            start_new_session=True,
+        )
+        self.process_id = self._process.pid
+        self.watchdog_id = int(self._answer())
+
+    def say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        assert self._answer() == "done"
+
+    def leave(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write("leave\n")
+        assert self._process.wait(LIMIT_S) == 0
+
+    def kill(self) -> None:
+        os.kill(self.process_id, signal.SIGKILL)
+        self._process.wait(LIMIT_S)
+
+    def _answer(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().strip()
+
+    def __enter__(self) -> "Parent":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+@pytest.fixture
+def parent() -> Iterator[Parent]:
+    with Parent() as started:
+        yield started
+
+
+def wait_for_end(process_id: int) -> None:
+    """Until a process that is no child of ours is gone, or is nothing but an entry that its parent has not read."""
+    try:
+        watched = os.pidfd_open(process_id)
+    except ProcessLookupError:
+        return
+    try:
+        assert select.select([watched], [], [], LIMIT_S)[0], "the watchdog is an orphan"
+    finally:
+        os.close(watched)
+
+
+def test_a_killed_operator_leaves_a_released_controller_and_no_orphan(
+    parent: Parent, controller: FakeController
+) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_nothing_is_written_while_the_parent_lives(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        os.kill(parent.watchdog_id, number)
+    assert controller.written(0.3) == b""
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+
+
+@pytest.mark.parametrize("last_words", [[], ["hold {path}", "let-go"]])
+def test_nothing_is_written_when_nothing_is_held(
+    parent: Parent, controller: FakeController, last_words: list[str]
+) -> None:
+    for words in last_words:
+        parent.say(words.format(path=os.fsdecode(controller.path)))
+    parent.kill()
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_a_clean_end_leaves_nobody_behind(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    parent.say("let-go")
+    parent.leave()
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_the_newest_controller_is_the_one_that_counts(
+    parent: Parent, controller: FakeController, tmp_path: Path
+) -> None:
+    with FakeController(tmp_path / "hidraw4") as other:
+        parent.say(f"hold {os.fsdecode(controller.path)}")
+        parent.say(f"hold {os.fsdecode(other.path)}")
+        parent.kill()
+        assert other.written(LIMIT_S) == REPORT
+        wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_the_path_may_become_another_device_s(parent: Parent, controller: FakeController, tmp_path: Path) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    Path(os.fsdecode(controller.path)).rename(tmp_path / "unplugged")
+    with FakeController(Path(os.fsdecode(controller.path))) as keyboard:
+        parent.kill()
+        assert controller.written(LIMIT_S) == REPORT
+        wait_for_end(parent.watchdog_id)
+        assert keyboard.written(0.0) == b""
+
+
+def wait_until_open(process_id: int, path: bytes) -> None:
+    with select.epoll() as pause:
+        for _ in range(round(LIMIT_S / 0.01)):
+            files = Path(f"/proc/{process_id}/fd").iterdir()
+            if any(os.fsencode(file.readlink()) == path for file in files):
+                return
+            pause.poll(0.01)
+    raise AssertionError(f"{path!r} was never opened")
+
+
+def test_a_controller_that_cannot_be_opened_harms_nobody(parent: Parent, tmp_path: Path) -> None:
+    parent.say(f"hold {tmp_path / 'nothing'}")
+    parent.kill()
+    wait_for_end(parent.watchdog_id)
+
+
+def test_it_starts_with_nothing_but_python_itself() -> None:
+    script = Path(__file__).parents[1] / "operator_side/dualsense/release_watchdog.py"
+    program = f"import runpy, sys; runpy.run_path({str(script)!r}); print('site' in sys.modules, len(sys.modules))"
+    said = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True, timeout=LIMIT_S
+    ).stdout.split()
+    assert said[0] == "False"
+    assert int(said[1]) < 80
+
+
+def test_without_a_watchdog_the_guard_says_so_and_goes_on(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        assert guard.running
+        assert guard.process_id is not None
+        os.kill(guard.process_id, signal.SIGKILL)
+        wait_for_end(guard.process_id)
+        assert not guard.running
+        guard.hold(controller.path, REPORT)
+        guard.let_go()
+
+
+def test_a_controller_that_refuses_is_tried_a_few_times() -> None:
+    attempts = 0
+
+    def refuse(file: int, report: bytes) -> int:
+        nonlocal attempts
+        attempts += 1
+        raise OSError(f"{len(report)} bytes to {file}")
+
+    target = LinuxTarget(os.fsencode(os.devnull), REPORT)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "write", refuse)
+        target.release()
+    assert attempts == 3
+    target.close()
+    target.close()
