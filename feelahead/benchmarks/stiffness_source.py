@@ -58,6 +58,11 @@ class StiffnessSource:
         """Whether an operator side has said Hello."""
         return self._peer is not None
 
+    def change(self) -> float:
+        """Send the stiffness as it is now at once; when."""
+        self._send(self._clock.now())
+        return self.sent_s
+
     def run(self, duration_s: float) -> None:
         """Answer, and send a stiffness every millisecond, for so long."""
         self._pacer.restart(self._clock.now())
