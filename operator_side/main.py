@@ -1,5 +1,6 @@
 """The process `feelahead-operator`: sockets, clock, controller, core; nothing else."""
 
+import functools
 import json
 import secrets
 from collections.abc import Sequence
@@ -63,17 +64,21 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             status.note(text)
         person: SimulatedOperator | None = None
         with ExitStack() as stack:
+            guard: ReleaseGuard | None = None
             if settings.device == "simulated":
                 simulated = SimulatedDualSense()
                 person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
-                connection = _real_controller(settings, core, stack, backend)
+                loaded = load_backend() if backend is None else backend
+                # Whoever only reads leaves nothing behind.
+                guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
+                connection = Connection(BackgroundSearch(functools.partial(find_controller, loaded)), core, guard)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, line, sockets, connection, person, status)
+            loop = _Loop(settings, core, line, sockets, connection, guard, person, status)
             failure: FeelaheadError | None = None
             try:
                 loop.run(stop)
@@ -90,16 +95,6 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     return 0
 
 
-def _real_controller(
-    settings: OperatorSettings, core: OperatorSide, stack: ExitStack, backend: HidBackend | None
-) -> Connection:
-    """Whatever real controller is there or comes; NoDriverError when none ever could."""
-    loaded = load_backend() if backend is None else backend
-    search = BackgroundSearch(lambda preferred: find_controller(loaded, preferred))
-    guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-    return Connection(search, core, guard)
-
-
 class _Loop:
     """Motion at absolute deadlines, messages and effects as they come."""
 
@@ -110,6 +105,7 @@ class _Loop:
         line: DelayLine[bytes],
         sockets: OperatorSockets,
         connection: Connection,
+        guard: ReleaseGuard | None,
         person: SimulatedOperator | None,
         status: Status,
     ) -> None:
@@ -118,6 +114,7 @@ class _Loop:
         self._line = line
         self._sockets = sockets
         self._connection = connection
+        self._guard = guard
         self._person = person
         self._status = status
         self._clock = MonotonicClock()
@@ -174,6 +171,8 @@ class _Loop:
         for text in self._connection.take_notes():
             self._status.note(text)
         if self._status.due(now_s):
+            if self._guard is not None and (trouble := self._guard.take_note()) is not None:
+                self._status.note(trouble)
             values: dict[str, Value] = dict(self._core.status(now_s))
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble

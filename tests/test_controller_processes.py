@@ -204,6 +204,17 @@ def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: Worl
     assert world.end() == (0, "")
 
 
+def test_a_watchdog_that_ends_before_us_is_told_of_once(world: World) -> None:
+    world.until(lambda: world.controller() == "connected")
+    [watchdog] = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text().split()
+    os.kill(int(watchdog), signal.SIGKILL)
+    world.until(lambda: any("watchdog process has ended" in note for note in world.notes()))
+    seen = len(world.events)
+    world.until(lambda: len(world.events) > seen + 5)
+    assert sum("watchdog" in note for note in world.notes()) == 1
+    assert world.process.poll() is None
+
+
 def test_only_reading_starts_no_watchdog_and_writes_nothing(tmp_path: Path) -> None:
     with World(tmp_path, "--no-haptics") as world:
         world.until(lambda: world.controller() == "connected" and world.source.connected)
