@@ -19,7 +19,7 @@ from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.core import OperatorSide
 from operator_side.dualsense.connection import Connection
-from operator_side.dualsense.device import load_backend
+from operator_side.dualsense.device import HidBackend, load_backend
 from operator_side.dualsense.finding import find_controller
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.release_guard import ReleaseGuard
@@ -36,10 +36,11 @@ def main() -> None:
     run_command("feelahead-operator", command)
 
 
-def command(arguments: Sequence[str]) -> int:
+def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out.
 
-    A real controller need not be there: it is waited for, and so is one that was unplugged.
+    A real controller need not be there: it is waited for, and so is one that was unplugged. `backend`: hidapi
+    unless given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
@@ -67,7 +68,7 @@ def command(arguments: Sequence[str]) -> int:
                 person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
-                connection = _real_controller(settings, core, stack)
+                connection = _real_controller(settings, core, stack, backend)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
@@ -89,10 +90,12 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _real_controller(settings: OperatorSettings, core: OperatorSide, stack: ExitStack) -> Connection:
+def _real_controller(
+    settings: OperatorSettings, core: OperatorSide, stack: ExitStack, backend: HidBackend | None
+) -> Connection:
     """Whatever real controller is there or comes; NoDriverError when none ever could."""
-    backend = load_backend()
-    search = BackgroundSearch(lambda preferred: find_controller(backend, preferred))
+    loaded = load_backend() if backend is None else backend
+    search = BackgroundSearch(lambda preferred: find_controller(loaded, preferred))
     guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
     return Connection(search, core, guard)
 
