@@ -11,7 +11,7 @@ from operator_side.dualsense.controller_state import (
     Stick,
     TriggerFeedback,
 )
-from operator_side.dualsense.effects import Off, TriggerEffect
+from operator_side.dualsense.effects import AnyEffect, Off
 from operator_side.dualsense.input_report import build_input_report
 from operator_side.dualsense.output_report import Rumble, parse_output_report
 from operator_side.dualsense.trigger_model import SimulatedTrigger
@@ -67,7 +67,7 @@ class SimulatedDualSense:
     # What a test may look at
 
     @property
-    def effects(self) -> tuple[TriggerEffect, TriggerEffect]:
+    def effects(self) -> tuple[AnyEffect, AnyEffect]:
         """The effects in force, L2 and R2, as decoded from the bytes."""
         return self._l2.effect, self._r2.effect
 

@@ -8,7 +8,7 @@ trigger forces exists.
 import math
 from typing import Final
 
-from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT, Off, TriggerEffect
+from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT, AnyEffect, Off
 
 SPRING_PRELOAD_N: Final = 0.5
 """What it takes to move the trigger at all (assumed)."""
@@ -55,7 +55,7 @@ class SimulatedTrigger:
 
     def __init__(self) -> None:
         self._finger_force_n = 0.0
-        self._effect: TriggerEffect = Off()
+        self._effect: AnyEffect = Off()
         self._equilibrium = 0.0
         self._travel = 0.0
 
@@ -82,7 +82,7 @@ class SimulatedTrigger:
         return self._finger_force_n > 0.0 and (strengths[self.zone] > 0 or strengths[reach] > 0)
 
     @property
-    def effect(self) -> TriggerEffect:
+    def effect(self) -> AnyEffect:
         """The effect in force."""
         return self._effect
 
@@ -91,7 +91,7 @@ class SimulatedTrigger:
         self._equilibrium = equilibrium_travel(finger_force_n, self._effect.zone_strengths)
         self._finger_force_n = finger_force_n
 
-    def set_effect(self, effect: TriggerEffect) -> None:
+    def set_effect(self, effect: AnyEffect) -> None:
         """Resist like `effect` from now on."""
         self._effect = effect
         self._equilibrium = equilibrium_travel(self._finger_force_n, effect.zone_strengths)
