@@ -6,7 +6,7 @@ from typing import Final
 
 from common.errors import DeviceError, RemoteProtocolError
 from operator_side.dualsense.attachments import CHARGED, ON_BLUETOOTH, ON_USB, Battery, BatteryState
-from operator_side.dualsense.checksum import Seed, check
+from operator_side.dualsense.checksum import Seed, is_sealed
 from operator_side.dualsense.effects import AnyEffect, Off
 from operator_side.dualsense.feature_report import (
     ADDRESS_ID,
@@ -195,7 +195,7 @@ class SimulatedDualSense(SimulatedHands):
         try:
             if transport_of_output(report) is not self._transport:
                 raise ValueError(f"report: id 0x{report[0]:02x} is not for a controller on {self._transport.value}")
-            if self._transport is Transport.BLUETOOTH and not _arrives_whole(report):
+            if self._transport is Transport.BLUETOOTH and not is_sealed(Seed.OUTPUT, report):
                 self._advance(now_s)
                 self._bad_checksums += 1
                 return
@@ -265,11 +265,3 @@ class SimulatedDualSense(SimulatedHands):
             return build_simple_input_report(self._state(number % 64, clock_s))
         sequence = number % 256 if self._transport is Transport.USB else _BLUETOOTH_SEQUENCE
         return build_input_report(self._state(sequence, clock_s), self._transport, self._motion)
-
-
-def _arrives_whole(report: bytes) -> bool:
-    try:
-        check(Seed.OUTPUT, report)
-    except RemoteProtocolError:
-        return False
-    return True
