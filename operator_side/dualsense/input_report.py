@@ -108,8 +108,11 @@ def parse_input_report(report: bytes, motion: MotionCalibration = NOMINAL_MOTION
     return state
 
 
-def _touches(*codes: int) -> tuple[TouchPoint, ...]:
-    return tuple(point for point in map(touch_point, codes) if point is not None)
+def _touches(first: int, second: int) -> tuple[TouchPoint, ...]:
+    """One finger or two: at least one of the codes has one."""
+    if first & NOT_TOUCHED:
+        return (touch_point(second),)
+    return (touch_point(first),) if second & NOT_TOUCHED else (touch_point(first), touch_point(second))
 
 
 def _parse_simple(report: bytes) -> ControllerState:
