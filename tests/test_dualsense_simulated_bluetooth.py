@@ -227,6 +227,10 @@ def test_power_reduction_weakens_the_triggers() -> None:
         travels.append(parse_input_report(report_at(device, 2.0)).r2)
     assert travels == sorted(travels)
     assert len(set(travels)) == 8
+    half = SimulatedDualSense()
+    half.set_finger_force(0.0, 3.7)
+    half.write(build_output_report(OutputReport(r2=Feedback(0, 4))), 0.0)
+    assert travels[4] == parse_input_report(report_at(half, 2.0)).r2  # steps of 12.5 %
 
 
 def test_arguments_out_of_range() -> None:

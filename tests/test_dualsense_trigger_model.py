@@ -172,8 +172,9 @@ def test_a_weapon_set_again_stays_as_fired_as_it_was() -> None:
     trigger = SimulatedTrigger()
     trigger.set_effect(Weapon(3, 6, 8))
     assert pulled(trigger, 5.0).status == 2
-    trigger.set_effect(Weapon(3, 6, 8))
     assert pulled(trigger, 2.2).status == 2
+    trigger.set_effect(Weapon(3, 6, 8))
+    assert trigger.feedback.status == 2
     trigger.set_effect(Weapon(3, 6, 7))  # another one: it has not fired yet
     assert trigger.feedback.status == 1
     trigger.set_effect(Off())

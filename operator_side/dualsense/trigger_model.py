@@ -135,28 +135,12 @@ class SimulatedTrigger:
         """Let `step_s` pass; ValueError for a negative or non-finite step."""
         if not (math.isfinite(step_s) and step_s >= 0.0):
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
-        if isinstance(self._effect, Weapon):
-            step_s = self._advance_to_events(self._effect, step_s)
         remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
         self._travel = self._equilibrium + (self._travel - self._equilibrium) * remaining
-
-    def _advance_to_events(self, weapon: Weapon, step_s: float) -> float:
-        """Fire, or make ready again, whenever that happens within the step; the time that is left after it."""
-        while True:
-            event = (weapon.start if self._fired else weapon.end) / ZONE_COUNT
-            ahead = event < self._travel if self._fired else event > self._travel
-            beyond = self._equilibrium < event if self._fired else self._equilibrium > event
-            if not (ahead and beyond):
-                return step_s
-            after_s = FINGER_TIME_CONSTANT_S * math.log(
-                (self._travel - self._equilibrium) / (event - self._equilibrium)
-            )
-            if after_s > step_s:
-                return step_s
-            step_s -= after_s
-            self._travel = event
-            self._fired = not self._fired
-            self._balance()
+        if isinstance(self._effect, Weapon):
+            # Nothing is held beyond either end, so neither firing nor getting ready changes the way.
+            zones = self._travel * ZONE_COUNT
+            self._fired = zones >= self._effect.start if self._fired else zones >= self._effect.end
 
     def _strengths(self) -> tuple[float, ...]:
         if self._fired:
