@@ -8,7 +8,7 @@ from operator_side.dualsense.controller_state import AT_REST_M_S2, Button, Contr
 from operator_side.dualsense.effects import Feedback, Off, Weapon
 from operator_side.dualsense.feature_report import CalibrationReport, Firmware, parse_address
 from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.model import Model
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.motion_sensors import MotionCalibration
 from operator_side.dualsense.output_report import MuteLed, OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated import SIMULATED_ADDRESS, SIMULATED_FIRMWARE, SimulatedDualSense

@@ -18,7 +18,7 @@ from operator_side.dualsense.feature_report import (
     build_address,
 )
 from operator_side.dualsense.input_report import build_input_report, build_simple_input_report
-from operator_side.dualsense.model import Model
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.motion_sensors import MotionCalibration
 from operator_side.dualsense.output_report import (
     RELEASED,

@@ -13,7 +13,7 @@ from operator_side.dualsense.controller_state import (
     Stick,
     Vector3,
 )
-from operator_side.dualsense.model import Model
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.trigger_model import SimulatedTrigger
 
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
