@@ -156,6 +156,22 @@ def test_a_debug_code_is_refused_wherever_it_stands(code: int, place: int, flags
             parse_output_report(report)
 
 
+@pytest.mark.parametrize(
+    ("flags", "rumble"),
+    [
+        ({0: 0x03}, Rumble(1.0, 0.2)),
+        ({0: 0x02, 38: 0x04}, Rumble(1.0, 0.2)),  # as hid-playstation does with present firmware
+        ({0: 0x02}, None),
+    ],
+)
+def test_either_way_to_rumble_is_read(flags: dict[int, int], rumble: Rumble | None) -> None:
+    block = bytearray(47)
+    block[2], block[3] = 51, 255
+    for place, value in flags.items():
+        block[place] = value
+    assert parse_output_report(b"\x02" + block) == OutputReport(rumble=rumble)
+
+
 def test_a_wrong_checksum_is_refused() -> None:
     report = bytearray(build_output_report(FULL, Transport.BLUETOOTH))
     report[30] ^= 0x40

@@ -6,7 +6,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off, TriggerEffect
+from operator_side.dualsense.controller_state import TriggerFeedback
+from operator_side.dualsense.effects import (
+    Feedback,
+    MultiPositionFeedback,
+    MultiPositionVibration,
+    Off,
+    SlopeFeedback,
+    TriggerEffect,
+    Vibration,
+    Weapon,
+)
 from operator_side.dualsense.trigger_model import (
     FINGER_TIME_CONSTANT_S,
     NORMAL_FINGER_FORCE_N,
@@ -17,11 +27,17 @@ from operator_side.dualsense.trigger_model import (
     SimulatedTrigger,
     equilibrium_travel,
 )
+from operator_side.dualsense.unofficial_effects import Bow
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 FORCES = st.floats(0.0, 10.0)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
-EFFECTS = st.one_of(st.just(Off()), st.builds(MultiPositionFeedback, STRENGTHS))
+WEAPONS = st.tuples(st.integers(2, 7), st.integers(3, 8), st.integers(1, 8)).map(
+    lambda drawn: Weapon(min(drawn[0], drawn[1] - 1), drawn[1], drawn[2])
+)
+EFFECTS: st.SearchStrategy[TriggerEffect] = st.one_of(
+    st.just(Off()), st.builds(MultiPositionFeedback, STRENGTHS), WEAPONS
+)
 
 
 def resistance_n(travel: float, strength: int) -> float:
@@ -103,7 +119,10 @@ def test_no_step_is_too_long(force_n: float, effect: TriggerEffect, step_s: floa
     trigger.set_finger_force(force_n)
     trigger.set_effect(effect)
     trigger.advance(step_s)
-    assert 0.0 <= trigger.travel <= equilibrium_travel(force_n, effect.zone_strengths)
+    ends = {equilibrium_travel(force_n, effect.zone_strengths)}
+    if trigger.feedback.status == 2:
+        ends.add(equilibrium_travel(force_n, (0,) * 10))
+    assert 0.0 <= trigger.travel <= max(ends)
 
 
 def test_load() -> None:
@@ -124,6 +143,89 @@ def test_load() -> None:
     assert trigger.zone == 9
     assert trigger.sensed_travel == 1.0
     assert trigger.loaded
+
+
+def pulled(trigger: SimulatedTrigger, force_n: float, duration_s: float = 2.0) -> TriggerFeedback:
+    trigger.set_finger_force(force_n)
+    trigger.advance(duration_s)
+    return trigger.feedback
+
+
+def test_a_weapon_is_ready_fires_and_is_ready_again_once_let_go() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(Weapon(3, 6, 8))
+    assert pulled(trigger, 0.0) == TriggerFeedback(0, 0, 2)
+    assert pulled(trigger, 1.5) == TriggerFeedback(2, 0, 2)  # short of it
+    assert pulled(trigger, 3.5) == TriggerFeedback(3, 1, 2)  # against it
+    assert trigger.travel == pytest.approx(0.3, abs=1e-9)
+    fired = pulled(trigger, 5.0)  # beyond 0.5 + 4.0 * 0.6 + 8 * 0.25 newtons
+    assert (fired.status, fired.active_effect) == (2, 2)
+    assert trigger.travel == pytest.approx(1.0, abs=1e-9)
+    # Letting go half way, it stays fired and holds nothing; back before zone 3 it is ready.
+    assert pulled(trigger, 2.2) == TriggerFeedback(4, 2, 2)
+    assert trigger.travel == pytest.approx((2.2 - 0.5) / 4.0, abs=1e-9)
+    assert pulled(trigger, 1.0) == TriggerFeedback(1, 0, 2)
+    assert pulled(trigger, 3.5).status == 1
+
+
+def test_a_weapon_set_again_stays_as_fired_as_it_was() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(Weapon(3, 6, 8))
+    assert pulled(trigger, 5.0).status == 2
+    assert pulled(trigger, 2.2).status == 2
+    trigger.set_effect(Weapon(3, 6, 8))
+    assert trigger.feedback.status == 2
+    trigger.set_effect(Weapon(3, 6, 7))  # another one: it has not fired yet
+    assert trigger.feedback.status == 1
+    trigger.set_effect(Off())
+    assert pulled(trigger, 5.0) == TriggerFeedback()
+    trigger.set_effect(Weapon(3, 6, 8))  # a trigger that is beyond it already
+    assert trigger.feedback.status == 2
+
+
+def test_a_shot_comes_when_the_trigger_gets_there() -> None:
+    """The time of the crossing follows from the exponential approach, whatever the step."""
+    trigger = SimulatedTrigger()
+    trigger.set_finger_force(6.0)
+    trigger.set_effect(Weapon(2, 5, 4))
+    held = 1.0  # 6 N overcome everything: the goal is the end of the travel
+    crossing_s = FINGER_TIME_CONSTANT_S * math.log(held / (held - 0.5))
+    trigger.advance(crossing_s - 1e-6)
+    assert trigger.feedback.status == 1
+    trigger.advance(2e-6)
+    assert trigger.feedback.status == 2
+
+
+@pytest.mark.parametrize("effect", [Vibration(4, 6, 30), MultiPositionVibration((0,) * 4 + (6,) * 6, 30)])
+def test_vibration_moves_nothing_and_is_reported_where_it_shakes(effect: TriggerEffect) -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(effect)
+    assert pulled(trigger, 1.5) == TriggerFeedback(2, 0, 3)
+    assert pulled(trigger, 3.7) == TriggerFeedback(8, 1, 3)
+    assert trigger.travel == pytest.approx(equilibrium_travel(3.7, (0,) * 10), abs=1e-9)
+
+
+def test_a_slope_reports_like_any_feedback() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(SlopeFeedback(0, 9, 1, 8))
+    assert pulled(trigger, 3.0) == TriggerFeedback(4, 1, 1)
+
+
+def test_unofficial_effects_report_as_other() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_effect(Bow(1, 4, 8, 8))
+    assert pulled(trigger, 2.0) == TriggerFeedback()
+    assert trigger.travel == pytest.approx(0.1, abs=1e-9)
+
+
+def test_less_power_is_less_strength() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_finger_force(3.0)
+    trigger.set_effect(Feedback(0, 8), power=0.5)
+    trigger.advance(2.0)
+    assert trigger.travel == pytest.approx(equilibrium_travel(3.0, (4,) * 10), abs=1e-9)
+    with pytest.raises(ValueError, match=r"power = 1\.5"):
+        trigger.set_effect(Off(), power=1.5)
 
 
 def test_arguments_out_of_range() -> None:

@@ -58,10 +58,8 @@ def connections_byte(connections: Connections) -> int:
     return sum(plugged << bit for bit, plugged in enumerate(bits))
 
 
-def touch_point(code: int) -> TouchPoint | None:
-    """A finger by its four bytes as one number, little-endian; None where there is none."""
-    if code & NOT_TOUCHED:
-        return None
+def touch_point(code: int) -> TouchPoint:
+    """A finger by its four bytes as one number, little-endian, in which NOT_TOUCHED is not set."""
     return TouchPoint(code & 0x7F, code >> 8 & 0xFFF, code >> 20)
 
 

@@ -21,6 +21,8 @@ class TouchPoint:
     """Downwards, in pad units: below 1080."""
 
     def __post_init__(self) -> None:
+        if 0 <= self.identity <= 127 and 0 <= self.x <= _TWELVE_BITS and 0 <= self.y <= _TWELVE_BITS:
+            return  # made for every report while a finger is down
         for name, value, highest in (
             ("identity", self.identity, 127),
             ("x", self.x, _TWELVE_BITS),

@@ -5,17 +5,20 @@ wiki, which agree.
 """
 
 import struct
-from functools import lru_cache
+from dataclasses import fields
+from functools import lru_cache, partial
 from typing import Final
 
 from operator_side.dualsense.attachment_codes import (
     BATTERIES,
     CONNECTIONS,
+    NOT_TOUCHED,
     battery_byte,
     connections_byte,
     touch_code,
     touch_point,
 )
+from operator_side.dualsense.attachments import TouchPoint
 from operator_side.dualsense.button_codes import AXIS, AXIS_DOWN, TRAVEL, byte_of_axis, code_of, pressed_of
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.controller_state import (
@@ -30,7 +33,6 @@ from operator_side.dualsense.transport import (
     SIMPLE_REPORT_ID,
     SIMPLE_REPORT_LENGTH,
     Transport,
-    is_simple_report,
     transport_of_input,
 )
 
@@ -38,6 +40,10 @@ from operator_side.dualsense.transport import (
 # timestamp 27-30, touch points 32-39, trigger feedback 41-42 (R2 first), active effects 47, device timestamp
 # 48-51, battery 52, sockets 53: offsets in the common block.
 _COMMON: Final = struct.Struct("<7B3B5x3h3hIxIIxBB4xBIBB")
+_unpack: Final = _COMMON.unpack_from
+_USB, _BLUETOOTH = INPUT_FRAMING[Transport.USB], INPUT_FRAMING[Transport.BLUETOOTH]
+_USB_ID, _USB_LENGTH, _USB_START = _USB.report_id, _USB.length, _USB.start
+_BLUETOOTH_ID, _BLUETOOTH_LENGTH, _BLUETOOTH_START = _BLUETOOTH.report_id, _BLUETOOTH.length, _BLUETOOTH.start
 _SIMPLE: Final = struct.Struct("<4B3B2B")
 _SIMPLE_BUTTONS: Final = 0x03FFFF
 """The simple report's third byte of buttons has two of them, and a counter of six bits."""
@@ -45,43 +51,68 @@ _HAS_STATE: Final = 0x01
 """In the second byte of Bluetooth's report, below a sequence number: it holds the controller's state (wiki)."""
 
 
+_new_state: Final = partial(object.__new__, ControllerState)
+(
+    _set_left_stick, _set_right_stick, _set_l2, _set_r2, _set_pressed, _set_sequence, _set_sensor_time,
+    _set_l2_feedback, _set_r2_feedback, _set_gyro, _set_acceleration, _set_touches, _set_battery, _set_connections,
+    _set_device_timestamp,
+) = (vars(ControllerState)[part.name].__set__ for part in fields(ControllerState))  # fmt: skip
+"""Every report passes here, and every value comes from a table or has few bits: nothing is left to be validated."""
+
+
 def parse_input_report(report: bytes, motion: MotionCalibration = NOMINAL_MOTION) -> ControllerState:
     """Read an input report of either transport; every one of a valid id, length and checksum can be read.
 
     `motion`: the calibration that the controller holds. RemoteProtocolError for any other report.
     """
-    transport = transport_of_input(report)
-    if is_simple_report(report):
-        return _parse_simple(report)
-    if transport is Transport.BLUETOOTH:
+    length = len(report)
+    if length == _USB_LENGTH and report[0] == _USB_ID:
+        start = _USB_START
+    elif length == _BLUETOOTH_LENGTH and report[0] == _BLUETOOTH_ID:
         check(Seed.INPUT, report)
+        start = _BLUETOOTH_START
+    else:
+        transport_of_input(report)  # or it is none
+        return _parse_simple(report)
     (
         left_x, left_y, right_x, right_y, l2, r2, sequence, buttons_0, buttons_1, buttons_2,
         gyro_x, gyro_y, gyro_z, acceleration_x, acceleration_y, acceleration_z, sensor_ticks,
         touch_0, touch_1, r2_feedback, l2_feedback, active_effects, device_timestamp, battery, connections,
-    ) = _COMMON.unpack_from(report, INPUT_FRAMING[transport].start)  # fmt: skip
-    gyro, acceleration, zero = motion.gyro_rad_s, motion.acceleration_m_s2, motion.acceleration_zero
-    return ControllerState(
-        left_stick=(AXIS[left_x], AXIS_DOWN[left_y]),
-        right_stick=(AXIS[right_x], AXIS_DOWN[right_y]),
-        l2=TRAVEL[l2],
-        r2=TRAVEL[r2],
-        pressed=pressed_of(buttons_0 | buttons_1 << 8 | buttons_2 << 16),
-        sequence=sequence,
-        sensor_time_s=sensor_ticks / SENSOR_TICKS_PER_S,
-        l2_feedback=_trigger_feedback(l2_feedback, active_effects >> 4),
-        r2_feedback=_trigger_feedback(r2_feedback, active_effects & 0x0F),
-        gyro_rad_s=(gyro_x * gyro[0], gyro_y * gyro[1], gyro_z * gyro[2]),
-        acceleration_m_s2=(
-            (acceleration_x - zero[0]) * acceleration[0],
-            (acceleration_y - zero[1]) * acceleration[1],
-            (acceleration_z - zero[2]) * acceleration[2],
+    ) = _unpack(report, start)  # fmt: skip
+    gyro_scale_x, gyro_scale_y, gyro_scale_z = motion.gyro_rad_s
+    scale_x, scale_y, scale_z = motion.acceleration_m_s2
+    zero_x, zero_y, zero_z = motion.acceleration_zero
+    state = _new_state()
+    _set_left_stick(state, (AXIS[left_x], AXIS_DOWN[left_y]))
+    _set_right_stick(state, (AXIS[right_x], AXIS_DOWN[right_y]))
+    _set_l2(state, TRAVEL[l2])
+    _set_r2(state, TRAVEL[r2])
+    _set_pressed(state, pressed_of(buttons_0 | buttons_1 << 8 | buttons_2 << 16))
+    _set_sequence(state, sequence)
+    _set_sensor_time(state, sensor_ticks / SENSOR_TICKS_PER_S)
+    _set_l2_feedback(state, _trigger_feedback(l2_feedback | (active_effects & 0xF0) << 4))
+    _set_r2_feedback(state, _trigger_feedback(r2_feedback | (active_effects & 0x0F) << 8))
+    _set_gyro(state, (gyro_x * gyro_scale_x, gyro_y * gyro_scale_y, gyro_z * gyro_scale_z))
+    _set_acceleration(
+        state,
+        (
+            (acceleration_x - zero_x) * scale_x,
+            (acceleration_y - zero_y) * scale_y,
+            (acceleration_z - zero_z) * scale_z,
         ),
-        touches=tuple(point for point in (touch_point(touch_0), touch_point(touch_1)) if point is not None),
-        battery=BATTERIES[battery],
-        connections=CONNECTIONS[connections],
-        device_timestamp=device_timestamp,
     )
+    _set_touches(state, () if touch_0 & touch_1 & NOT_TOUCHED else _touches(touch_0, touch_1))
+    _set_battery(state, BATTERIES[battery])
+    _set_connections(state, CONNECTIONS[connections])
+    _set_device_timestamp(state, device_timestamp)
+    return state
+
+
+def _touches(first: int, second: int) -> tuple[TouchPoint, ...]:
+    """One finger or two: at least one of the codes has one."""
+    if first & NOT_TOUCHED:
+        return (touch_point(second),)
+    return (touch_point(first),) if second & NOT_TOUCHED else (touch_point(first), touch_point(second))
 
 
 def _parse_simple(report: bytes) -> ControllerState:
@@ -106,8 +137,9 @@ def _parse_simple(report: bytes) -> ControllerState:
 
 
 @lru_cache(maxsize=4096)
-def _trigger_feedback(byte: int, active_effect: int) -> TriggerFeedback:
-    return TriggerFeedback(stop_location=byte & 0x0F, status=byte >> 4, active_effect=active_effect)
+def _trigger_feedback(code: int) -> TriggerFeedback:
+    """Three nibbles: from the lowest on the stop location, the status and the active effect."""
+    return TriggerFeedback(stop_location=code & 0x0F, status=code >> 4 & 0x0F, active_effect=code >> 8)
 
 
 def build_input_report(

@@ -11,8 +11,9 @@ from typing import Final
 
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.effects import DEBUG_CODES, EFFECT_LENGTH, Off, TriggerEffect, decode_effect
+from operator_side.dualsense.effects import DEBUG_CODES, EFFECT_LENGTH, AnyEffect, Off, decode_effect
 from operator_side.dualsense.transport import OUTPUT_FRAMING, Transport, described
+from operator_side.dualsense.unofficial_effects import UnofficialEffect
 
 Color = tuple[int, int, int]
 
@@ -55,8 +56,8 @@ class MuteLed(IntEnum):
 class OutputReport:
     """What one output report sets; None leaves a part of the controller as it is."""
 
-    l2: TriggerEffect | None = None
-    r2: TriggerEffect | None = None
+    l2: AnyEffect | None = None
+    r2: AnyEffect | None = None
     rumble: Rumble | None = None
     lightbar: Color | None = None
     """Red, green and blue, 0 to 255 each."""
@@ -68,8 +69,8 @@ class OutputReport:
 
     def __post_init__(self) -> None:
         for name, effect in (("l2", self.l2), ("r2", self.r2)):
-            if effect is not None and not isinstance(effect, TriggerEffect):
-                raise ValueError(f"{name} = {effect!r}; valid: Off, Feedback, MultiPositionFeedback or None")
+            if effect is not None and not isinstance(effect, AnyEffect):
+                raise ValueError(f"{name} = {effect!r}; valid: a trigger effect or None")
         if self.lightbar is not None and not (
             len(self.lightbar) == 3 and all(isinstance(part, int) and 0 <= part <= 255 for part in self.lightbar)
         ):
@@ -88,12 +89,19 @@ RELEASED: Final = OutputReport(l2=Off(), r2=Off(), rumble=Rumble())
 """No effect on either trigger, no rumble."""
 
 
-def build_output_report(output: OutputReport, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
+def build_output_report(
+    output: OutputReport, transport: Transport = Transport.USB, sequence: int = 0, *, unofficial: bool = False
+) -> bytes:
     """Make the report that sets what `output` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
 
     `sequence`: on Bluetooth, 0 to 15, one more with each report; ValueError beyond. Of the two framings of a
     Bluetooth report that are in use this is the one of Linux hid-playstation, whose authors make the controller.
+    ValueError for an unofficial effect unless `unofficial` says that it is meant.
     """
+    if not unofficial:
+        for name, effect in (("l2", output.l2), ("r2", output.r2)):
+            if isinstance(effect, UnofficialEffect):
+                raise ValueError(f"{name} = {effect}; valid: an official effect, unless unofficial=True")
     if not 0 <= sequence <= 15:
         raise ValueError(f"sequence = {sequence}; valid: 0 to 15")
     framing = OUTPUT_FRAMING[transport]
@@ -134,12 +142,12 @@ def _common_block(output: OutputReport) -> bytearray:
     return block
 
 
-def parse_output_report(report: bytes) -> OutputReport:
+def parse_output_report(report: bytes, *, unofficial: bool = False) -> OutputReport:
     """Read an output report of either transport; flags for other parts of the controller are passed over.
 
     USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. RemoteProtocolError for another id, length,
     framing or checksum, for an effect that does not decode, and for a debug code in either trigger's place even
-    where its flag is not set.
+    where its flag is not set. `unofficial`: accept those effects, too.
     """
     start = _common_start(report)
     block = report[start : start + _COMMON_LENGTH]
@@ -149,8 +157,8 @@ def parse_output_report(report: bytes) -> OutputReport:
     flags, flags_1 = block[_FLAGS_0], block[_FLAGS_1]
     rumbles = flags & _CLASSIC_RUMBLE or block[_FLAGS_2] & _CLASSIC_RUMBLE_V2
     return OutputReport(
-        l2=_effect_at(block, _L2_EFFECT) if flags & _SET_L2_EFFECT else None,
-        r2=_effect_at(block, _R2_EFFECT) if flags & _SET_R2_EFFECT else None,
+        l2=_effect_at(block, _L2_EFFECT, unofficial) if flags & _SET_L2_EFFECT else None,
+        r2=_effect_at(block, _R2_EFFECT, unofficial) if flags & _SET_R2_EFFECT else None,
         rumble=Rumble(block[_MOTOR_LEFT] / 255, block[_MOTOR_RIGHT] / 255) if rumbles else None,
         lightbar=(block[_LIGHTBAR], block[_LIGHTBAR + 1], block[_LIGHTBAR + 2]) if flags_1 & _SET_LIGHTBAR else None,
         player_leds=block[_PLAYER_LEDS] & 0x1F if flags_1 & _SET_PLAYER_LEDS else None,
@@ -189,8 +197,8 @@ def _common_start(report: bytes) -> int:
     )
 
 
-def _effect_at(block: bytes, start: int) -> TriggerEffect:
-    return decode_effect(block[start : start + EFFECT_LENGTH])
+def _effect_at(block: bytes, start: int, unofficial: bool) -> AnyEffect:
+    return decode_effect(block[start : start + EFFECT_LENGTH], unofficial=unofficial)
 
 
 def _mute_led(byte: int) -> MuteLed:

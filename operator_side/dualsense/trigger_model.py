@@ -8,7 +8,19 @@ trigger forces exists.
 import math
 from typing import Final
 
-from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT, Off, TriggerEffect
+from operator_side.dualsense.controller_state import TriggerFeedback
+from operator_side.dualsense.effects import (
+    MAX_STRENGTH,
+    ZONE_COUNT,
+    AnyEffect,
+    Feedback,
+    MultiPositionFeedback,
+    MultiPositionVibration,
+    Off,
+    SlopeFeedback,
+    Vibration,
+    Weapon,
+)
 
 SPRING_PRELOAD_N: Final = 0.5
 """What it takes to move the trigger at all (assumed)."""
@@ -28,7 +40,7 @@ _TOUCHING_TRAVEL = 0.005
 """How near to a resisting zone the trigger lies against it."""
 
 
-def equilibrium_travel(finger_force_n: float, zone_strengths: tuple[int, ...]) -> float:
+def equilibrium_travel(finger_force_n: float, zone_strengths: tuple[float, ...]) -> float:
     """Where a finger that presses from rest with a constant force comes to a stop, 0 to 1.
 
     It is the first travel at which spring and effect together hold the force. The effect is constant within a
@@ -50,12 +62,15 @@ class SimulatedTrigger:
     """A trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
 
     The finger's force and the effect are constant between the calls that set them, so that `advance` is
-    exact: one long step and many short ones agree to rounding.
+    exact: one long step and many short ones agree to rounding. A weapon holds until the trigger has come to its
+    second zone, then it holds nothing until the trigger is back before its first one. Vibration moves nothing.
     """
 
     def __init__(self) -> None:
         self._finger_force_n = 0.0
-        self._effect: TriggerEffect = Off()
+        self._effect: AnyEffect = Off()
+        self._power = 1.0
+        self._fired = False
         self._equilibrium = 0.0
         self._travel = 0.0
 
@@ -78,23 +93,43 @@ class SimulatedTrigger:
     def loaded(self) -> bool:
         """The finger presses the trigger into, or against the edge of, a zone that resists."""
         reach = min(int((self._travel + _TOUCHING_TRAVEL) * ZONE_COUNT), ZONE_COUNT - 1)
-        strengths = self._effect.zone_strengths
+        strengths = self._strengths()
         return self._finger_force_n > 0.0 and (strengths[self.zone] > 0 or strengths[reach] > 0)
 
     @property
-    def effect(self) -> TriggerEffect:
+    def effect(self) -> AnyEffect:
         """The effect in force."""
         return self._effect
 
+    @property
+    def feedback(self) -> TriggerFeedback:
+        """What the trigger reports of itself; that its stop location is the present zone is assumed."""
+        match self._effect:
+            case Feedback() | MultiPositionFeedback() | SlopeFeedback():
+                return TriggerFeedback(self.zone, int(self.loaded), active_effect=1)
+            case Weapon():
+                return TriggerFeedback(self.zone, 2 if self._fired else int(self.loaded), active_effect=2)
+            case Vibration() | MultiPositionVibration():
+                shaken = self._finger_force_n > 0.0 and self._effect.zone_amplitudes[self.zone] > 0
+                return TriggerFeedback(self.zone, int(shaken), active_effect=3)
+        return TriggerFeedback()
+
     def set_finger_force(self, finger_force_n: float) -> None:
         """Press with a constant force from now on; ValueError for a negative or non-finite one."""
-        self._equilibrium = equilibrium_travel(finger_force_n, self._effect.zone_strengths)
+        self._equilibrium = equilibrium_travel(finger_force_n, self._strengths())
         self._finger_force_n = finger_force_n
 
-    def set_effect(self, effect: TriggerEffect) -> None:
-        """Resist like `effect` from now on."""
-        self._effect = effect
-        self._equilibrium = equilibrium_travel(self._finger_force_n, effect.zone_strengths)
+    def set_effect(self, effect: AnyEffect, power: float = 1.0) -> None:
+        """Act like `effect` from now on; `power`: what is left of every strength, 0 to 1 (assumed linear).
+
+        A weapon that is set again stays as fired as it was.
+        """
+        if not 0.0 <= power <= 1.0:
+            raise ValueError(f"power = {power}; valid: 0 to 1")
+        if effect != self._effect:
+            self._fired = isinstance(effect, Weapon) and self._travel >= effect.end / ZONE_COUNT
+        self._effect, self._power = effect, power
+        self._balance()
 
     def advance(self, step_s: float) -> None:
         """Let `step_s` pass; ValueError for a negative or non-finite step."""
@@ -102,3 +137,15 @@ class SimulatedTrigger:
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
         remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
         self._travel = self._equilibrium + (self._travel - self._equilibrium) * remaining
+        if isinstance(self._effect, Weapon):
+            # Nothing is held beyond either end, so neither firing nor getting ready changes the way.
+            zones = self._travel * ZONE_COUNT
+            self._fired = zones >= self._effect.start if self._fired else zones >= self._effect.end
+
+    def _strengths(self) -> tuple[float, ...]:
+        if self._fired:
+            return (0.0,) * ZONE_COUNT
+        return tuple(strength * self._power for strength in self._effect.zone_strengths)
+
+    def _balance(self) -> None:
+        self._equilibrium = equilibrium_travel(self._finger_force_n, self._strengths())
