@@ -24,6 +24,12 @@ def _dualsense(arguments: Sequence[str]) -> int:
     return bench_dualsense(arguments)
 
 
+def _effects(arguments: Sequence[str]) -> int:
+    from feelahead.benchmarks.effect_latency import bench_effects  # noqa: PLC0415
+
+    return bench_effects(arguments)
+
+
 _BENCHMARKS: dict[str, tuple[Callable[[Sequence[str]], int], str, str]] = {
     "overlap": (
         _overlap,
@@ -39,6 +45,11 @@ _BENCHMARKS: dict[str, tuple[Callable[[Sequence[str]], int], str, str]] = {
         _dualsense,
         "our driver of the controller beside pydualsense, on the same simulated reports",
         "pip install 'feelahead[operator,bench]'",
+    ),
+    "effects": (
+        _effects,
+        "how long it takes from a change of stiffness until the controller is told",
+        "pip install feelahead",
     ),
 }
 """Each name with what it runs, what that measures, and what brings it; imported only when it is asked for."""

@@ -13,6 +13,9 @@ from common.link_model import DelayLine, Stream, link_summary
 from common.statistics import RunningStatistics
 from feelahead.summary import merge_summaries
 from operator_side.core import OperatorSide
+from operator_side.dualsense.connection import Connection
+from operator_side.dualsense.port import OpenController
+from operator_side.dualsense.search import Ready
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
@@ -53,6 +56,7 @@ class Loopback:
             asymmetry_s=settings.operator.asymmetry_s(),
         )
         self.device = SimulatedDualSense()
+        self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
         self.person = SimulatedOperator(
             self.device, settings.operator.person, settings.operator.seed, settings.operator.calibration
         )
@@ -78,7 +82,7 @@ class Loopback:
                 self._robot_tick(due_s)
             self._deliver(due_s)
             if (output := self.operator.output_report(due_s)) is not None:
-                self.device.write(output, due_s)
+                self.connection.write(output, due_s)
         self.clock.advance_to(end_s)
 
     def summary(self) -> dict[str, Any]:
@@ -107,7 +111,8 @@ class Loopback:
 
     def _operator_tick(self, now_s: float) -> None:
         self.person.tick(now_s, self.operator.screen, self.operator.link.round_trip.mean or 0.0)
-        if (report := self.device.read(now_s)) is not None:
+        self.connection.update(now_s)
+        if (report := self.connection.read(now_s)) is not None:
             self.operator.read_report(report, now_s)
         for payload in self.operator.motion(now_s):
             self._to_robot.push(now_s, payload)

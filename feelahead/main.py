@@ -7,10 +7,12 @@ from common.command_line import run_command
 from common.errors import ConfigurationError
 from feelahead.bench import bench
 from feelahead.demo import demo
+from feelahead.doctor.command import doctor
 from feelahead.keys import keys
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
+    "doctor": (doctor, "what is missing on this machine, and the command that mends it"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
 }

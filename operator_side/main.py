@@ -1,5 +1,6 @@
 """The process `feelahead-operator`: sockets, clock, controller, core; nothing else."""
 
+import functools
 import json
 import secrets
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.core import OperatorSide
 from operator_side.dualsense.connection import Connection
-from operator_side.dualsense.device import load_backend
+from operator_side.dualsense.device import HidBackend, load_backend
 from operator_side.dualsense.finding import find_controller
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.release_guard import ReleaseGuard
@@ -36,10 +37,11 @@ def main() -> None:
     run_command("feelahead-operator", command)
 
 
-def command(arguments: Sequence[str]) -> int:
+def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out.
 
-    A real controller need not be there: it is waited for, and so is one that was unplugged.
+    A real controller need not be there: it is waited for, and so is one that was unplugged. `backend`: hidapi
+    unless given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
@@ -62,17 +64,21 @@ def command(arguments: Sequence[str]) -> int:
             status.note(text)
         person: SimulatedOperator | None = None
         with ExitStack() as stack:
+            guard: ReleaseGuard | None = None
             if settings.device == "simulated":
                 simulated = SimulatedDualSense()
                 person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
-                connection = _real_controller(settings, core, stack)
+                loaded = load_backend() if backend is None else backend
+                # Whoever only reads leaves nothing behind.
+                guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
+                connection = Connection(BackgroundSearch(functools.partial(find_controller, loaded)), core, guard)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, line, sockets, connection, person, status)
+            loop = _Loop(settings, core, line, sockets, connection, guard, person, status)
             failure: FeelaheadError | None = None
             try:
                 loop.run(stop)
@@ -89,14 +95,6 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _real_controller(settings: OperatorSettings, core: OperatorSide, stack: ExitStack) -> Connection:
-    """Whatever real controller is there or comes; NoDriverError when none ever could."""
-    backend = load_backend()
-    search = BackgroundSearch(lambda preferred: find_controller(backend, preferred))
-    guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-    return Connection(search, core, guard)
-
-
 class _Loop:
     """Motion at absolute deadlines, messages and effects as they come."""
 
@@ -107,6 +105,7 @@ class _Loop:
         line: DelayLine[bytes],
         sockets: OperatorSockets,
         connection: Connection,
+        guard: ReleaseGuard | None,
         person: SimulatedOperator | None,
         status: Status,
     ) -> None:
@@ -115,6 +114,7 @@ class _Loop:
         self._line = line
         self._sockets = sockets
         self._connection = connection
+        self._guard = guard
         self._person = person
         self._status = status
         self._clock = MonotonicClock()
@@ -171,6 +171,8 @@ class _Loop:
         for text in self._connection.take_notes():
             self._status.note(text)
         if self._status.due(now_s):
+            if self._guard is not None and (trouble := self._guard.take_note()) is not None:
+                self._status.note(trouble)
             values: dict[str, Value] = dict(self._core.status(now_s))
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble

@@ -33,7 +33,7 @@ class OperatorSettings(RunOptions):
     realtime: bool = False
     """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     device: Literal["hid", "simulated"] = "hid"
-    """A real controller, or a simulated one with a scripted person."""
+    """A real controller, which is waited for while it is not there, or a simulated one with a scripted person."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)

@@ -208,11 +208,22 @@ def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:
     denied, other = DeviceError("no permission"), DeviceError("in use")
     for result in (denied, other, denied, NoDeviceError("none"), denied):
         world.search.result = result
-        world.run(2.0)
+        world.run(2 * LOOK_PERIOD_S)
     assert [note.partition(";")[0] for note in world.connection.take_notes()] == ["no permission", "in use", "none"]
     world.plug_in()
     world.run(1.5)
     assert world.connection.state is ConnectionState.CONNECTED
+
+
+def test_a_controller_that_is_refused_while_the_system_still_sets_it_up_is_no_trouble(world: World) -> None:
+    world.run(0.5)
+    world.connection.take_notes()
+    world.search.result = DeviceError("no permission")
+    world.run(LOOK_PERIOD_S)
+    world.plug_in()
+    world.run(LOOK_PERIOD_S)
+    assert len(world.search.looks) == 3
+    assert world.connection.take_notes() == ["controller: DualSense on USB"]
 
 
 def test_what_no_waiting_mends_is_raised(world: World) -> None:

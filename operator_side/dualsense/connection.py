@@ -80,6 +80,7 @@ class Connection:
         self._controller: OpenController | None = None
         self._address: str | None = None
         self._next_look_s: float | None = None
+        self._refused: str | None = None
         self._said: set[str] = set()
         self._notes: list[str] = []
         self._closed = False
@@ -105,7 +106,10 @@ class Connection:
                 self._say_once(f"{found}; waiting for one")
         elif found is not None:
             self._handle(ConnectionEvent.REFUSED)
-            self._say_once(f"{found}; trying again until it works")
+            # The system gives permission a moment after the controller appears: once is no trouble yet.
+            if str(found) == self._refused:
+                self._say_once(f"{found}; trying again until it works")
+            self._refused = str(found)
         if self._next_look_s is None or now_s >= self._next_look_s:
             self._next_look_s = now_s + LOOK_PERIOD_S
             self._search.begin(self._address)
@@ -154,6 +158,7 @@ class Connection:
         self._handle(ConnectionEvent.OPENED)
         self.found += 1
         self._said.clear()
+        self._refused = None
         self._notes.append(f"controller: {controller.name}" + (", back again" if self.found > 1 else ""))
         self._listener.controller_found(now_s)
 

@@ -29,6 +29,7 @@ class ReleaseGuard:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
+        self._told = False
 
     def __enter__(self) -> "ReleaseGuard":
         self._process = subprocess.Popen(
@@ -67,6 +68,13 @@ class ReleaseGuard:
     def running(self) -> bool:
         """Whether there is anybody to release the triggers; False when somebody ended the watchdog."""
         return self._process is not None and self._process.poll() is None
+
+    def take_note(self) -> str | None:
+        """What a person has to know, once: that the watchdog has ended before us."""
+        if self._told or self.running:
+            return None
+        self._told = True
+        return "the watchdog process has ended: should this one be killed now, the triggers stay as stiff as they are"
 
     def hold(self, path: bytes, release: bytes) -> None:
         """From now on, should we die, `release` is to be written to the controller at `path`."""

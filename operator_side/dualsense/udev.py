@@ -26,6 +26,5 @@ RULES: Final = tuple(
 
 
 def installing_command() -> str:
-    """One command for a shell that puts the rule into its place and loads it."""
-    lines = " ".join(f"'{rule}'" for rule in RULES)
-    return f"printf '%s\\n' {lines} | sudo tee {RULE_FILE} && {RELOAD}"
+    """Lines for a shell that put the rule into its place and load it; to be copied as they are."""
+    return "\n".join((f"sudo tee {RULE_FILE} << 'END'", *RULES, "END", RELOAD))

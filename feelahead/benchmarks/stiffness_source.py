@@ -1,0 +1,102 @@
+"""The robot side's end of the link without a robot: it grants the lease and says what stiffness it is told to."""
+
+from types import TracebackType
+
+from common.clock import MonotonicClock, clock_domain
+from common.codec import decode, encode
+from common.errors import RemoteProtocolError
+from common.link_end import LinkEnd
+from common.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
+from common.pacing import Pacer, wait_for_turn
+from common.session import SessionState
+from common.sockets import RobotSockets
+
+TICK_PERIOD_S = 1e-3
+"""As the robot side's."""
+_NOTICE_PERIOD_S = 0.05
+
+
+class StiffnessSource:
+    """One operator side's counterpart on loopback, in real time."""
+
+    def __init__(self) -> None:
+        self.l2 = 0.0
+        self.r2 = 0.0
+        self.state: MotionState = "armed"
+        self.commands = 0
+        """Motion commands that came."""
+        self.hellos = 0
+        self.sent_s = 0.0
+        """When the last stiffness was sent, on the machine's monotonic clock."""
+        self._clock = MonotonicClock()
+        self._sockets = RobotSockets("tcp://127.0.0.1:0")
+        self._link = LinkEnd("robot", 1, clock_domain())
+        self._peer: bytes | None = None
+        self._noticed_s = -1.0
+        self._pacer = Pacer(TICK_PERIOD_S, self._clock.now())
+
+    def __enter__(self) -> "StiffnessSource":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._sockets.close()
+
+    @property
+    def address(self) -> str:
+        """Where to connect."""
+        return self._sockets.control_endpoint
+
+    @property
+    def view_address(self) -> str:
+        """Where it would publish."""
+        return self._sockets.view_endpoint
+
+    @property
+    def connected(self) -> bool:
+        """Whether an operator side has said Hello."""
+        return self._peer is not None
+
+    def change(self) -> float:
+        """Send the stiffness as it is now at once; when."""
+        self._send(self._clock.now())
+        return self.sent_s
+
+    def run(self, duration_s: float) -> None:
+        """Answer, and send a stiffness every millisecond, for so long."""
+        self._pacer.restart(self._clock.now())
+        end_s = self._clock.now() + duration_s
+        while (now_s := self._clock.now()) < end_s:
+            self._receive(now_s)
+            if self._pacer.due(now_s):
+                self._pacer.begin(now_s)
+                self._send(now_s)
+            wait_for_turn(self._pacer, self._clock, self._sockets.wait)
+
+    def _receive(self, now_s: float) -> None:
+        for peer, payload in self._sockets.receive():
+            try:
+                message = decode(payload)
+            except RemoteProtocolError:
+                continue
+            if isinstance(message, Hello):
+                self.hellos += 1
+                if peer != self._peer:
+                    self._sockets.send(peer, encode(self._link.hello(now_s)))
+                self._peer = peer
+            if isinstance(message, Hello | MotionCommand):
+                self._link.arrived(message, now_s)
+            self.commands += isinstance(message, MotionCommand)
+
+    def _send(self, now_s: float) -> None:
+        if self._peer is None:
+            return
+        if now_s - self._noticed_s >= _NOTICE_PERIOD_S:
+            self._noticed_s = now_s
+            session = SessionState.ARMED if self.state == "armed" else SessionState.DISARMED
+            notice = LeaseNotice(self._link.stamp(now_s), session=session, why="", token=1, waiting=0)
+            self._sockets.send(self._peer, encode(notice))
+        self.sent_s = self._clock.now()
+        stiffness = StiffnessUpdate(self._link.stamp(self.sent_s), l2=self.l2, r2=self.r2, rumble=0.0, state=self.state)
+        self._sockets.send(self._peer, encode(stiffness))
