@@ -49,6 +49,7 @@ class Loopback:
             _VIRTUAL_CLOCK,
             haptics=settings.operator.haptics,
             calibration=settings.operator.calibration,
+            rendering=settings.operator.rendering,
             seed=settings.operator.seed,
             asymmetry_s=settings.operator.asymmetry_s(),
         )

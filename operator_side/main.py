@@ -48,6 +48,7 @@ def command(arguments: Sequence[str]) -> int:
         clock_domain(),
         haptics=settings.haptics,
         calibration=settings.calibration,
+        rendering=settings.rendering,
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
     )

@@ -8,7 +8,8 @@ import tyro
 
 from common.run_options import RunOptions
 from operator_side.simulated_operator import PersonSettings
-from operator_side.trigger_motion import TravelCalibration
+from operator_side.travel_calibration import TravelCalibration
+from operator_side.trigger_rendering import RenderingSettings
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,9 @@ class OperatorSettings(RunOptions):
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
-    """Which part of the triggers' travel counts."""
+    """Which part of the triggers' and sticks' travel counts."""
+    rendering: RenderingSettings = field(default_factory=RenderingSettings)
+    """How stiffness becomes what the fingers feel."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
 

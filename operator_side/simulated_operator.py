@@ -27,7 +27,7 @@ from operator_side.dualsense.trigger_model import (
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.trigger_motion import TravelCalibration
+from operator_side.travel_calibration import TravelCalibration
 
 FULL_TRIGGER_M_S = 0.25
 """What a person has learnt a fully pulled trigger to do."""
@@ -225,13 +225,12 @@ class SimulatedOperator:
         if trigger != self._pulling:
             self._pulling, self._insistence_n = trigger, 0.0
         if meant > 0.0:
-            free = self._calibration.dead_zone + meant * (self._calibration.saturation - self._calibration.dead_zone)
-            mechanical = free * SENSED_TRAVEL
-            acting = self._calibration.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
+            calibrated = self._calibration.r2 if trigger == 1 else self._calibration.l2
+            acting = calibrated.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
             yields_less = acting < _FELT_SHARE * meant
             insisting = self._settings.insistence_per_s * NORMAL_FINGER_FORCE_N * step_s
             self._insistence_n = max(0.0, self._insistence_n + (insisting if yields_less else -insisting))
-            force_n = SPRING_PRELOAD_N + SPRING_RISE_N * mechanical
+            force_n = SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * calibrated.raw(meant)
             self._insistence_n = min(self._insistence_n, max(0.0, NORMAL_FINGER_FORCE_N - force_n))
             force_n = min(force_n + self._insistence_n, NORMAL_FINGER_FORCE_N)
         else:
@@ -245,7 +244,7 @@ class SimulatedOperator:
         radius = math.hypot(*stick)
         if radius < 1e-3:
             return (0.0, 0.0)
-        dead = self._calibration.stick_dead_zone
+        dead = self._calibration.left_stick.dead_zone
         scale = (dead + (1.0 - dead) * radius) / radius
         return _within_unit_circle(stick[0] * scale, stick[1] * scale)
 

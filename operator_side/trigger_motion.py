@@ -1,6 +1,5 @@
 """The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -8,6 +7,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from operator_side.dualsense.controller_state import Button, ControllerState, Stick
+from operator_side.travel_calibration import TravelCalibration
 
 
 class Action(Enum):
@@ -34,39 +34,6 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
     }
 )
 """The whole button map. Besides: R2 advances, L2 retreats, the left stick moves across, the right one turns."""
-
-
-@dataclass(frozen=True)
-class TravelCalibration:
-    """Where this controller's triggers and sticks begin and end, in raw travel."""
-
-    dead_zone: float = 0.05
-    """A trigger below this is released."""
-    saturation: float = 0.98
-    """A trigger above this is fully pulled."""
-    stick_dead_zone: float = 0.1
-    """A stick within this radius is at rest: worn sticks do not come back to the centre."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.dead_zone < self.saturation <= 1.0:
-            raise ValueError(
-                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone < saturation <= 1"
-            )
-        if not 0.0 <= self.stick_dead_zone < 1.0:
-            raise ValueError(f"stick_dead_zone = {self.stick_dead_zone}; valid: 0 to below 1")
-
-    def travel(self, raw: float) -> float:
-        """Calibrated trigger travel, 0 to 1, from the raw one; exactly 0 within the dead zone."""
-        return min(max((raw - self.dead_zone) / (self.saturation - self.dead_zone), 0.0), 1.0)
-
-    def stick(self, raw: Stick) -> Stick:
-        """The same direction with the dead zone taken off the radius, which ends at 1."""
-        radius = math.hypot(*raw)
-        if radius <= self.stick_dead_zone:
-            return 0.0, 0.0
-        scale = min((radius - self.stick_dead_zone) / (1.0 - self.stick_dead_zone), 1.0) / radius
-        x, y = (min(max(axis * scale, -1.0), 1.0) for axis in raw)  # rounding must not leave the range
-        return x, y
 
 
 _DEFAULT_CALIBRATION: Final = TravelCalibration()
@@ -111,10 +78,10 @@ def operator_intent(state: ControllerState, calibration: TravelCalibration = _DE
     if (Action.CLOSE_GRIPPER in held) != (Action.OPEN_GRIPPER in held):
         gripper = 1 if Action.CLOSE_GRIPPER in held else -1
     return OperatorIntent(
-        l2=calibration.travel(state.l2),
-        r2=calibration.travel(state.r2),
-        lateral=calibration.stick(state.left_stick),
-        turning=calibration.stick(state.right_stick),
+        l2=calibration.l2.travel(state.l2),
+        r2=calibration.r2.travel(state.r2),
+        lateral=calibration.left_stick.deflection(state.left_stick),
+        turning=calibration.right_stick.deflection(state.right_stick),
         run=Action.RUN in held,
         arm=Action.ARM in held,
         emergency_stop=Action.EMERGENCY_STOP in held,

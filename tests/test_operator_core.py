@@ -57,7 +57,42 @@ def test_stiffness_reaches_the_trigger_it_is_meant_for(bench: Bench) -> None:
     bench.feel(0.8)
     l2, r2 = bench.device.effects
     assert l2 == Off()
-    assert sum(r2.zone_strengths) == 64
+    assert sum(r2.zone_strengths) == 68  # half-way from where danger begins, at level 56, to 80
+
+
+def test_predicted_contact_is_a_bump_in_one_zone(bench: Bench) -> None:
+    update = StiffnessUpdate(
+        bench.robot.stamp(bench.now_s), l2=0.0, r2=0.0, rumble=0.0, state="armed", l2_contact=None, r2_contact=0.5
+    )
+    bench.side.receive(encode(update), bench.now_s)
+    bench.write()
+    l2, r2 = bench.device.effects
+    assert l2 == Off()
+    assert r2.zone_strengths == (0, 0, 0, 2, 0, 0, 0, 0, 0, 0)
+
+
+def test_writes_are_bounded_the_newest_wins_and_a_release_does_not_wait(bench: Bench) -> None:
+    for step in range(1000):
+        bench.now_s += 0.001
+        bench.feel(0.2 + 0.7 * (step % 2))
+    assert 50 < bench.device.write_count <= 100
+    bench.feel(0.9)
+    bench.now_s += 0.1
+    bench.write()
+    assert sum(bench.device.effects[1].zone_strengths) == 74
+    for step in range(40):
+        bench.feel(0.2 + 0.7 * (step % 2))
+    assert not bench.device.released
+    bench.feel(0.0)
+    assert bench.device.released
+
+
+def test_people_are_told_the_band(bench: Bench) -> None:
+    bench.feel(0.7)
+    assert bench.side.status(bench.now_s)["feel"] == "L2 clear, R2 danger"
+    rendering = bench.side.summary()["rendering"]
+    assert rendering["r2"]["band_changes"] == 1
+    assert rendering["writes"] == 1
 
 
 def test_only_changes_are_written(bench: Bench) -> None:
