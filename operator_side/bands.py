@@ -31,7 +31,7 @@ class Band(IntEnum):
 
 @dataclass(frozen=True)
 class BandSettings:
-    """Where the bands begin. ValueError for what cannot be."""
+    """Where the bands begin, and whether they are marked at all."""
 
     marked: bool = True
     """Mark the bands by steps; without, the level is 80 times the stiffness throughout."""

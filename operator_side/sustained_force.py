@@ -12,7 +12,7 @@ from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT
 
 @dataclass(frozen=True)
 class SustainedForceSettings:
-    """When and how far a force that lasts is lowered. ValueError for a value out of range."""
+    """When and how far a force that lasts is lowered."""
 
     longest_s: float = 10.0
     """How long a trigger may ask for full force before it is lowered; 0 lowers it at once."""

@@ -15,7 +15,7 @@ _ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True)
 class TriggerTravel:
-    """Which part of one trigger's raw travel counts. ValueError unless 0 <= dead_zone < saturation <= 1."""
+    """Which part of one trigger's raw travel counts: 0 <= dead_zone < saturation <= 1."""
 
     dead_zone: float = 0.05
     """A trigger up to this is released."""
@@ -44,7 +44,7 @@ class TriggerTravel:
 
 @dataclass(frozen=True)
 class StickRest:
-    """Where one stick rests. ValueError for a rest or a dead zone that cannot be."""
+    """Where one stick rests."""
 
     x: float = 0.0
     """Where it rests, right positive: worn sticks do not come back to the centre."""
