@@ -65,6 +65,7 @@ class OperatorSide:
         self.applied_age = RunningStatistics(seed)
         self._haptics = haptics
         self._calibration = calibration or TravelCalibration()
+        self._rendering_settings = rendering or RenderingSettings()
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
         self._stiffness_s = 0.0
@@ -72,7 +73,8 @@ class OperatorSide:
         self._lease_s = 0.0
         self._screen_order = (-1, -1)
         self.writes = 0
-        self._rendering = TriggerRendering(rendering or RenderingSettings(), self._calibration)
+        """Output reports that were made."""
+        self._rendering = TriggerRendering(self._rendering_settings, self._calibration)
         self._write_bound = WriteBound()
         self._written: OutputReport | None = RELEASED
         self._lost_s: float | None = None
@@ -128,6 +130,12 @@ class OperatorSide:
             self.rejected += 1
             return
         self._intent, self._intent_s = operator_intent(state, self._calibration), now_s
+
+    def calibrate(self, calibration: TravelCalibration) -> None:
+        """Read the triggers and sticks of the controller that has just been found through `calibration`."""
+        if calibration != self._calibration:
+            self._calibration = calibration
+            self._rendering = TriggerRendering(self._rendering_settings, calibration)
 
     def controller_found(self, now_s: float) -> None:
         """A controller came, perhaps with what was written to it before: it is released first, then told anew."""

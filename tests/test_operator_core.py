@@ -10,6 +10,7 @@ from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXP
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.effects import Off
 from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.travel_calibration import TravelCalibration, TriggerTravel
 
 
 class Bench:
@@ -85,6 +86,19 @@ def test_writes_are_bounded_the_newest_wins_and_a_release_does_not_wait(bench: B
     assert not bench.device.released
     bench.feel(0.0)
     assert bench.device.released
+
+
+def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench) -> None:
+    bench.side.calibrate(TravelCalibration(r2=TriggerTravel(0.5, 0.6)))
+    bench.device.set_finger_force(0.0, 0.5 + 4.0 * 0.75 * 0.55)
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
+    bench.read()
+    assert bench.commands()[0].r2 == pytest.approx(0.5, abs=0.05)
+    bench.feel(0.05)
+    # A full pull ends in the fifth zone: that is where the first strengths go.
+    assert bench.device.effects[1].zone_strengths == (0, 0, 0, 1, 1, 0, 0, 0, 0, 0)
 
 
 def test_people_are_told_the_band(bench: Bench) -> None:
