@@ -44,10 +44,11 @@ class OperatorSide:
         haptics: bool = True,
         calibration: TravelCalibration | None = None,
         rendering: RenderingSettings | None = None,
+        swap_sides: bool = False,
         seed: int = 0,
         asymmetry_s: float = 0.0,
     ) -> None:
-        """`asymmetry_s`: see LinkEnd."""
+        """`swap_sides`: left and right of the controller swapped; `asymmetry_s`: see LinkEnd."""
         self.link = LinkEnd("operator", epoch, clock_domain, seed, asymmetry_s)
         self.screen: Telemetry | None = None
         """The newest view of the robot; None before the first."""
@@ -65,6 +66,7 @@ class OperatorSide:
         self.applied_age = RunningStatistics(seed)
         self._haptics = haptics
         self._calibration = calibration or TravelCalibration()
+        self._swap_sides = swap_sides
         self._rendering_settings = rendering or RenderingSettings()
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
@@ -74,7 +76,7 @@ class OperatorSide:
         self._screen_order = (-1, -1)
         self.writes = 0
         """Output reports that were made."""
-        self._rendering = TriggerRendering(self._rendering_settings, self._calibration)
+        self._rendering = self._new_rendering()
         self._write_bound = WriteBound()
         self._written: OutputReport | None = RELEASED
         self._lost_s: float | None = None
@@ -129,13 +131,17 @@ class OperatorSide:
         except RemoteProtocolError:
             self.rejected += 1
             return
-        self._intent, self._intent_s = operator_intent(state, self._calibration), now_s
+        self._intent = operator_intent(state, self._calibration, swap_sides=self._swap_sides)
+        self._intent_s = now_s
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Read the triggers and sticks of the controller that has just been found through `calibration`."""
         if calibration != self._calibration:
             self._calibration = calibration
-            self._rendering = TriggerRendering(self._rendering_settings, calibration)
+            self._rendering = self._new_rendering()
+
+    def _new_rendering(self) -> TriggerRendering:
+        return TriggerRendering(self._rendering_settings, self._calibration, swap_sides=self._swap_sides)
 
     def controller_found(self, now_s: float) -> None:
         """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
@@ -229,11 +235,13 @@ class OperatorSide:
     def status(self, now_s: float) -> dict[str, float | str | None]:
         """A few figures for the status line."""
         mean_s = self.link.delay.mean
+        felt = None if self.stiffness is None else (self.stiffness.l2, self.stiffness.r2)
+        left, right = (None, None) if felt is None else (felt[::-1] if self._swap_sides else felt)
         return {
             "link": self._link_status(now_s),
             "state": None if self.stiffness is None else self.stiffness.state,
-            "L2": None if self.stiffness is None else self.stiffness.l2,
-            "R2": None if self.stiffness is None else self.stiffness.r2,
+            "L2": left,
+            "R2": right,
             "feel": f"L2 {self._rendering.l2.status()}, R2 {self._rendering.r2.status()}",
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }

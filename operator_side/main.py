@@ -51,6 +51,7 @@ def command(arguments: Sequence[str]) -> int:
         haptics=settings.haptics,
         calibration=settings.calibration,
         rendering=settings.rendering,
+        swap_sides=settings.swap_sides,
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
     )
@@ -67,7 +68,9 @@ def command(arguments: Sequence[str]) -> int:
         with ExitStack() as stack:
             if settings.device == "simulated":
                 simulated = SimulatedDualSense()
-                person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
+                person = SimulatedOperator(
+                    simulated, settings.person, settings.seed, settings.calibration, swap_sides=settings.swap_sides
+                )
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
                 connection = _real_controller(settings, core, stack)

@@ -37,6 +37,9 @@ class OperatorSettings(RunOptions):
     """A real controller, or a simulated one with a scripted person."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
+    swap_sides: bool = False
+    """Left and right swapped: L2 advances and R2 retreats, R1 is held to run, the right stick moves across and the left
+    one turns."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
     """Which part of the triggers' and sticks' travel counts."""
     rendering: RenderingSettings = field(default_factory=RenderingSettings)

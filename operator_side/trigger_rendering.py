@@ -91,7 +91,11 @@ class RenderedTrigger:
 class TriggerRendering:
     """Both triggers, and the motors for danger that lies along neither."""
 
-    def __init__(self, settings: RenderingSettings, calibration: TravelCalibration) -> None:
+    def __init__(
+        self, settings: RenderingSettings, calibration: TravelCalibration, *, swap_sides: bool = False
+    ) -> None:
+        """`swap_sides`: what the robot side says of L2 is for R2, and the other way round."""
+        self._swap_sides = swap_sides
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
 
@@ -99,9 +103,12 @@ class TriggerRendering:
         """What both triggers and the motors have to do at `now_s`; all off for None."""
         if felt is None:
             return OutputReport(self.l2.render(0.0, None, now_s), self.r2.render(0.0, None, now_s), Rumble())
+        left, right = (felt.l2, felt.l2_contact), (felt.r2, felt.r2_contact)
+        if self._swap_sides:
+            left, right = right, left
         return OutputReport(
-            l2=self.l2.render(felt.l2, felt.l2_contact, now_s),
-            r2=self.r2.render(felt.r2, felt.r2_contact, now_s),
+            l2=self.l2.render(*left, now_s),
+            r2=self.r2.render(*right, now_s),
             rumble=Rumble(left=round(felt.rumble * _RUMBLE_STEPS) / _RUMBLE_STEPS),
         )
 

@@ -59,6 +59,13 @@ def test_a_bump_where_contact_begins_comes_to_meet_the_finger() -> None:
     assert len(bumps) >= 4
 
 
+def test_a_person_whose_left_hand_advances_gets_there_as_well() -> None:
+    operator = OperatorSettings(swap_sides=True)
+    run = Loopback(LoopbackSettings(RobotSettings(), operator))
+    run.run_until(7.0)
+    assert run.summary()["task"]["time_to_grasp_s"] == episode(0, haptics=True)["task"]["time_to_grasp_s"]
+
+
 def test_more_delay_means_more_enlargement() -> None:
     moving = [episode(delay_ms, haptics=False)["enlargement_mm"]["mean_moving"] for delay_ms in (0, 50, 200)]
     assert moving[0] < moving[1] < moving[2]

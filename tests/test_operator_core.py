@@ -16,8 +16,8 @@ from operator_side.travel_calibration import TravelCalibration, TriggerTravel
 class Bench:
     """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
 
-    def __init__(self, *, haptics: bool = True) -> None:
-        self.side = OperatorSide(2, "clock", haptics=haptics)
+    def __init__(self, *, haptics: bool = True, swap_sides: bool = False) -> None:
+        self.side = OperatorSide(2, "clock", haptics=haptics, swap_sides=swap_sides)
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.now_s = 1.0
@@ -99,6 +99,24 @@ def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench)
     bench.feel(0.05)
     # A full pull ends in the fifth zone: that is where the first strengths go.
     assert bench.device.effects[1].zone_strengths == (0, 0, 0, 1, 1, 0, 0, 0, 0, 0)
+
+
+def test_with_swapped_sides_the_left_trigger_advances_and_feels_it() -> None:
+    bench = Bench(swap_sides=True)
+    bench.feel(0.7)
+    l2, r2 = bench.device.effects
+    assert sum(l2.zone_strengths) > 0
+    assert r2 == Off()
+    status = bench.side.status(bench.now_s)
+    assert (status["L2"], status["R2"], status["feel"]) == (0.7, 0.0, "L2 danger, R2 clear")
+    bench.feel(0.0)
+    bench.device.set_finger_force(10.0, 0.0)
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
+    bench.read()
+    [command] = bench.commands()
+    assert (command.l2, command.r2) == (0.0, 1.0)
 
 
 def test_people_are_told_the_band(bench: Bench) -> None:

@@ -2,9 +2,10 @@
 
 import pytest
 
+from operator_side.button_map import BUTTON_OF
 from operator_side.dualsense.controller_state import Button, ControllerState
 from operator_side.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.trigger_motion import BUTTON_OF, Action, OperatorIntent, operator_intent
+from operator_side.trigger_motion import OperatorIntent, operator_intent
 
 
 def pressing(*buttons: Button) -> OperatorIntent:
@@ -35,18 +36,6 @@ def test_left_stick_moves_across_and_right_stick_turns() -> None:
     intent = operator_intent(ControllerState(left_stick=(1.0, 0.0), right_stick=(0.0, -1.0)))
     assert intent.lateral == (1.0, 0.0)
     assert intent.turning == (0.0, -1.0)
-
-
-def test_the_button_map() -> None:
-    assert dict(BUTTON_OF) == {
-        Action.RUN: Button.L1,
-        Action.ARM: Button.OPTIONS,
-        Action.EMERGENCY_STOP: Button.CIRCLE,
-        Action.CLOSE_GRIPPER: Button.CROSS,
-        Action.OPEN_GRIPPER: Button.SQUARE,
-        Action.NEXT_TARGET: Button.TRIANGLE,
-        Action.HAND_OVER: Button.CREATE,
-    }
 
 
 @pytest.mark.parametrize(
@@ -82,3 +71,23 @@ def test_both_gripper_buttons_hold() -> None:
 
 def test_the_emergency_stop_overrules_the_other_buttons() -> None:
     assert pressing(*BUTTON_OF.values()) == pressing(Button.CIRCLE)
+
+
+def test_swapped_sides_swap_triggers_sticks_and_l1_and_nothing_else() -> None:
+    calibration = TravelCalibration(l2=TriggerTravel(0.1, 0.5), r2=TriggerTravel(0.3, 0.9))
+    state = ControllerState(
+        l2=0.3,
+        r2=0.6,
+        left_stick=(1.0, 0.0),
+        right_stick=(0.0, -1.0),
+        pressed=frozenset({Button.R1, Button.CROSS}),
+    )
+    plain = operator_intent(state, calibration)
+    swapped = operator_intent(state, calibration, swap_sides=True)
+    # Each trigger keeps its own calibration: the swap is of what they are for.
+    assert (plain.l2, plain.r2) == pytest.approx((0.5, 0.5))
+    assert (swapped.l2, swapped.r2) == (plain.r2, plain.l2)
+    assert (swapped.lateral, swapped.turning) == (plain.turning, plain.lateral)
+    assert (plain.run, swapped.run) == (False, True)
+    assert swapped.gripper == plain.gripper == 1
+    assert not operator_intent(ControllerState(pressed=frozenset({Button.L1})), swap_sides=True).run

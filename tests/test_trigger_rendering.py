@@ -132,6 +132,15 @@ def test_each_trigger_gets_its_own() -> None:
     assert rendering.render(None, 1.0) == RELEASED
 
 
+def test_with_swapped_sides_each_gets_the_others() -> None:
+    calibration = TravelCalibration(l2=TriggerTravel(0.05, 0.5))
+    felt = update(l2=0.1, r2=0.3, r2_contact=1.0)
+    wanted = TriggerRendering(USUAL, calibration, swap_sides=True).render(felt, 1.0)
+    plain = RenderedTrigger(USUAL, calibration.l2).render(0.3, 1.0, 1.0)
+    assert wanted.l2 == plain
+    assert wanted.r2 == RenderedTrigger(USUAL, calibration.r2).render(0.1, None, 1.0)
+
+
 @pytest.mark.parametrize("stiffness", [-0.1, 1.1, math.nan])
 def test_what_is_no_stiffness(stiffness: float) -> None:
     with pytest.raises(ValueError, match="stiffness"):
