@@ -4,6 +4,7 @@ The robot side says at which calibrated travel contact is predicted (`StiffnessU
 pulls runs into the bump there, may push through it, and so knows where contact begins.
 """
 
+from functools import cache
 from typing import Final
 
 from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback, TriggerEffect
@@ -33,6 +34,7 @@ class DetentSelector:
         return self.zone
 
 
+@cache
 def with_detent(effect: TriggerEffect, zone: int | None) -> TriggerEffect:
     """`effect` with the bump in `zone`, at most at full strength there; `effect` itself for None."""
     if zone is None:
