@@ -43,8 +43,12 @@ def load_calibration(address: str) -> TravelCalibration | None:
     ConfigurationError, in one line with what mends it, for a file that is broken or another controller's.
     """
     path = calibration_path(address)
-    if not path.exists():
+    try:
+        path.stat()
+    except FileNotFoundError:
         return None
+    except OSError:
+        pass  # reading says what is wrong
     stored, calibration = read_calibration(path)
     if stored != address:
         raise ConfigurationError(f"{path}: is of the controller {stored}; valid: {address}; {_MEND}")

@@ -25,6 +25,8 @@ from robot_side.proximity import CandidatePairs, bounding_spheres
 
 CONTACT_PERIOD_S = 0.01
 """Contact is predicted this often: a controller is written to no more often."""
+KEPT_S = 0.1
+"""Contact that is predicted no more is kept for so long, lest a bump rattles at the horizon or at a grazed edge."""
 _TOUCHING_M = 1e-4
 _LEADING = 0.5
 """A sphere that touches already counts where the trigger leads into the surface, at most 60° off square: fingers
@@ -75,13 +77,14 @@ class ContactPredictor:
         self._settings = settings
         self._full_speed_m_s = full_speed_m_s
         self._contact = _NONE
+        self._seen_s = [-math.inf, -math.inf]
         self._next_s = -math.inf
         self._pairs: _Pairs | None = None
 
     def predict(
         self, pose: GripperPose, objects: PerceivedObjects, target: int | None, loop_age_s: float, now_s: float
     ) -> Contact:
-        """The contact at `now_s`, no older than CONTACT_PERIOD_S.
+        """The contact at `now_s`, no older than CONTACT_PERIOD_S, or than KEPT_S where there is none any more.
 
         target: its index in `objects`; None for none, and while it is held. loop_age_s: t_d of eq. 8.
         """
@@ -90,9 +93,17 @@ class ContactPredictor:
         elif now_s >= self._next_s:
             self._next_s = now_s + CONTACT_PERIOD_S
             reach_m = self._full_speed_m_s * (loop_age_s + self._settings.reaction_s)
-            retreat_m, advance_m = self._distances(pose, objects, target, reach_m)
-            self._contact = _travel(retreat_m, reach_m), _travel(advance_m, reach_m)
+            distances_m = self._distances(pose, objects, target, reach_m)
+            l2, r2 = (self._kept(trigger, distance / reach_m, now_s) for trigger, distance in enumerate(distances_m))
+            self._contact = l2, r2
         return self._contact
+
+    def _kept(self, trigger: int, travel: float, now_s: float) -> float | None:
+        """`travel`, or for a while what it was before it went beyond 1."""
+        if travel <= 1.0:
+            self._seen_s[trigger] = now_s
+            return travel
+        return self._contact[trigger] if now_s - self._seen_s[trigger] <= KEPT_S else None
 
     def _distances(
         self, pose: GripperPose, objects: PerceivedObjects, target: int, reach_m: float
@@ -198,10 +209,6 @@ def _step(
         for axis in range(3):
             points[pair, axis] += step * direction[axis]
     return best
-
-
-def _travel(distance_m: float, reach_m: float) -> float | None:
-    return distance_m / reach_m if distance_m <= reach_m else None
 
 
 def _all_pairs(objects: PerceivedObjects, index: int, count: int) -> _Pairs:

@@ -102,6 +102,12 @@ def test_bytes_that_are_no_text() -> None:
         load_calibration(ADDRESS)
 
 
+def test_a_folder_that_is_none(own_folder: Path) -> None:
+    (own_folder / "feelahead").write_text("a file where a folder should be")
+    with pytest.raises(ConfigurationError, match="cannot be read: Not a directory"):
+        load_calibration(ADDRESS)
+
+
 @pytest.mark.parametrize("address", ["", "aa:bb", "../../etc/passwd", "AA:BB:CC:00:11:22", "aa-bb-cc-00-11-22"])
 def test_what_is_no_address_never_becomes_a_path(address: str) -> None:
     with pytest.raises(ValueError, match="address"):

@@ -9,7 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side import contact, overlapping
 from robot_side.arm_port import GripperPose
-from robot_side.contact import CONTACT_PERIOD_S, ContactPredictor, ContactSettings
+from robot_side.contact import CONTACT_PERIOD_S, KEPT_S, ContactPredictor, ContactSettings
 from robot_side.nearest_object import distance_to_object
 from robot_side.overlap import Mesh
 from robot_side.overlap.mesh_shapes import ellipsoid_mesh
@@ -131,6 +131,21 @@ def test_no_target_is_no_contact_and_a_new_one_is_seen_at_once() -> None:
     assert contacts.predict(one_sphere(), objects, 0, LOOP_AGE_S, 0.0)[1] is not None
     assert contacts.predict(one_sphere(), objects, None, LOOP_AGE_S, 0.001) == (None, None)
     assert contacts.predict(one_sphere(), ahead(0.01), 0, LOOP_AGE_S, 0.002)[1] == pytest.approx(0.1, abs=TOLERANCE)
+
+
+def test_noise_at_the_horizon_does_not_rattle() -> None:
+    noise = np.random.default_rng(5).uniform(-2e-4, 2e-4, 200)
+    contacts = predictor()
+    seen = [
+        contacts.predict(one_sphere(), ahead(REACH_M + float(n)), 0, LOOP_AGE_S, 1.001 * tick * CONTACT_PERIOD_S)[1]
+        for tick, n in enumerate(noise)
+    ]
+    first = next(tick for tick, travel in enumerate(seen) if travel is not None)
+    assert all(travel is not None for travel in seen[first:])
+    # What is really gone goes after a tenth of a second.
+    later_s = 1.001 * len(noise) * CONTACT_PERIOD_S
+    assert contacts.predict(one_sphere(), ahead(1.0), 0, LOOP_AGE_S, later_s)[1] is not None
+    assert contacts.predict(one_sphere(), ahead(1.0), 0, LOOP_AGE_S, later_s + KEPT_S + 0.01) == (None, None)
 
 
 def test_far_targets_cost_no_distance_and_near_ones_are_looked_at_at_their_rate(
