@@ -27,8 +27,6 @@ from operator_side.dualsense.port import Device, OpenController
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.simulated_calibration import CalibratingHands
 
-_SIMULATED_ADDRESS = "02:00:00:00:00:01"
-"""Of those that nobody's hardware has: locally administered."""
 _POLL_S = 0.002
 _SHOW_S = 0.05
 _SILENT_S = 5.0
@@ -58,7 +56,7 @@ def calibrate(arguments: Sequence[str]) -> int:
     clock: Clock
     if settings.device == "simulated":
         clock, simulated = VirtualClock(), SimulatedDualSense()
-        controller = OpenController(simulated, "simulated DualSense", _SIMULATED_ADDRESS)
+        controller = OpenController(simulated, "simulated DualSense", simulated.address)
         hands: CalibratingHands | None = CalibratingHands(simulated)
         kept_at = settings.out
     else:
