@@ -12,8 +12,8 @@ import msgspec
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.messages import AnyMessage, Message
 
-PROTOCOL_VERSION = 2
-"""2: the lease, with its token in every command."""
+PROTOCOL_VERSION = 3
+"""2: the lease, with its token in every command. 3: predicted contact in each stiffness."""
 MAXIMUM_BYTES = 4096
 """The largest message is a tenth of this; a longer payload is not looked into."""
 

@@ -149,11 +149,17 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     rumble: float
     """Danger that lies along neither trigger, 0 to 1."""
     state: MotionState
+    l2_contact: float | None = None
+    """The calibrated travel, 0 to 1, from which on the left trigger leads to contact; None: to none that is near."""
+    r2_contact: float | None = None
 
     def __post_init__(self) -> None:
         _in_range("l2", 0.0, 1.0, self.l2)
         _in_range("r2", 0.0, 1.0, self.r2)
         _in_range("rumble", 0.0, 1.0, self.rumble)
+        for name, travel in (("l2_contact", self.l2_contact), ("r2_contact", self.r2_contact)):
+            if travel is not None:
+                _in_range(name, 0.0, 1.0, travel)
 
 
 class Telemetry(Message, frozen=True, tag="telemetry"):

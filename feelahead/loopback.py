@@ -52,13 +52,19 @@ class Loopback:
             _VIRTUAL_CLOCK,
             haptics=settings.operator.haptics,
             calibration=settings.operator.calibration,
+            rendering=settings.operator.rendering,
+            swap_sides=settings.operator.swap_sides,
             seed=settings.operator.seed,
             asymmetry_s=settings.operator.asymmetry_s(),
         )
         self.device = SimulatedDualSense()
         self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
         self.person = SimulatedOperator(
-            self.device, settings.operator.person, settings.operator.seed, settings.operator.calibration
+            self.device,
+            settings.operator.person,
+            settings.operator.seed,
+            settings.operator.calibration,
+            swap_sides=settings.operator.swap_sides,
         )
         self.tick_time = RunningStatistics(settings.robot.seed)
         there, back = settings.operator.link_spec(), settings.robot.link_spec()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from common.command_line import run_command
 from common.errors import ConfigurationError
 from feelahead.bench import bench
+from feelahead.calibrate import calibrate
 from feelahead.demo import demo
 from feelahead.doctor.command import doctor
 from feelahead.keys import keys
@@ -13,6 +14,7 @@ from feelahead.keys import keys
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
     "doctor": (doctor, "what is missing on this machine, and the command that mends it"),
+    "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
 }

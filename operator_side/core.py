@@ -14,11 +14,13 @@ from common.link_end import LinkEnd
 from common.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.session import OWNING, SessionState
 from common.statistics import RunningStatistics
-from operator_side.dualsense.effects import Off, TriggerEffect
+from operator_side.dualsense.effects import Off
 from operator_side.dualsense.input_report import parse_input_report
 from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble, build_output_report
-from operator_side.trigger_effect import EffectSelector
-from operator_side.trigger_motion import OperatorIntent, TravelCalibration, operator_intent
+from operator_side.travel_calibration import TravelCalibration
+from operator_side.trigger_motion import OperatorIntent, operator_intent
+from operator_side.trigger_rendering import RenderingSettings, TriggerRendering
+from operator_side.write_bound import WriteBound
 
 STIFFNESS_EXPIRES_S = 0.2
 """Triggers are released this long after the last stiffness that was received."""
@@ -41,10 +43,12 @@ class OperatorSide:
         *,
         haptics: bool = True,
         calibration: TravelCalibration | None = None,
+        rendering: RenderingSettings | None = None,
+        swap_sides: bool = False,
         seed: int = 0,
         asymmetry_s: float = 0.0,
     ) -> None:
-        """`asymmetry_s`: see LinkEnd."""
+        """`swap_sides`: left and right of the controller swapped; `asymmetry_s`: see LinkEnd."""
         self.link = LinkEnd("operator", epoch, clock_domain, seed, asymmetry_s)
         self.screen: Telemetry | None = None
         """The newest view of the robot; None before the first."""
@@ -62,13 +66,18 @@ class OperatorSide:
         self.applied_age = RunningStatistics(seed)
         self._haptics = haptics
         self._calibration = calibration or TravelCalibration()
+        self._swap_sides = swap_sides
+        self._rendering_settings = rendering or RenderingSettings()
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
         self._stiffness_s = 0.0
         self._hello_s = -math.inf
         self._lease_s = 0.0
         self._screen_order = (-1, -1)
-        self._selectors = (EffectSelector(), EffectSelector())
+        self.writes = 0
+        """Output reports that were made."""
+        self._rendering = self._new_rendering()
+        self._write_bound = WriteBound()
         self._written: OutputReport | None = RELEASED
         self._lost_s: float | None = None
 
@@ -122,7 +131,17 @@ class OperatorSide:
         except RemoteProtocolError:
             self.rejected += 1
             return
-        self._intent, self._intent_s = operator_intent(state, self._calibration), now_s
+        self._intent = operator_intent(state, self._calibration, swap_sides=self._swap_sides)
+        self._intent_s = now_s
+
+    def calibrate(self, calibration: TravelCalibration) -> None:
+        """Read the triggers and sticks of the controller that has just been found through `calibration`."""
+        if calibration != self._calibration:
+            self._calibration = calibration
+            self._rendering = self._new_rendering()
+
+    def _new_rendering(self) -> TriggerRendering:
+        return TriggerRendering(self._rendering_settings, self._calibration, swap_sides=self._swap_sides)
 
     def controller_found(self, now_s: float) -> None:
         """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
@@ -187,42 +206,43 @@ class OperatorSide:
         self.lease, self._lease_s = notice, now_s
 
     def output_report(self, now_s: float) -> bytes | None:
-        """What the controller has to be told now; None while nothing changes."""
+        """What the controller has to be told now; None while nothing changes, or while a change has to wait."""
         if self.stiffness is not None and now_s - self._stiffness_s > STIFFNESS_EXPIRES_S:
             self.stiffness = None
         felt = self.stiffness if self._haptics else None
-        if felt is None or felt.state != "armed":
-            effects: tuple[TriggerEffect, TriggerEffect] = (Off(), Off())
-            for selector in self._selectors:
-                selector.select(0.0)
-            rumble = Rumble()
-        else:
-            effects = (self._selectors[0].select(felt.l2), self._selectors[1].select(felt.r2))
-            drive = round(felt.rumble * 8) / 8  # coarse steps: a motor needs no more, and each is a write
-            rumble = Rumble(left=drive)
+        if felt is not None and felt.state != "armed":
+            felt = None
+        wanted = self._rendering.render(felt, now_s)
         if self._written is None:
-            self._written = RELEASED
+            # Nobody knows what the triggers do: released first, then as they should be.
+            self._write_bound.allows(now_s, releasing=True)
+            self._written, self.writes = RELEASED, self.writes + 1
             return build_output_report(RELEASED)
-        before, wanted = self._written, OutputReport(*effects, rumble)
+        before = self._written
         if wanted == before:
             return None
-        self._written = wanted
-        return build_output_report(
-            OutputReport(
-                l2=wanted.l2 if wanted.l2 != before.l2 else None,
-                r2=wanted.r2 if wanted.r2 != before.r2 else None,
-                rumble=rumble if rumble != before.rumble else None,
-            )
+        change = OutputReport(
+            l2=wanted.l2 if wanted.l2 != before.l2 else None,
+            r2=wanted.r2 if wanted.r2 != before.r2 else None,
+            rumble=wanted.rumble if wanted.rumble != before.rumble else None,
         )
+        releasing = change.l2 == Off() or change.r2 == Off() or change.rumble == Rumble()
+        if not self._write_bound.allows(now_s, releasing=releasing):
+            return None
+        self._written, self.writes = wanted, self.writes + 1
+        return build_output_report(change)
 
     def status(self, now_s: float) -> dict[str, float | str | None]:
         """A few figures for the status line."""
         mean_s = self.link.delay.mean
+        felt = None if self.stiffness is None else (self.stiffness.l2, self.stiffness.r2)
+        left, right = (None, None) if felt is None else (felt[::-1] if self._swap_sides else felt)
         return {
             "link": self._link_status(now_s),
             "state": None if self.stiffness is None else self.stiffness.state,
-            "L2": None if self.stiffness is None else self.stiffness.l2,
-            "R2": None if self.stiffness is None else self.stiffness.r2,
+            "L2": left,
+            "R2": right,
+            "feel": f"L2 {self._rendering.l2.status()}, R2 {self._rendering.r2.status()}",
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
 
@@ -247,6 +267,7 @@ class OperatorSide:
                 "stale": self.link.stale,
             },
             "lease_states": self.leases,
+            "rendering": self._rendering.summary() | {"writes": self.writes},
             "delay_ms": {
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
-from common.command_line import parse_settings, run_command
+from common.command_line import given_fields, parse_settings, run_command
 from common.errors import FeelaheadError
 from common.garbage import IdleCollection
 from common.link_model import DelayLine, link_summary, unused_clauses
@@ -18,6 +18,7 @@ from common.sockets import OperatorSockets
 from common.sockets.authentication import OperatorKeys
 from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
+from operator_side.calibration_store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
 from operator_side.dualsense.connection import Connection
 from operator_side.dualsense.device import HidBackend, load_backend
@@ -28,6 +29,7 @@ from operator_side.dualsense.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import SimulatedOperator
+from operator_side.travel_calibration import TravelCalibration
 
 MOTION_PERIOD_S = 1 / 250
 
@@ -50,6 +52,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         clock_domain(),
         haptics=settings.haptics,
         calibration=settings.calibration,
+        rendering=settings.rendering,
+        swap_sides=settings.swap_sides,
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
     )
@@ -67,7 +71,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             guard: ReleaseGuard | None = None
             if settings.device == "simulated":
                 simulated = SimulatedDualSense()
-                person = SimulatedOperator(simulated, settings.person, settings.seed, settings.calibration)
+                person = SimulatedOperator(
+                    simulated, settings.person, settings.seed, settings.calibration, swap_sides=settings.swap_sides
+                )
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
                 loaded = load_backend() if backend is None else backend
@@ -78,7 +84,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, line, sockets, connection, guard, person, status)
+            given = "calibration" in given_fields(arguments, OperatorSettings)
+            loop = _Loop(settings, core, line, sockets, connection, guard, person, status, stored_travel=not given)
             failure: FeelaheadError | None = None
             try:
                 loop.run(stop)
@@ -108,7 +115,12 @@ class _Loop:
         guard: ReleaseGuard | None,
         person: SimulatedOperator | None,
         status: Status,
+        *,
+        stored_travel: bool,
     ) -> None:
+        """`stored_travel`: take on the calibration that is stored for a controller, as none was given."""
+        self._stored_travel = stored_travel
+        self._calibrated = 0
         self._duration_s = settings.duration
         self._core = core
         self._line = line
@@ -161,10 +173,26 @@ class _Loop:
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
         self._connection.update(now_s)
+        self._calibrate()
         if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
         for payload in self._core.motion(now_s):
             self._line.push(now_s, payload)
+
+    def _calibrate(self) -> None:
+        """Once for each time that a controller is found; ConfigurationError for a stored calibration that is broken."""
+        controller = self._connection.controller
+        if controller is None or self._calibrated == self._connection.found:
+            return
+        self._calibrated = self._connection.found
+        if not self._stored_travel or controller.address is None:
+            return
+        stored = load_calibration(controller.address)
+        if stored is None:
+            self._status.note("its travel has not been calibrated: feelahead calibrate does that")
+        else:
+            self._status.note(f"its travel calibration: {calibration_path(controller.address)}")
+        self._core.calibrate(stored or TravelCalibration())
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""

@@ -8,7 +8,8 @@ import tyro
 
 from common.run_options import RunOptions
 from operator_side.simulated_operator import PersonSettings
-from operator_side.trigger_motion import TravelCalibration
+from operator_side.travel_calibration import TravelCalibration
+from operator_side.trigger_rendering import RenderingSettings
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,13 @@ class OperatorSettings(RunOptions):
     """A real controller, which is waited for while it is not there, or a simulated one with a scripted person."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
+    swap_sides: bool = False
+    """Left and right swapped: L2 advances and R2 retreats, R1 is held to run, the right stick moves across and the left
+    one turns."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
-    """Which part of the triggers' travel counts."""
+    """Which part of the triggers' and sticks' travel counts."""
+    rendering: RenderingSettings = field(default_factory=RenderingSettings)
+    """How stiffness becomes what the fingers feel."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
 

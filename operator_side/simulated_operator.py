@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from common.messages import Telemetry, Vector2, Vector3
+from operator_side.button_map import Action, button_of
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.trigger_model import (
@@ -27,7 +28,7 @@ from operator_side.dualsense.trigger_model import (
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.trigger_motion import TravelCalibration
+from operator_side.travel_calibration import TravelCalibration
 
 FULL_TRIGGER_M_S = 0.25
 """What a person has learnt a fully pulled trigger to do."""
@@ -95,6 +96,8 @@ class SimulatedOperator:
         settings: PersonSettings,
         seed: int,
         calibration: TravelCalibration | None = None,
+        *,
+        swap_sides: bool = False,
     ) -> None:
         self.phase: Phase = "wait"
         self._device = device
@@ -108,6 +111,7 @@ class SimulatedOperator:
         self._lift_from: Vector3 | None = None
         self._holding_s = 0.0
         self._calibration = calibration or TravelCalibration()
+        self._swap_sides = swap_sides
         self._insistence_n = 0.0
         self._pulling: int | None = None
         self._hands_s: float | None = None
@@ -214,38 +218,43 @@ class SimulatedOperator:
     def _hands(self, now_s: float, advance: float, stick: Vector2, buttons: AbstractSet[Button] = frozenset()) -> None:
         """Pull R2 (advance > 0) or L2 as far as the person means to, 0 to 1; hold-to-run is always held.
 
+        With the sides swapped, it is the other one of everything.
         They know by habit which force that takes on a free trigger. One that resists yields less, which they
         feel, and after a while they push harder, up to a normal finger's force.
         """
         meant = min(1.0, abs(advance))
-        trigger = 1 if advance > 0 else 0
+        trigger = int((advance > 0) != self._swap_sides)
         step_s = 0.0 if self._hands_s is None else now_s - self._hands_s
         self._hands_s = now_s
         force_n = 0.0
         if trigger != self._pulling:
             self._pulling, self._insistence_n = trigger, 0.0
         if meant > 0.0:
-            free = self._calibration.dead_zone + meant * (self._calibration.saturation - self._calibration.dead_zone)
-            mechanical = free * SENSED_TRAVEL
-            acting = self._calibration.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
+            calibrated = self._calibration.r2 if trigger == 1 else self._calibration.l2
+            acting = calibrated.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
             yields_less = acting < _FELT_SHARE * meant
             insisting = self._settings.insistence_per_s * NORMAL_FINGER_FORCE_N * step_s
             self._insistence_n = max(0.0, self._insistence_n + (insisting if yields_less else -insisting))
-            force_n = SPRING_PRELOAD_N + SPRING_RISE_N * mechanical
+            force_n = SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * calibrated.raw(meant)
             self._insistence_n = min(self._insistence_n, max(0.0, NORMAL_FINGER_FORCE_N - force_n))
             force_n = min(force_n + self._insistence_n, NORMAL_FINGER_FORCE_N)
         else:
             self._insistence_n = 0.0
         self._device.set_finger_force(force_n if trigger == 0 else 0.0, force_n if trigger == 1 else 0.0)
-        self._device.set_sticks(left=self._beyond_dead_zone(stick))
-        self._device.set_buttons(frozenset({Button.L1, *buttons}))
+        across = self._beyond_dead_zone(stick)
+        if self._swap_sides:
+            self._device.set_sticks(right=across)
+        else:
+            self._device.set_sticks(left=across)
+        run = button_of(swap_sides=self._swap_sides)[Action.RUN]
+        self._device.set_buttons(frozenset({run, *buttons}))
 
     def _beyond_dead_zone(self, stick: Vector2) -> Vector2:
         """A hand learns where a stick begins to act."""
         radius = math.hypot(*stick)
         if radius < 1e-3:
             return (0.0, 0.0)
-        dead = self._calibration.stick_dead_zone
+        dead = (self._calibration.right_stick if self._swap_sides else self._calibration.left_stick).dead_zone
         scale = (dead + (1.0 - dead) * radius) / radius
         return _within_unit_circle(stick[0] * scale, stick[1] * scale)
 

@@ -1,73 +1,11 @@
 """The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
-from types import MappingProxyType
 from typing import Final, Literal
 
-from operator_side.dualsense.controller_state import Button, ControllerState, Stick
-
-
-class Action(Enum):
-    """What a button is for."""
-
-    RUN = "hold to run"
-    ARM = "arm"
-    EMERGENCY_STOP = "emergency stop"
-    CLOSE_GRIPPER = "close the gripper while held"
-    OPEN_GRIPPER = "open the gripper while held"
-    NEXT_TARGET = "next target"
-    HAND_OVER = "hand the robot over to the observer that has waited longest"
-
-
-BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
-    {
-        Action.RUN: Button.L1,
-        Action.ARM: Button.OPTIONS,
-        Action.EMERGENCY_STOP: Button.CIRCLE,
-        Action.CLOSE_GRIPPER: Button.CROSS,
-        Action.OPEN_GRIPPER: Button.SQUARE,
-        Action.NEXT_TARGET: Button.TRIANGLE,
-        Action.HAND_OVER: Button.CREATE,
-    }
-)
-"""The whole button map. Besides: R2 advances, L2 retreats, the left stick moves across, the right one turns."""
-
-
-@dataclass(frozen=True)
-class TravelCalibration:
-    """Where this controller's triggers and sticks begin and end, in raw travel."""
-
-    dead_zone: float = 0.05
-    """A trigger below this is released."""
-    saturation: float = 0.98
-    """A trigger above this is fully pulled."""
-    stick_dead_zone: float = 0.1
-    """A stick within this radius is at rest: worn sticks do not come back to the centre."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.dead_zone < self.saturation <= 1.0:
-            raise ValueError(
-                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone < saturation <= 1"
-            )
-        if not 0.0 <= self.stick_dead_zone < 1.0:
-            raise ValueError(f"stick_dead_zone = {self.stick_dead_zone}; valid: 0 to below 1")
-
-    def travel(self, raw: float) -> float:
-        """Calibrated trigger travel, 0 to 1, from the raw one; exactly 0 within the dead zone."""
-        return min(max((raw - self.dead_zone) / (self.saturation - self.dead_zone), 0.0), 1.0)
-
-    def stick(self, raw: Stick) -> Stick:
-        """The same direction with the dead zone taken off the radius, which ends at 1."""
-        radius = math.hypot(*raw)
-        if radius <= self.stick_dead_zone:
-            return 0.0, 0.0
-        scale = min((radius - self.stick_dead_zone) / (1.0 - self.stick_dead_zone), 1.0) / radius
-        x, y = (min(max(axis * scale, -1.0), 1.0) for axis in raw)  # rounding must not leave the range
-        return x, y
-
+from operator_side.button_map import Action, button_of
+from operator_side.dualsense.controller_state import ControllerState, Stick
+from operator_side.travel_calibration import TravelCalibration
 
 _DEFAULT_CALIBRATION: Final = TravelCalibration()
 
@@ -77,13 +15,13 @@ class OperatorIntent:
     """What the operator's hands mean at one moment. Buttons are levels: they are true as long as they are held."""
 
     l2: float
-    """Calibrated travel, 0 to 1: retreat."""
+    """Calibrated travel, 0 to 1, of the trigger that retreats: L2, unless the sides are swapped."""
     r2: float
-    """Calibrated travel, 0 to 1: advance."""
+    """Calibrated travel, 0 to 1, of the trigger that advances."""
     lateral: Stick
-    """Left stick, right and up positive, within the unit circle."""
+    """Of the stick that moves across, the left one: right and up positive, within the unit circle."""
     turning: Stick
-    """Right stick, right and up positive, within the unit circle."""
+    """Of the stick that turns, the right one."""
     run: bool
     arm: bool
     emergency_stop: bool
@@ -99,22 +37,31 @@ class OperatorIntent:
         return self.l2 == 0.0 and self.r2 == 0.0
 
 
-def operator_intent(state: ControllerState, calibration: TravelCalibration = _DEFAULT_CALIBRATION) -> OperatorIntent:
-    """Read `state` through the calibration and the button map.
+def operator_intent(
+    state: ControllerState, calibration: TravelCalibration = _DEFAULT_CALIBRATION, *, swap_sides: bool = False
+) -> OperatorIntent:
+    """Read `state` through the calibration and the button map, with left and right swapped if so asked.
 
     While the emergency stop is held, every other button counts as not pressed.
     """
-    held = {action for action, button in BUTTON_OF.items() if button in state.pressed}
+    held = {action for action, button in button_of(swap_sides=swap_sides).items() if button in state.pressed}
     if Action.EMERGENCY_STOP in held:
         held = {Action.EMERGENCY_STOP}
     gripper: Literal[-1, 0, 1] = 0
     if (Action.CLOSE_GRIPPER in held) != (Action.OPEN_GRIPPER in held):
         gripper = 1 if Action.CLOSE_GRIPPER in held else -1
+    l2, r2 = calibration.l2.travel(state.l2), calibration.r2.travel(state.r2)
+    left, right = (
+        calibration.left_stick.deflection(state.left_stick),
+        calibration.right_stick.deflection(state.right_stick),
+    )
+    if swap_sides:
+        l2, r2, left, right = r2, l2, right, left
     return OperatorIntent(
-        l2=calibration.travel(state.l2),
-        r2=calibration.travel(state.r2),
-        lateral=calibration.stick(state.left_stick),
-        turning=calibration.stick(state.right_stick),
+        l2=l2,
+        r2=r2,
+        lateral=left,
+        turning=right,
         run=Action.RUN in held,
         arm=Action.ARM in held,
         emergency_stop=Action.EMERGENCY_STOP in held,

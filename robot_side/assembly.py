@@ -12,6 +12,7 @@ from common.errors import ConfigurationError
 from common.link_end import LinkEnd
 from robot_side.arm import MujocoArm, MujocoKinematics
 from robot_side.arm_port import Arm, ArmState
+from robot_side.contact import ContactPredictor
 from robot_side.core import RobotSide
 from robot_side.enlargement import Enlargement
 from robot_side.kinematic_error import position_covariance
@@ -90,6 +91,7 @@ def build_robot_side(
         LoopAge(settings.assumed_delay_s),
         np.full(arm.joint_count, limits.velocity_rad_s),
         settings.motion,
+        ContactPredictor(settings.contact, settings.motion.trigger_speed_m_s),
         SimulationObserver(scene),
         settings.seed,
         _notes(scene),

@@ -15,6 +15,7 @@ from common.codec import encode
 from common.delay import LoopAge
 from common.messages import MotionState, StiffnessUpdate, Telemetry
 from robot_side.arm_port import Arm, ArmState, GripperKinematics, GripperPose
+from robot_side.contact import Contact, ContactPredictor
 from robot_side.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.operator_session import OperatorSession, Receiver
 from robot_side.perceived_objects import ObjectSource, PerceivedObjects, Role
@@ -68,6 +69,7 @@ class RobotSide:
         loop_age: LoopAge,
         velocity_limits_rad_s: FloatArray,
         motion: ToolMotionSettings,
+        contact: ContactPredictor,
         observer: Observer | None = None,
         seed: int = 0,
         notes: Sequence[str] = (),
@@ -84,6 +86,7 @@ class RobotSide:
         self._loop_age = loop_age
         self._velocity_limits_rad_s = velocity_limits_rad_s
         self._motion = motion
+        self._contact = contact
         self._observer = observer
         self._start_s: float | None = None
         self._was_armed = False
@@ -134,10 +137,12 @@ class RobotSide:
             # What the gripper carries changes its shape: the support counts anew from there.
             self._sensing.stiffness_map.set_support_baseline()
         self._was_armed, self._was_carrying = armed, carrying
+        target = target_index(objects) if armed and not carrying else None
+        contact = self._contact.predict(whole, objects, target, self._loop_age.value(now_s), now_s)
         self._last = (state, sensed)
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
         self._record(sensed, objects, speed_m_s, armed, now_s)
-        return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
+        return self._outgoing(permission, pose, objects, state, sensed, contact, speed_m_s, now_s)
 
     def _perceive(self, now_s: float) -> PerceivedObjects:
         objects = self._camera.perceive(now_s)
@@ -198,6 +203,7 @@ class RobotSide:
         objects: PerceivedObjects,
         state: ArmState,
         sensed: Sensed,
+        contact: Contact,
         speed_m_s: float,
         now_s: float,
     ) -> list[Outgoing]:
@@ -205,11 +211,11 @@ class RobotSide:
         stiffness = sensed.stiffness
         if (owner := self.session.owner(now_s)) is not None:
             self.stiffness_sent += 1
-            outgoing.append(_stiffness(owner, stiffness, permission.state))
+            outgoing.append(_stiffness(owner, stiffness, contact, permission.state))
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             observers = self.session.observers(now_s)
-            outgoing += [_stiffness(one, stiffness, permission.state) for one in observers]
+            outgoing += [_stiffness(one, stiffness, contact, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
             target = target_index(objects)
@@ -259,7 +265,7 @@ class RobotSide:
         start_s = self._start_s or 0.0
         stops = [{"time_s": when_s - start_s, "reason": reason} for when_s, reason in self.session.safety.stops]
         return self.figures.summary() | {
-            "skipped": vars(self._sensing.skipped).copy(),
+            "skipped": vars(self._sensing.skipped) | {"contact_out_of_reach": self._contact.out_of_reach},
             "messages": {
                 "stiffness_sent": self.stiffness_sent,
                 "motion_received": self.session.motion_received,
@@ -274,8 +280,16 @@ class RobotSide:
         }
 
 
-def _stiffness(receiver: Receiver, stiffness: Stiffness, state: MotionState) -> Outgoing:
-    update = StiffnessUpdate(receiver.header, l2=stiffness.l2, r2=stiffness.r2, rumble=stiffness.rumble, state=state)
+def _stiffness(receiver: Receiver, stiffness: Stiffness, contact: Contact, state: MotionState) -> Outgoing:
+    update = StiffnessUpdate(
+        receiver.header,
+        l2=stiffness.l2,
+        r2=stiffness.r2,
+        rumble=stiffness.rumble,
+        state=state,
+        l2_contact=contact[0],
+        r2_contact=contact[1],
+    )
     return Outgoing("haptics", receiver.peer, encode(update))
 
 

@@ -220,6 +220,16 @@ def _find_pairs(
     return count
 
 
+def bounding_spheres(objects: PerceivedObjects, index: int) -> tuple[FloatArray, FloatArray]:
+    """Spheres around the bounded primitives of the object `index`: centres (b, 3) and radii (b,) in metres.
+
+    A half-space has none.
+    """
+    bounds = _bounds_of(objects)
+    rows = np.flatnonzero(bounds.object_index == index)
+    return bounds.centers_m.take(rows, axis=0), bounds.radii_m.take(rows)
+
+
 def _bounds_of(objects: PerceivedObjects) -> _Bounds:
     """The bounding spheres of `objects`, worked out when they are first seen."""
     key = id(objects)

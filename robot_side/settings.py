@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from common.run_options import RunOptions
+from robot_side.contact import ContactSettings
 from robot_side.enlargement import EnlargementSettings
 from robot_side.kinematic_error import VarianceMeasure
 from robot_side.perceived_objects import Role
@@ -101,6 +102,7 @@ class RobotSettings(RunOptions):
     camera: CameraSettings = field(default_factory=CameraSettings)
     enlargement: EnlargementOptions = field(default_factory=EnlargementOptions)
     stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
+    contact: ContactSettings = field(default_factory=ContactSettings)
     motion: ToolMotionSettings = field(default_factory=ToolMotionSettings)
     safety: SafetySettings = field(default_factory=SafetySettings)
 

@@ -14,8 +14,8 @@ from operator_side.dualsense.output_report import OutputReport, build_output_rep
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.trigger_model import SENSED_TRAVEL, SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.simulated_operator import PersonSettings, Phase, SimulatedOperator
+from operator_side.travel_calibration import TravelCalibration
 from operator_side.trigger_effect import stiffness_to_effect
-from operator_side.trigger_motion import TravelCalibration
 
 TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()
@@ -144,7 +144,7 @@ class Desk:
 
 def habitual_force_n(meant: float) -> float:
     """What a free trigger takes for that calibrated travel."""
-    raw = CALIBRATION.dead_zone + meant * (CALIBRATION.saturation - CALIBRATION.dead_zone)
+    raw = CALIBRATION.r2.raw(meant)
     return SPRING_PRELOAD_N + SPRING_RISE_N * raw * SENSED_TRAVEL
 
 

@@ -160,6 +160,9 @@ def test_an_oversize_payload_is_not_looked_into() -> None:
 def test_messages_refuse_bad_values_when_made() -> None:
     with pytest.raises(ValueError, match="rumble"):
         StiffnessUpdate(HEADER, l2=0.0, r2=0.0, rumble=2.0, state="armed")
+    for travel in (-0.1, 1.1, math.nan):
+        with pytest.raises(ValueError, match="r2_contact"):
+            StiffnessUpdate(HEADER, l2=0.0, r2=0.0, rumble=0.0, state="armed", r2_contact=travel)
     with pytest.raises(ValueError, match="both or neither"):
         Header(epoch=1, sequence=1, sent_s=0.0, echo_sent_s=1.0)
 

@@ -18,6 +18,7 @@ VALID: tuple[AnyMessage, ...] = (
     Hello(HEADER, side="operator", clock_domain="boot"),
     MotionCommand(HEADER, l2=0.5, r2=0.25, lateral=(0.1, -0.1), run=True),
     StiffnessUpdate(HEADER, l2=0.0, r2=1.0, rumble=0.5, state="armed"),
+    StiffnessUpdate(HEADER, l2=0.0, r2=1.0, rumble=0.5, state="armed", l2_contact=None, r2_contact=0.25),
 )
 
 

@@ -33,6 +33,7 @@ CLOCK_READERS = {
     "common/clock.py",  # the clock
     "feelahead/benchmarks/wake_error.py",  # measures a clock's loop
     "feelahead/experiments/hostile_input.py",  # drives two real processes
+    "feelahead/calibrate.py",  # shows a real controller to a person
     "feelahead/demo.py",  # shows two real processes to a person
     "robot_side/main.py",  # times its own ticks
     "feelahead/loopback.py",  # likewise

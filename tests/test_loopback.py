@@ -1,6 +1,7 @@
 """Both sides in virtual time, from a scripted person's fingers to a lifted target and back as stiffness."""
 
 import functools
+import itertools
 from typing import Any
 
 import pytest
@@ -38,6 +39,31 @@ def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone() -> None:
     stiffness = episode(200, haptics=True)["stiffness"]
     assert stiffness["r2"]["max"] > 0.3
     assert stiffness["l2"]["max"] < 0.3
+
+
+def test_a_bump_where_contact_begins_comes_to_meet_the_finger() -> None:
+    run = loopback("")
+    contacts: list[float] = []
+    bumps = set()
+    while run.person.phase != "close" and run.clock.now() < 9.0:
+        run.run_until(run.clock.now() + 0.05)
+        felt = run.operator.stiffness
+        assert felt is None or felt.l2_contact is None
+        if felt is not None and felt.r2_contact is not None:
+            contacts.append(felt.r2_contact)
+            r2 = run.device.effects[1].zone_strengths
+            bumps.add(max(range(10), key=lambda zone: r2[zone]))
+    assert contacts[0] > 0.5
+    assert contacts[-1] < 0.05
+    assert all(later <= earlier + 0.02 for earlier, later in itertools.pairwise(contacts))
+    assert len(bumps) >= 4
+
+
+def test_a_person_whose_left_hand_advances_gets_there_as_well() -> None:
+    operator = OperatorSettings(swap_sides=True)
+    run = Loopback(LoopbackSettings(RobotSettings(), operator))
+    run.run_until(7.0)
+    assert run.summary()["task"]["time_to_grasp_s"] == episode(0, haptics=True)["task"]["time_to_grasp_s"]
 
 
 def test_more_delay_means_more_enlargement() -> None:

@@ -10,13 +10,14 @@ from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXP
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.effects import Off
 from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.travel_calibration import TravelCalibration, TriggerTravel
 
 
 class Bench:
     """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
 
-    def __init__(self, *, haptics: bool = True) -> None:
-        self.side = OperatorSide(2, "clock", haptics=haptics)
+    def __init__(self, *, haptics: bool = True, swap_sides: bool = False) -> None:
+        self.side = OperatorSide(2, "clock", haptics=haptics, swap_sides=swap_sides)
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.now_s = 1.0
@@ -57,7 +58,73 @@ def test_stiffness_reaches_the_trigger_it_is_meant_for(bench: Bench) -> None:
     bench.feel(0.8)
     l2, r2 = bench.device.effects
     assert l2 == Off()
-    assert sum(r2.zone_strengths) == 64
+    assert sum(r2.zone_strengths) == 68  # half-way from where danger begins, at level 56, to 80
+
+
+def test_predicted_contact_is_a_bump_in_one_zone(bench: Bench) -> None:
+    update = StiffnessUpdate(
+        bench.robot.stamp(bench.now_s), l2=0.0, r2=0.0, rumble=0.0, state="armed", l2_contact=None, r2_contact=0.5
+    )
+    bench.side.receive(encode(update), bench.now_s)
+    bench.write()
+    l2, r2 = bench.device.effects
+    assert l2 == Off()
+    assert r2.zone_strengths == (0, 0, 0, 2, 0, 0, 0, 0, 0, 0)
+
+
+def test_writes_are_bounded_the_newest_wins_and_a_release_does_not_wait(bench: Bench) -> None:
+    for step in range(1000):
+        bench.now_s += 0.001
+        bench.feel(0.2 + 0.7 * (step % 2))
+    assert 50 < bench.device.write_count <= 100
+    bench.feel(0.9)
+    bench.now_s += 0.1
+    bench.write()
+    assert sum(bench.device.effects[1].zone_strengths) == 74
+    for step in range(40):
+        bench.feel(0.2 + 0.7 * (step % 2))
+    assert not bench.device.released
+    bench.feel(0.0)
+    assert bench.device.released
+
+
+def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench) -> None:
+    bench.side.calibrate(TravelCalibration(r2=TriggerTravel(0.5, 0.6)))
+    bench.device.set_finger_force(0.0, 0.5 + 4.0 * 0.75 * 0.55)
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
+    bench.read()
+    assert bench.commands()[0].r2 == pytest.approx(0.5, abs=0.05)
+    bench.feel(0.05)
+    # A full pull ends in the fifth zone: that is where the first strengths go.
+    assert bench.device.effects[1].zone_strengths == (0, 0, 0, 1, 1, 0, 0, 0, 0, 0)
+
+
+def test_with_swapped_sides_the_left_trigger_advances_and_feels_it() -> None:
+    bench = Bench(swap_sides=True)
+    bench.feel(0.7)
+    l2, r2 = bench.device.effects
+    assert sum(l2.zone_strengths) > 0
+    assert r2 == Off()
+    status = bench.side.status(bench.now_s)
+    assert (status["L2"], status["R2"], status["feel"]) == (0.7, 0.0, "L2 danger, R2 clear")
+    bench.feel(0.0)
+    bench.device.set_finger_force(10.0, 0.0)
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.notice(SessionState.DISARMED)
+    bench.read()
+    [command] = bench.commands()
+    assert (command.l2, command.r2) == (0.0, 1.0)
+
+
+def test_people_are_told_the_band(bench: Bench) -> None:
+    bench.feel(0.7)
+    assert bench.side.status(bench.now_s)["feel"] == "L2 clear, R2 danger"
+    rendering = bench.side.summary()["rendering"]
+    assert rendering["r2"]["band_changes"] == 1
+    assert rendering["writes"] == 1
 
 
 def test_only_changes_are_written(bench: Bench) -> None:

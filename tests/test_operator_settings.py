@@ -9,7 +9,7 @@ from common.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import PersonSettings
-from operator_side.trigger_motion import TravelCalibration
+from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 NAN, INFINITY = math.nan, math.inf
 
@@ -24,9 +24,11 @@ NAN, INFINITY = math.nan, math.inf
         (PersonSettings, "lift_m", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "insistence_per_s", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "attempts", (0, -1)),
-        (TravelCalibration, "dead_zone", (-0.1, 0.98, 1.5, NAN)),
-        (TravelCalibration, "saturation", (0.05, 0.0, 1.1, NAN)),
-        (TravelCalibration, "stick_dead_zone", (-0.1, 1.0, NAN)),
+        (TriggerTravel, "dead_zone", (-0.1, 0.98, 1.5, NAN)),
+        (TriggerTravel, "saturation", (0.05, 0.0, 1.1, NAN)),
+        (StickRest, "dead_zone", (-0.1, 1.0, NAN)),
+        (StickRest, "x", (-0.31, 0.31, NAN)),
+        (StickRest, "y", (-0.31, 0.31, NAN)),
         (OperatorSettings, "duration", (0.0, -2.0, NAN)),
         (OperatorSettings, "seed", (-1,)),
     ],
@@ -51,7 +53,8 @@ def test_the_ends_of_the_ranges_are_valid() -> None:
         lift_m=0.0,
         insistence_per_s=0.0,
     )
-    TravelCalibration(dead_zone=0.0, saturation=1.0, stick_dead_zone=0.0)
+    TriggerTravel(dead_zone=0.0, saturation=1.0)
+    StickRest(dead_zone=0.0)
 
 
 def test_a_real_controller_and_the_robot_on_this_machine_are_what_one_gets() -> None:
@@ -64,12 +67,12 @@ def test_a_real_controller_and_the_robot_on_this_machine_are_what_one_gets() -> 
 def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     path = tmp_path / "operator.toml"
     path.write_text('device = "simulated"\nhaptics = false\n[person]\nattempts = 5\nlift_m = 0.2\n')
-    arguments = ["--config", str(path), "--haptics", "--person.attempts", "2", "--calibration.dead-zone", "0.1"]
+    arguments = ["--config", str(path), "--haptics", "--person.attempts", "2", "--calibration.l2.dead-zone", "0.1"]
     settings = parse_settings(OperatorSettings, "operator", arguments)
     assert settings.device == "simulated"
     assert settings.haptics
     assert (settings.person.attempts, settings.person.lift_m) == (2, 0.2)
-    assert settings.calibration == TravelCalibration(dead_zone=0.1)
+    assert settings.calibration == TravelCalibration(l2=TriggerTravel(dead_zone=0.1))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +82,7 @@ def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
         ("[person]\nattempts = 0", "attempts = 0"),
         ("[person]\nphase_margin_rad = 2.0", "phase_margin_rad = 2.0"),
         ("[person]\nvisual_reaction_ms = 250", "person.visual_reaction_ms"),
-        ("[calibration]\ndead_zone = 0.99", "dead_zone = 0.99"),
+        ("[calibration.r2]\ndead_zone = 0.99", "dead_zone = 0.99"),
     ],
 )
 def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, named: str) -> None:
@@ -98,8 +101,10 @@ def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, 
     [
         (["--person.insistence-per-s", "-1"], "insistence_per_s = -1"),
         (["--person.lift-m", "tall"], "--person.lift-m"),
-        (["--calibration.stick-dead-zone", "1"], "stick_dead_zone = 1"),
+        (["--calibration.left-stick.dead-zone", "1"], "dead_zone = 1"),
         (["--device", "mouse"], "mouse"),
+        (["--rendering.bands.near", "0.9"], "near = 0.9"),
+        (["--rendering.sustained.longest-s", "-1"], "longest_s = -1"),
     ],
 )
 def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> None:

@@ -18,6 +18,7 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     assert {
         "robot_side.alignment",
         "robot_side.between_fingers",
+        "robot_side.contact",
         "robot_side.enlargement",
         "robot_side.kinematic_error",
         "robot_side.nearest_kernels",

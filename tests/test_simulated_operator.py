@@ -174,7 +174,7 @@ def test_a_free_trigger_travels_as_far_as_was_meant() -> None:
     desk.arm()
     desk.watch(armed((0.0, 0.0, 0.1)), 2.0)
     meant = crossover(0.25) * (0.1 + GRASP_M) / FULL_TRIGGER_M_S
-    assert CALIBRATION.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(meant, abs=0.01)
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(meant, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_the_stick_goes_to_where_the_target_is_seen(
     desk.arm()
     hands = desk.watch(armed((*across_m, 0.2)), 1.0)[-1]
     length = math.hypot(*hands.left)
-    assert length > CALIBRATION.stick_dead_zone
+    assert length > CALIBRATION.left_stick.dead_zone
     assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
     # So far off the line they centre first.
     assert hands.r2_n == 0.0
@@ -221,7 +221,7 @@ def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
     screen = armed(holding=True, up_in_tool=up)
     desk.until("lift", screen, 3.0)
     hands = desk.watch(screen, 1.0)[-1]
-    x, y = CALIBRATION.stick(hands.left)
+    x, y = CALIBRATION.left_stick.deflection(hands.left)
     # Right, down and forward of the tool frame, each as a share of its full speed.
     assert (x, -y) == pytest.approx((0.5 * up[0], 0.5 * up[1]), abs=1e-9)
     pull = {1: hands.r2_n, -1: hands.l2_n}
@@ -310,7 +310,7 @@ def test_they_push_harder_and_harder_while_a_trigger_yields_less_than_they_meant
     assert [hands.r2_n for hands in pushed] == sorted(hands.r2_n for hands in pushed)
     assert pushed[-1].r2_n == NORMAL_FINGER_FORCE_N
     # So they overcome even the strongest effect a little: a stiff trigger is advice.
-    assert CALIBRATION.travel(desk.device.travel[1] / SENSED_TRAVEL) > 0.2
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) > 0.2
 
 
 def test_they_push_as_hard_as_it_takes_to_get_about_where_they_meant() -> None:
@@ -319,7 +319,7 @@ def test_they_push_as_hard_as_it_takes_to_get_about_where_they_meant() -> None:
     desk.resist(STIFF)
     desk.watch(armed((0.0, 0.0, 0.03)), 4.0)
     meant = crossover(0.25) * (0.03 + GRASP_M) / FULL_TRIGGER_M_S
-    assert CALIBRATION.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(0.8 * meant, abs=0.01)
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(0.8 * meant, abs=0.01)
     assert habitual_force_n(meant) + 1.0 < desk.hands[-1].r2_n < NORMAL_FINGER_FORCE_N
 
 
@@ -398,7 +398,7 @@ def test_misjudged_distances_spread_as_they_are_said_to() -> None:
         desk.arm()
         force_n = desk.watch(armed((0.0, 0.0, 0.1)), 0.3)[-1].r2_n
         free = ((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N) / SENSED_TRAVEL
-        errors_m.append(CALIBRATION.travel(free) * FULL_TRIGGER_M_S / crossover(0.25) - 0.1 - GRASP_M)
+        errors_m.append(CALIBRATION.r2.travel(free) * FULL_TRIGGER_M_S / crossover(0.25) - 0.1 - GRASP_M)
     mean = sum(errors_m) / 60
     sd = math.sqrt(sum((error - mean) ** 2 for error in errors_m) / 59)
     # Three standard errors.

@@ -1,0 +1,130 @@
+"""Each controller's travel calibration as a TOML file that people can read, in their configuration folder.
+
+    controllers/aa-bb-cc-dd-ee-ff.toml      by the controller's own address, the same on USB and Bluetooth
+
+The address is written with dashes in the file's name, because colons are not allowed there on Windows.
+"""
+
+import dataclasses
+import math
+import os
+import re
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import ConfigurationError
+from common.user_folders import configuration_folder
+from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+
+_VERSION: Final = 1
+_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
+_PARTS: Final[dict[str, type[TriggerTravel] | type[StickRest]]] = {
+    "l2": TriggerTravel,
+    "r2": TriggerTravel,
+    "left_stick": StickRest,
+    "right_stick": StickRest,
+}
+_LARGEST_BYTES: Final = 10_000
+_MEND: Final = "measure it anew with: feelahead calibrate; or delete the file for the defaults"
+
+
+def calibration_path(address: str) -> Path:
+    """Where the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff") is; ValueError for another form."""
+    if not _ADDRESS.fullmatch(address):
+        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
+    return configuration_folder() / "controllers" / f"{address.replace(':', '-')}.toml"
+
+
+def load_calibration(address: str) -> TravelCalibration | None:
+    """The stored calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); None when there is none.
+
+    ConfigurationError, in one line with what mends it, for a file that is broken or another controller's.
+    """
+    path = calibration_path(address)
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return None
+    except OSError:
+        pass  # reading says what is wrong
+    stored, calibration = read_calibration(path)
+    if stored != address:
+        raise ConfigurationError(f"{path}: is of the controller {stored}; valid: {address}; {_MEND}")
+    return calibration
+
+
+def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
+    """Address and calibration in the file `path`; ConfigurationError, in one line, when it is broken."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(_LARGEST_BYTES + 1)
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(text) > _LARGEST_BYTES:
+        raise ConfigurationError(f"{path}: has more than {_LARGEST_BYTES} bytes; {_MEND}")
+    try:
+        content = tomllib.loads(text.decode("utf-8"))
+        return _read(content)
+    except ValueError as error:  # of TOML, UTF-8 and the values themselves
+        said = " ".join(str(error).split())
+        raise ConfigurationError(f"{path}: {said}; {_MEND}") from error
+
+
+def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
+    """Write the file whole or not at all, its folders too; OSError names what the system does not let us at."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(_text(address, calibration))
+            file.flush()
+            os.fsync(file.fileno())
+        Path(draft).chmod(0o644)
+        Path(draft).replace(path)
+    except BaseException:
+        Path(draft).unlink(missing_ok=True)
+        raise
+
+
+def _text(address: str, calibration: TravelCalibration) -> str:
+    lines = [
+        "# Travel of one controller's triggers and sticks, as its reports have it. Made by: feelahead calibrate",
+        f"version = {_VERSION}",
+        f'address = "{address}"',
+    ]
+    for part in _PARTS:
+        lines += ["", f"[{part}]"]
+        lines += [f"{key} = {value!r}" for key, value in dataclasses.asdict(getattr(calibration, part)).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
+    """ValueError names the key."""
+    _require_keys(content, {"version", "address", *_PARTS}, "")
+    if content["version"] != _VERSION:
+        raise ValueError(f"version = {content['version']!r}; valid: {_VERSION}")
+    address = content["address"]
+    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
+        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
+    parts: dict[str, Any] = {}
+    for part, kind in _PARTS.items():
+        values = content[part]
+        if not isinstance(values, dict):
+            raise ValueError(f"{part} = {values!r}; valid: a table")
+        _require_keys(values, {field.name for field in dataclasses.fields(kind)}, f"{part}.")
+        for key, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise ValueError(f"{part}.{key} = {value!r}; valid: a finite number")
+        try:
+            parts[part] = kind(**{key: float(value) for key, value in values.items()})
+        except ValueError as error:
+            raise ValueError(f"{part}: {error}") from error
+    return address, TravelCalibration(**parts)
+
+
+def _require_keys(content: dict[str, Any], wanted: set[str], prefix: str) -> None:
+    for key in sorted(content.keys() ^ wanted):
+        what = "is missing" if key in wanted else "is unknown"
+        raise ValueError(f"{prefix}{key[:80]} {what}; valid: {', '.join(sorted(wanted))}")

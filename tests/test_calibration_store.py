@@ -1,0 +1,114 @@
+"""Calibrations on disk: by the controller's address, whole or not at all, and refused when broken."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import ConfigurationError
+from operator_side.calibration_store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+ADDRESS = "aa:bb:cc:00:11:22"
+MEASURED = TravelCalibration(TriggerTravel(0.06, 0.91), TriggerTravel(0.03, 0.98), StickRest(0.02, -0.01, 0.08))
+TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.4), st.floats(0.5, 1.0))
+STICKS = st.builds(StickRest, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.0, 0.6))
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    return tmp_path
+
+
+def test_what_was_stored_is_loaded_for_that_controller_alone(own_folder: Path) -> None:
+    assert load_calibration(ADDRESS) is None
+    path = calibration_path(ADDRESS)
+    write_calibration(path, ADDRESS, MEASURED)
+    assert path == own_folder / "feelahead" / "controllers" / "aa-bb-cc-00-11-22.toml"
+    assert load_calibration(ADDRESS) == MEASURED
+    assert load_calibration("aa:bb:cc:00:11:23") is None
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+@given(st.builds(TravelCalibration, TRIGGERS, TRIGGERS, STICKS, STICKS))
+@REPEATABLE
+def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibration) -> None:
+    path = calibration_path(ADDRESS)
+    write_calibration(path, ADDRESS, calibration)
+    assert read_calibration(path) == (ADDRESS, calibration)
+
+
+def test_a_write_that_fails_leaves_what_was_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = calibration_path(ADDRESS)
+    write_calibration(path, ADDRESS, MEASURED)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_calibration(path, ADDRESS, TravelCalibration())
+    assert load_calibration(ADDRESS) == MEASURED
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("version = 1", "version = 2", "version = 2"),
+        ("version = 1\n", "", "version is missing"),
+        ("dead_zone = 0.06", "dead_zone = 0.95", "l2: dead_zone = 0.95"),
+        ("dead_zone = 0.06", "dead_zone = nan", "l2.dead_zone = nan"),
+        ("dead_zone = 0.06", "dead_zone = true", "l2.dead_zone = True"),
+        ("dead_zone = 0.06", 'dead_zone = "0.06"', "l2.dead_zone = '0.06'"),
+        ("dead_zone = 0.06", "", "l2.dead_zone is missing"),
+        ("saturation = 0.91", "saturation = 0.91\nsaturated = 1", "l2.saturated is unknown"),
+        ("[l2]", "[l3]", "l2 is missing"),
+        ("x = 0.02", "x = 0.5", "left_stick: x = 0.5"),
+        ("aa:bb:cc:00:11:22", "AA:BB", "address = 'AA:BB'"),
+        ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "is of the controller aa:bb:cc:00:11:23"),
+        ("[l2]", "[l2", "Expected"),
+        ("#", "#" * 20_000, "more than 10000 bytes"),
+    ],
+)
+def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: str, named: str) -> None:
+    path = calibration_path(ADDRESS)
+    write_calibration(path, ADDRESS, MEASURED)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ConfigurationError) as caught:
+        load_calibration(ADDRESS)
+    said = str(caught.value)
+    assert named in said
+    assert str(path) in said
+    assert "feelahead calibrate" in said
+    assert "\n" not in said
+
+
+def test_bytes_that_are_no_text() -> None:
+    path = calibration_path(ADDRESS)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigurationError, match="utf-8"):
+        load_calibration(ADDRESS)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(ConfigurationError, match="cannot be read"):
+        load_calibration(ADDRESS)
+
+
+def test_a_folder_that_is_none(own_folder: Path) -> None:
+    (own_folder / "feelahead").write_text("a file where a folder should be")
+    with pytest.raises(ConfigurationError, match="cannot be read: Not a directory"):
+        load_calibration(ADDRESS)
+
+
+@pytest.mark.parametrize("address", ["", "aa:bb", "../../etc/passwd", "AA:BB:CC:00:11:22", "aa-bb-cc-00-11-22"])
+def test_what_is_no_address_never_becomes_a_path(address: str) -> None:
+    with pytest.raises(ValueError, match="address"):
+        load_calibration(address)
