@@ -185,6 +185,7 @@ class _Loop:
         if controller is None or self._calibrated == self._connection.found:
             return
         self._calibrated = self._connection.found
+        self._say_what_is_new()
         if not self._stored_travel or controller.address is None:
             return
         stored = load_calibration(controller.address)
@@ -194,10 +195,13 @@ class _Loop:
             self._status.note(f"its travel calibration: {calibration_path(controller.address)}")
         self._core.calibrate(stored or TravelCalibration())
 
-    def _use_idle_time(self, now_s: float) -> None:
-        """What no message should wait for."""
+    def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
             self._status.note(text)
+
+    def _use_idle_time(self, now_s: float) -> None:
+        """What no message should wait for."""
+        self._say_what_is_new()
         if self._status.due(now_s):
             if self._guard is not None and (trouble := self._guard.take_note()) is not None:
                 self._status.note(trouble)

@@ -42,7 +42,7 @@ def test_it_moves_on_with_contact() -> None:
 def test_one_zone_is_two_strengths_stiffer_and_can_be_pushed_through() -> None:
     assert with_detent(Off(), 3) == MultiPositionFeedback((0, 0, 0, 2, 0, 0, 0, 0, 0, 0))
     assert with_detent(MultiPositionFeedback((7,) * 10), 9) == MultiPositionFeedback((7,) * 9 + (8,))
-    assert with_detent(EFFECTS[37], None) is EFFECTS[37]
+    assert with_detent(EFFECTS[37], None) == EFFECTS[37]
 
 
 @given(st.integers(0, 80), st.integers(0, 80), st.integers(0, 9))

@@ -171,7 +171,8 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         assert (world.source.commands, world.written) == (0, [])
         world.plug(True)
         world.until(lambda: world.source.commands > 10)
-        assert world.notes()[1:] == ["controller: DualSense on USB (a4:5e:60:01:02:03)"]
+        assert world.notes()[1] == "controller: DualSense on USB (a4:5e:60:01:02:03)"
+        assert "feelahead calibrate" in world.notes()[2]
         assert world.written == [RELEASED]
 
 

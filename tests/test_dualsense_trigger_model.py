@@ -63,8 +63,9 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         if begin < travel:
             assert resistance_n(end, strengths[zone]) <= force_n + 1e-9
     if 0.0 < travel < 1.0:
-        here = min(int(travel * 10 + 1e-9), 9)
-        assert resistance_n(travel, strengths[here]) >= force_n - 1e-9
+        # At a boundary, to rounding, either zone may be the one that holds.
+        beside = {min(max(int(travel * 10 + one), 0), 9) for one in (-1e-9, 1e-9)}
+        assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
 
 
 @given(FORCES, STRENGTHS, st.integers(0, 9))
