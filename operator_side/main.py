@@ -121,6 +121,7 @@ class _Loop:
         """`stored_travel`: take on the calibration that is stored for a controller, as none was given."""
         self._stored_travel = stored_travel
         self._calibrated = 0
+        self._told_travel: set[str] = set()
         self._duration_s = settings.duration
         self._core = core
         self._line = line
@@ -189,11 +190,14 @@ class _Loop:
         if not self._stored_travel or controller.address is None:
             return
         stored = load_calibration(controller.address)
+        self._core.calibrate(stored or TravelCalibration())
+        if controller.address in self._told_travel:
+            return
+        self._told_travel.add(controller.address)
         if stored is None:
             self._status.note("its travel has not been calibrated: feelahead calibrate does that")
         else:
             self._status.note(f"its travel calibration: {calibration_path(controller.address)}")
-        self._core.calibrate(stored or TravelCalibration())
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
