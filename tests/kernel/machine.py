@@ -28,7 +28,7 @@ def run_machine(
         *("-machine", "pc", "-cpu", "max", "-smp", str(processors), "-m", "1024"),
         *(("-L", str(parts.firmware / "qemu"), "-L", str(parts.firmware / "seabios")) if parts.firmware else ()),
         *("-kernel", str(parts.kernel), "-initrd", str(ramdisk)),
-        *("-append", "console=ttyS0 panic=-1 quiet loglevel=6 mitigations=off tsc=reliable random.trust_cpu=on"),
+        *("-append", "console=ttyS0 panic=-1 loglevel=7 mitigations=off tsc=reliable random.trust_cpu=on"),
         *("-serial", f"file:{console}", "-serial", "stdio"),
         *("-fsdev", "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap"),
         *("-device", "virtio-9p-pci,fsdev=host,mount_tag=host"),

@@ -1,0 +1,83 @@
+"""A virtual controller in the machine, and hands on it."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TypeVar
+
+from common.clock import MonotonicClock
+from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.dualsense.uhid_controller import UhidController, identity
+from operator_side.dualsense.uhid_file import UhidFile, offer
+from tests.kernel.features import usb_feature
+from tests.kernel.waiting import CheckError, wait_until
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Which controller, and how it is connected."""
+
+    bluetooth: bool
+    edge: bool
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return f"DualSense{' Edge' if self.edge else ''} on {'Bluetooth' if self.bluetooth else 'USB'}"
+
+
+class _Controller(SimulatedDualSense):
+    def get_feature(self, report_id: int) -> bytes:
+        return usb_feature(report_id)
+
+
+class Plugged:
+    """A simulated controller on /dev/uhid, alive in a thread of its own while the context is open."""
+
+    def __init__(self, variant: Variant) -> None:
+        self.variant = variant
+        self.identity = identity(bluetooth=variant.bluetooth, edge=variant.edge)
+        self._simulated = _Controller()
+        self.offered = UhidController(self._simulated, self.identity)
+        self._asked: deque[Callable[[], None]] = deque()
+        self._ending = False
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._live)
+
+    def __enter__(self) -> "Plugged":
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending = True
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def ask(self, function: Callable[[SimulatedDualSense], Value]) -> Value:
+        """What `function` says of the simulated controller, in the thread that it lives in."""
+        answers: deque[Value] = deque()
+        self._asked.append(lambda: answers.append(function(self._simulated)))
+        wait_until("the controller answers", lambda: bool(answers) or not self._thread.is_alive())
+        if not answers:
+            raise CheckError(f"the controller has died: {self._failure!r}")
+        return answers[0]
+
+    def _live(self) -> None:
+        try:
+            with UhidFile() as file:
+                offer(file, self.offered, MonotonicClock(), 0.004, self._going)
+        except BaseException as error:
+            self._failure = error
+
+    def _going(self, now_s: float) -> bool:
+        del now_s
+        while self._asked:
+            self._asked.popleft()()
+        return not self._ending

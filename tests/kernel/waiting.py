@@ -1,0 +1,28 @@
+"""Waiting for what happens in its own time, and complaining when it does not."""
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+Value = TypeVar("Value")
+
+
+class CheckError(AssertionError):
+    """The machine did not behave as it should; the text says how."""
+
+
+def require(condition: bool, otherwise: str) -> None:
+    """CheckError with the text `otherwise` unless `condition` holds."""
+    if not condition:
+        raise CheckError(otherwise)
+
+
+def wait_until(what: str, condition: Callable[[], Value | None], limit_s: float = 20.0) -> Value:
+    """The first value of `condition` that is not None or False; CheckError naming `what` after `limit_s`."""
+    end_s = time.monotonic() + limit_s
+    while time.monotonic() < end_s:
+        value = condition()
+        if value is not None and value is not False:
+            return value
+        time.sleep(0.01)
+    raise CheckError(f"not within {limit_s:g} s: {what}")
