@@ -1,5 +1,6 @@
 """QEMU, a kernel and busybox as Debian packages, unpacked into a folder; nothing is installed on the system."""
 
+import fcntl
 import os
 import platform
 import shutil
@@ -15,7 +16,7 @@ _QEMU: Final = "qemu-system-x86_64"
 _QEMU_PACKAGE = "qemu-system-x86"
 _KERNEL_PACKAGE = "linux-image-amd64"
 _BUSYBOX_PACKAGE = "busybox-static"
-_PATIENCE_S = 300.0
+_PATIENCE_S = 90.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,13 @@ def default_cache() -> Path:
 
 def provide(cache: Path) -> Parts:
     """Find the parts in `cache`, or download and unpack them there; SkippedError when they cannot be had."""
+    cache.mkdir(parents=True, exist_ok=True)
+    with (cache / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another run may be filling it
+        return _provide(cache)
+
+
+def _provide(cache: Path) -> Parts:
     if platform.machine() != "x86_64":
         raise SkippedError(f"the machine is {platform.machine()}; the test boots an x86_64 kernel")
     for program in ("apt-get", "apt-cache", "dpkg-deb"):
@@ -97,7 +105,7 @@ def _download(cache: Path, root: Path) -> None:
     for partial in ("lists/partial", "apt/archives/partial"):
         (cache / partial).mkdir(parents=True, exist_ok=True)
     # Our own lists of packages: the system's may be empty, as in a container, or stale, or not ours to renew.
-    _run(cache, "apt-get", ["update"])
+    _run(cache, "apt-get", ["update", "-o", "APT::Update::Error-Mode=any"])
     names = [_kernel_name(cache), _BUSYBOX_PACKAGE]
     if shutil.which(_QEMU) is None:
         names += _missing_for(cache, _QEMU_PACKAGE)
@@ -153,5 +161,5 @@ def _run(cache: Path, program: str, arguments: Sequence[str], folder: Path | Non
         raise SkippedError(f"{program} {arguments[0]} took more than {_PATIENCE_S:g} s") from None
     if done.returncode != 0:
         reasons = [line for line in done.stderr.splitlines() if line.startswith("E:")] or [f"code {done.returncode}"]
-        raise SkippedError(f"{program} {' '.join(arguments[:2])}: {reasons[0].removeprefix('E: ')}")
+        raise SkippedError(f"{program} {arguments[0]}: {reasons[0].removeprefix('E: ')}")
     return done.stdout
