@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
 
-EVENT_LENGTH: Final = 4376
-"""sizeof(struct uhid_event); what to ask for with each read."""
+EVENT_LENGTH: Final = 4380
+"""sizeof(struct uhid_event), the end of its union padded to 8 bytes; what to ask for with each read."""
 REPORT_MAX_LENGTH: Final = 4096
 DESCRIPTOR_MAX_LENGTH: Final = 4096
 BUS_USB: Final = 0x03
