@@ -68,7 +68,7 @@ class UhidCounts:
     inputs: int = 0
     outputs: int = 0
     refused: int = 0
-    """Output reports that the controller could not read, and questions that it could not answer."""
+    """Reports that the controller did not take, and questions that it could not answer."""
     features: int = 0
 
 
@@ -102,13 +102,12 @@ class UhidController:
                 self.driven = self.opened = False
             case Opened():
                 self.opened = True
-            case Output(report):
-                self._write(report, now_s)
+            case Output(report, kind):
+                self._write(report, kind, now_s)
             case GetReport(request, report_id, kind):
-                return get_report_reply(request, self._feature(report_id) if kind == FEATURE_REPORT else None)
+                return get_report_reply(request, self._answer(report_id, kind))
             case SetReport(request, _, kind, report):
-                accepted = kind == OUTPUT_REPORT and self._write(report, now_s)
-                return set_report_reply(request, accepted=accepted)
+                return set_report_reply(request, accepted=self._write(report, kind, now_s))
             case Closed():
                 self.opened = False
             case None:
@@ -123,8 +122,10 @@ class UhidController:
         self.counts.inputs += 1
         return input_report(report)
 
-    def _write(self, report: bytes, now_s: float) -> bool:
+    def _write(self, report: bytes, kind: int, now_s: float) -> bool:
         try:
+            if kind != OUTPUT_REPORT:
+                raise ValueError(f"kind = {kind}; valid: {OUTPUT_REPORT}")
             self._controller.write(report, now_s)
         except ValueError:
             self.counts.refused += 1
@@ -132,8 +133,10 @@ class UhidController:
         self.counts.outputs += 1
         return True
 
-    def _feature(self, report_id: int) -> bytes | None:
+    def _answer(self, report_id: int, kind: int) -> bytes | None:
         try:
+            if kind != FEATURE_REPORT:
+                raise ValueError(f"kind = {kind}; valid: {FEATURE_REPORT}")
             answer = self._controller.get_feature(report_id)
         except (ValueError, DeviceError):
             self.counts.refused += 1
