@@ -3,6 +3,7 @@
 import pytest
 
 from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
+from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid import create, destroy, get_report_reply, input_report, set_report_reply
 from operator_side.dualsense.uhid_controller import UhidController, UhidCounts, identity
 from tests.fake_kernel import (
@@ -37,19 +38,19 @@ def test_it_appears_as_what_it_is_and_disappears() -> None:
 
 
 @pytest.mark.parametrize(
-    ("bluetooth", "edge", "ids", "name"),
+    ("transport", "edge", "ids", "name"),
     [
-        (False, False, (3, 0x054C, 0x0CE6), "Sony Interactive Entertainment DualSense Wireless Controller"),
-        (False, True, (3, 0x054C, 0x0DF2), "Sony Interactive Entertainment DualSense Edge Wireless Controller"),
-        (True, False, (5, 0x054C, 0x0CE6), "DualSense Wireless Controller"),
-        (True, True, (5, 0x054C, 0x0DF2), "DualSense Edge Wireless Controller"),
+        (Transport.USB, False, (3, 0x054C, 0x0CE6), "Sony Interactive Entertainment DualSense Wireless Controller"),
+        (Transport.USB, True, (3, 0x054C, 0x0DF2), "Sony Interactive Entertainment DualSense Edge Wireless Controller"),
+        (Transport.BLUETOOTH, False, (5, 0x054C, 0x0CE6), "DualSense Wireless Controller"),
+        (Transport.BLUETOOTH, True, (5, 0x054C, 0x0DF2), "DualSense Edge Wireless Controller"),
     ],
 )
-def test_identities(bluetooth: bool, edge: bool, ids: tuple[int, int, int], name: str) -> None:
-    told = identity(bluetooth=bluetooth, edge=edge, unique_id="aa:bb")
+def test_identities(transport: Transport, edge: bool, ids: tuple[int, int, int], name: str) -> None:
+    told = identity(transport, edge=edge, unique_id="aa:bb")
     assert (told.bus, told.vendor_id, told.product_id) == ids
     assert (told.name, told.unique_id) == (name, "aa:bb")
-    assert told.descriptor == (BLUETOOTH_DESCRIPTOR if bluetooth else USB_DESCRIPTOR)
+    assert told.descriptor == (BLUETOOTH_DESCRIPTOR if transport is Transport.BLUETOOTH else USB_DESCRIPTOR)
 
 
 def test_features_are_answered_as_the_controller_answers(offered: UhidController) -> None:

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from common.errors import DeviceError
 from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
+from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid import (
     BUS_BLUETOOTH,
     BUS_USB,
@@ -47,8 +48,9 @@ class OfferedController(Protocol):
         ...
 
 
-def identity(*, bluetooth: bool = False, edge: bool = False, unique_id: str = "") -> UhidIdentity:
+def identity(transport: Transport = Transport.USB, *, edge: bool = False, unique_id: str = "") -> UhidIdentity:
     """What the kernel is told of a DualSense, or a DualSense Edge, on USB or on Bluetooth."""
+    bluetooth = transport is Transport.BLUETOOTH
     maker = "" if bluetooth else "Sony Interactive Entertainment "
     return UhidIdentity(
         name=f"{maker}DualSense {'Edge ' if edge else ''}Wireless Controller",

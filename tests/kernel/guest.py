@@ -7,10 +7,11 @@ import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from operator_side.dualsense.transport import Transport
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.plugged import Plugged, Variant
 
-VARIANTS = (Variant(bluetooth=False, edge=False), Variant(bluetooth=False, edge=True))
+VARIANTS = tuple(Variant(transport, edge) for transport in (Transport.USB,) for edge in (False, True))
 
 
 def main(words: Sequence[str]) -> int:

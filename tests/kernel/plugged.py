@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from common.clock import MonotonicClock
 from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid_controller import UhidController, identity
 from operator_side.dualsense.uhid_file import UhidFile, offer
 from tests.kernel.features import usb_feature
@@ -21,13 +22,13 @@ Value = TypeVar("Value")
 class Variant:
     """Which controller, and how it is connected."""
 
-    bluetooth: bool
-    edge: bool
+    transport: Transport
+    edge: bool = False
 
     @property
     def name(self) -> str:
         """For people."""
-        return f"DualSense{' Edge' if self.edge else ''} on {'Bluetooth' if self.bluetooth else 'USB'}"
+        return f"DualSense{' Edge' if self.edge else ''} on {self.transport.value}"
 
 
 class _Controller(SimulatedDualSense):
@@ -40,7 +41,7 @@ class Plugged:
 
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
-        self.identity = identity(bluetooth=variant.bluetooth, edge=variant.edge)
+        self.identity = identity(variant.transport, edge=variant.edge)
         self._simulated = _Controller()
         self.offered = UhidController(self._simulated, self.identity)
         self._asked: deque[Callable[[], None]] = deque()
@@ -68,6 +69,16 @@ class Plugged:
         if not answers:
             raise CheckError(f"the controller has died: {self._failure!r}")
         return answers[0]
+
+    def hands_off(self) -> None:
+        """Let go of everything."""
+
+        def let_go(controller: SimulatedDualSense) -> None:
+            controller.set_sticks()
+            controller.set_buttons(frozenset())
+            controller.set_finger_force(0.0, 0.0)
+
+        self.ask(let_go)
 
     def _live(self) -> None:
         try:
