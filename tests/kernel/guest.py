@@ -11,7 +11,7 @@ from operator_side.dualsense.transport import Transport
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.plugged import Plugged, Variant
 
-VARIANTS = tuple(Variant(transport, edge) for transport in (Transport.USB,) for edge in (False, True))
+VARIANTS = tuple(Variant(transport, edge) for transport in Transport for edge in (False, True))
 
 
 def main(words: Sequence[str]) -> int:

@@ -12,7 +12,7 @@ from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid_controller import UhidController, identity
 from operator_side.dualsense.uhid_file import UhidFile, offer
-from tests.kernel.features import usb_feature
+from tests.kernel.carried import Carried
 from tests.kernel.waiting import CheckError, wait_until
 
 Value = TypeVar("Value")
@@ -31,19 +31,14 @@ class Variant:
         return f"DualSense{' Edge' if self.edge else ''} on {self.transport.value}"
 
 
-class _Controller(SimulatedDualSense):
-    def get_feature(self, report_id: int) -> bytes:
-        return usb_feature(report_id)
-
-
 class Plugged:
     """A simulated controller on /dev/uhid, alive in a thread of its own while the context is open."""
 
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
         self.identity = identity(variant.transport, edge=variant.edge)
-        self._simulated = _Controller()
-        self.offered = UhidController(self._simulated, self.identity)
+        self._simulated = SimulatedDualSense()
+        self.offered = UhidController(Carried(self._simulated, variant.transport), self.identity)
         self._asked: deque[Callable[[], None]] = deque()
         self._ending = False
         self._failure: BaseException | None = None
