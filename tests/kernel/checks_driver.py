@@ -1,11 +1,13 @@
 """What the kernel's own driver makes of the virtual controller, seen as games see it."""
 
 import contextlib
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from operator_side.dualsense.controller_state import Button
+from operator_side.dualsense.controller_state import AT_REST_M_S2, STANDARD_GRAVITY_M_S2, Button, Vector3
 from operator_side.dualsense.effects import Feedback, Off
+from operator_side.dualsense.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
 from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.evdev import (
@@ -75,19 +77,37 @@ def sees_the_hands(plugged: Plugged) -> str:
     return "six axes, the pad and cross"
 
 
-def feels_gravity(plugged: Plugged) -> str:
-    """The kernel's calibrated motion sensors say one g upwards and no turning."""
+def feels_motion(plugged: Plugged) -> str:
+    """The kernel's calibrated motion sensors say what was put into them."""
+    turning_rad_s, acceleration_m_s2 = (1.0, -2.0, 0.5), (-3.0, 8.0, 5.0)
     with opened(plugged, " Motion Sensors") as device:
-        per_g, per_degree_s = device.axis(ABS_Y).resolution, device.axis(ABS_RX).resolution
-        upright = (0, per_g, 0)
+        per_degree_s, per_g = device.axis(ABS_RX).resolution, device.axis(ABS_X).resolution
 
-        def at_rest() -> bool:
-            acceleration, turning = device.axes(ABS_X, ABS_Y, ABS_Z), device.axes(ABS_RX, ABS_RY, ABS_RZ)
-            near = all(abs(is_ - should) <= per_g / 1000 for is_, should in zip(acceleration, upright, strict=True))
-            return near and all(abs(axis) <= per_degree_s / 10 for axis in turning)
+        def said() -> tuple[Vector3, Vector3]:
+            rx, ry, rz = (math.radians(axis / per_degree_s) for axis in device.axes(ABS_RX, ABS_RY, ABS_RZ))
+            x, y, z = (axis / per_g * STANDARD_GRAVITY_M_S2 for axis in device.axes(ABS_X, ABS_Y, ABS_Z))
+            return (rx, ry, rz), (x, y, z)
 
-        wait_until("gravity along y", at_rest)
-        return f"{device.axes(ABS_X, ABS_Y, ABS_Z)} of {per_g} a g"
+        def comes(turning: Vector3, force: Vector3) -> None:
+            plugged.carried.turning_rad_s, plugged.carried.acceleration_m_s2 = turning, force
+            # One count of the sensor, and the rounding of the driver's own units.
+            wait_until(
+                f"motion of {turning} rad/s and {force} m/s²",
+                lambda: (
+                    _near(said()[0], turning, 2 * NOMINAL_GYRO_RAD_S)
+                    and _near(said()[1], force, 2 * NOMINAL_ACCELERATION_M_S2)
+                ),
+                instead=said,
+            )
+
+        comes(turning_rad_s, acceleration_m_s2)
+        detail = f"{', '.join(f'{axis:.3f}' for axis in said()[0])} rad/s"
+        comes((0.0, 0.0, 0.0), AT_REST_M_S2)
+        return detail
+
+
+def _near(values: Vector3, expected: Vector3, within: float) -> bool:
+    return all(abs(value - goal) <= within for value, goal in zip(values, expected, strict=True))
 
 
 def rumble_spares_the_triggers(plugged: Plugged) -> str:
@@ -115,4 +135,4 @@ def write_raw(hidraw: Path | None, plugged: Plugged, output: OutputReport) -> No
     hidraw.write_bytes(build_output_report(output, plugged.variant.transport))
 
 
-DRIVER_CHECKS = (binds, sees_the_hands, feels_gravity, rumble_spares_the_triggers)
+DRIVER_CHECKS = (binds, sees_the_hands, feels_motion, rumble_spares_the_triggers)

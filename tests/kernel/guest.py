@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from operator_side.dualsense.transport import Transport
+from tests.kernel.checks_device import DEVICE_CHECKS
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.plugged import Plugged, Variant
 
@@ -19,7 +20,9 @@ def main(words: Sequence[str]) -> int:
     print(f"Linux {platform.release()}, Python {platform.python_version()}")
     passed, failed = 0, 0
     for variant in VARIANTS:
-        wanted = [check for check in DRIVER_CHECKS if _is_wanted(f"{variant.name}: {_title(check)}", words)]
+        wanted = [
+            check for check in (*DRIVER_CHECKS, *DEVICE_CHECKS) if _is_wanted(f"{variant.name}: {_title(check)}", words)
+        ]
         if not wanted:
             continue
         with Plugged(variant) as plugged:

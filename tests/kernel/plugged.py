@@ -26,9 +26,14 @@ class Variant:
     edge: bool = False
 
     @property
+    def model(self) -> str:
+        """Which of the two."""
+        return "DualSense Edge" if self.edge else "DualSense"
+
+    @property
     def name(self) -> str:
         """For people."""
-        return f"DualSense{' Edge' if self.edge else ''} on {self.transport.value}"
+        return f"{self.model} on {self.transport.value}"
 
 
 class Plugged:
@@ -38,29 +43,46 @@ class Plugged:
         self.variant = variant
         self.identity = identity(variant.transport, edge=variant.edge)
         self._simulated = SimulatedDualSense()
-        self.offered = UhidController(Carried(self._simulated, variant.transport), self.identity)
+        self.carried = Carried(self._simulated, variant.transport)
+        self.offered = UhidController(self.carried, self.identity)
         self._asked: deque[Callable[[], None]] = deque()
         self._ending = False
         self._failure: BaseException | None = None
-        self._thread = threading.Thread(target=self._live)
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> "Plugged":
-        self._thread.start()
+        self.plug_in()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.unplug()
+
+    def plug_in(self) -> None:
+        """Let it appear."""
+        self._ending = False
+        self._thread = threading.Thread(target=self._live)
+        self._thread.start()
+
+    def unplug(self) -> None:
+        """Pull it out; nothing happens when it is out."""
         self._ending = True
-        self._thread.join()
-        if self._failure is not None:
-            raise self._failure
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
 
     def ask(self, function: Callable[[SimulatedDualSense], Value]) -> Value:
         """What `function` says of the simulated controller, in the thread that it lives in."""
         answers: deque[Value] = deque()
+        thread = self._thread
+        if thread is None:
+            return function(self._simulated)
         self._asked.append(lambda: answers.append(function(self._simulated)))
-        wait_until("the controller answers", lambda: bool(answers) or not self._thread.is_alive())
+        wait_until("the controller answers", lambda: bool(answers) or not thread.is_alive())
         if not answers:
             raise CheckError(f"the controller has died: {self._failure!r}")
         return answers[0]

@@ -17,12 +17,20 @@ def require(condition: bool, otherwise: str) -> None:
         raise CheckError(otherwise)
 
 
-def wait_until(what: str, condition: Callable[[], Value | None], limit_s: float = 20.0) -> Value:
-    """The first value of `condition` that is not None or False; CheckError naming `what` after `limit_s`."""
+def wait_until(
+    what: str,
+    condition: Callable[[], Value | None],
+    limit_s: float = 10.0,
+    instead: Callable[[], object] | None = None,
+) -> Value:
+    """The first value of `condition` that is not None or False.
+
+    CheckError after `limit_s` names `what`, and what there was `instead`.
+    """
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:
         value = condition()
         if value is not None and value is not False:
             return value
         time.sleep(0.01)
-    raise CheckError(f"not within {limit_s:g} s: {what}")
+    raise CheckError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
