@@ -29,7 +29,8 @@ from tests.kernel.waiting import require, wait_until
 
 
 def bound(plugged: Plugged) -> KernelView:
-    """What the kernel shows of the controller, once its driver has finished with it."""
+    """Plug the controller in; what the kernel shows of it once its driver has finished with it."""
+    plugged.plug_in()
     view = wait_until("the kernel shows the controller", lambda: seen_device(plugged.identity))
     wait_until("three input devices", lambda: len(view.inputs()) == 3)
     return view

@@ -37,7 +37,7 @@ class Variant:
 
 
 class Plugged:
-    """A simulated controller on /dev/uhid, alive in a thread of its own while the context is open."""
+    """A simulated controller on /dev/uhid, alive in a thread of its own while it is plugged in."""
 
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
@@ -51,7 +51,6 @@ class Plugged:
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> "Plugged":
-        self.plug_in()
         return self
 
     def __exit__(
@@ -60,7 +59,9 @@ class Plugged:
         self.unplug()
 
     def plug_in(self) -> None:
-        """Let it appear."""
+        """Let it appear; nothing happens when it is in."""
+        if self._thread is not None:
+            return
         self._ending = False
         self._thread = threading.Thread(target=self._live)
         self._thread.start()

@@ -6,6 +6,8 @@ from typing import TypeVar
 
 Value = TypeVar("Value")
 
+_LOOK_S = 0.02
+
 
 class CheckError(AssertionError):
     """The machine did not behave as it should; the text says how."""
@@ -32,5 +34,13 @@ def wait_until(
         value = condition()
         if value is not None and value is not False:
             return value
-        time.sleep(0.01)
+        time.sleep(_LOOK_S)
     raise CheckError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
+
+
+def stays(otherwise: str, condition: Callable[[], bool], for_s: float = 1.0) -> None:
+    """CheckError with the text `otherwise` unless `condition` holds for so long."""
+    end_s = time.monotonic() + for_s
+    while time.monotonic() < end_s:
+        require(condition(), otherwise)
+        time.sleep(_LOOK_S)
