@@ -79,5 +79,5 @@ class PlainController:
 
     def get_feature(self, report_id: int) -> bytes:
         if report_id != 5:
-            raise ValueError(f"report_id = {report_id}")
+            raise DeviceError(f"report_id = {report_id}")
         return b"\x05\x01\x02"

@@ -2,6 +2,7 @@
 
 import pytest
 
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
 from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid import create, destroy, get_report_reply, input_report, set_report_reply
@@ -31,23 +32,33 @@ def offered(plain: PlainController) -> UhidController:
 
 
 def test_it_appears_as_what_it_is_and_disappears() -> None:
-    told = identity(edge=True)
+    told = identity(model=Model.EDGE)
     offered = UhidController(PlainController(), told)
     assert offered.plug_in() == create(told)
     assert offered.unplug() == destroy()
 
 
 @pytest.mark.parametrize(
-    ("transport", "edge", "ids", "name"),
+    ("transport", "model", "ids", "name"),
     [
-        (Transport.USB, False, (3, 0x054C, 0x0CE6), "Sony Interactive Entertainment DualSense Wireless Controller"),
-        (Transport.USB, True, (3, 0x054C, 0x0DF2), "Sony Interactive Entertainment DualSense Edge Wireless Controller"),
-        (Transport.BLUETOOTH, False, (5, 0x054C, 0x0CE6), "DualSense Wireless Controller"),
-        (Transport.BLUETOOTH, True, (5, 0x054C, 0x0DF2), "DualSense Edge Wireless Controller"),
+        (
+            Transport.USB,
+            Model.DUALSENSE,
+            (3, 0x054C, 0x0CE6),
+            "Sony Interactive Entertainment DualSense Wireless Controller",
+        ),
+        (
+            Transport.USB,
+            Model.EDGE,
+            (3, 0x054C, 0x0DF2),
+            "Sony Interactive Entertainment DualSense Edge Wireless Controller",
+        ),
+        (Transport.BLUETOOTH, Model.DUALSENSE, (5, 0x054C, 0x0CE6), "DualSense Wireless Controller"),
+        (Transport.BLUETOOTH, Model.EDGE, (5, 0x054C, 0x0DF2), "DualSense Edge Wireless Controller"),
     ],
 )
-def test_identities(transport: Transport, edge: bool, ids: tuple[int, int, int], name: str) -> None:
-    told = identity(transport, edge=edge, unique_id="aa:bb")
+def test_identities(transport: Transport, model: Model, ids: tuple[int, int, int], name: str) -> None:
+    told = identity(transport, model, unique_id="aa:bb")
     assert (told.bus, told.vendor_id, told.product_id) == ids
     assert (told.name, told.unique_id) == (name, "aa:bb")
     assert told.descriptor == (BLUETOOTH_DESCRIPTOR if transport is Transport.BLUETOOTH else USB_DESCRIPTOR)

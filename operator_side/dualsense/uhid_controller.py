@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from common.errors import DeviceError
+from operator_side.dualsense.models import SONY_VENDOR_ID, Model
 from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
 from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid import (
@@ -27,10 +28,6 @@ from operator_side.dualsense.uhid import (
     set_report_reply,
 )
 
-SONY_VENDOR_ID = 0x054C
-DUALSENSE_PRODUCT_ID = 0x0CE6
-EDGE_PRODUCT_ID = 0x0DF2
-
 
 class OfferedController(Protocol):
     """What is used of a simulated controller."""
@@ -44,18 +41,18 @@ class OfferedController(Protocol):
         ...
 
     def get_feature(self, report_id: int) -> bytes:
-        """The answer to a feature report, its id in front; ValueError for one that it does not have."""
+        """The answer to a feature report, its id in front; DeviceError for one that it does not have."""
         ...
 
 
-def identity(transport: Transport = Transport.USB, *, edge: bool = False, unique_id: str = "") -> UhidIdentity:
-    """What the kernel is told of a DualSense, or a DualSense Edge, on USB or on Bluetooth."""
+def identity(transport: Transport = Transport.USB, model: Model = Model.DUALSENSE, unique_id: str = "") -> UhidIdentity:
+    """What the kernel is told of a controller on USB or on Bluetooth."""
     bluetooth = transport is Transport.BLUETOOTH
     maker = "" if bluetooth else "Sony Interactive Entertainment "
     return UhidIdentity(
-        name=f"{maker}DualSense {'Edge ' if edge else ''}Wireless Controller",
+        name=f"{maker}{model.title} Wireless Controller",
         vendor_id=SONY_VENDOR_ID,
-        product_id=EDGE_PRODUCT_ID if edge else DUALSENSE_PRODUCT_ID,
+        product_id=model.value,
         bus=BUS_BLUETOOTH if bluetooth else BUS_USB,
         descriptor=BLUETOOTH_DESCRIPTOR if bluetooth else USB_DESCRIPTOR,
         unique_id=unique_id,

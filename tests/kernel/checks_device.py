@@ -8,22 +8,32 @@ from typing import Final
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.controller_state import STANDARD_GRAVITY_M_S2, Button, ControllerState
 from operator_side.dualsense.device import HidDualSense, load_backend
-from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off, TriggerEffect
+from operator_side.dualsense.effects import (
+    AnyEffect,
+    Feedback,
+    MultiPositionFeedback,
+    MultiPositionVibration,
+    Off,
+    Vibration,
+    Weapon,
+)
 from operator_side.dualsense.finding import find_controller, sightings
 from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
+from operator_side.dualsense.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S, MotionCalibration
 from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.simulated import SIMULATED_FIRMWARE
 from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.kernel.carried import ADDRESS, FIRMWARE, MOTION
 from tests.kernel.checks_driver import bound
-from tests.kernel.plugged import Plugged
+from tests.kernel.plugged import ADDRESS, CALIBRATION, Plugged
 from tests.kernel.waiting import require, wait_until
 
 _NOBODY: Final = 65534
-_EFFECTS: Final[tuple[tuple[TriggerEffect, TriggerEffect], ...]] = (
+_EFFECTS: Final[tuple[tuple[AnyEffect, AnyEffect], ...]] = (
     (Feedback(position=3, strength=6), Off()),
     (Off(), Feedback(position=0, strength=8)),
     (MultiPositionFeedback((0, 1, 2, 3, 4, 5, 6, 7, 8, 0)), MultiPositionFeedback((8, 0, 8, 0, 1, 0, 2, 0, 3, 4))),
+    (Weapon(start=2, end=6, strength=8), Vibration(position=3, amplitude=5, frequency_hz=40)),
+    (MultiPositionVibration((0, 0, 1, 2, 3, 4, 5, 6, 7, 8), frequency_hz=25), Weapon(start=7, end=8, strength=1)),
     (Feedback(position=9, strength=1), Feedback(position=1, strength=3)),
 )
 
@@ -55,12 +65,18 @@ def finds_it(plugged: Plugged) -> str:
     try:
         require(found.address == ADDRESS, f"its address is {found.address}")
         transport = plugged.variant.transport
-        require(found.name == f"{plugged.variant.model} on {transport.value} ({ADDRESS})", f"it is called {found.name}")
+        require(
+            found.name == f"{plugged.variant.model.title} on {transport.value} ({ADDRESS})",
+            f"it is called {found.name}",
+        )
     finally:
         found.device.close()
+    motion = MotionCalibration.of(CALIBRATION)
     with our_device(plugged) as device:
         said = device.identity
-        require((said.transport, said.firmware, said.motion) == (transport, FIRMWARE, MOTION), f"it says {said}")
+        require(
+            (said.transport, said.firmware, said.motion) == (transport, SIMULATED_FIRMWARE, motion), f"it says {said}"
+        )
     return found.name
 
 
@@ -68,7 +84,7 @@ def reads_it(plugged: Plugged) -> str:
     """Our driver reads sticks, triggers, buttons and motion as they are sent."""
     turning_rad_s, acceleration_m_s2 = (1.0, -2.0, 0.5), (-3.0, 8.0, 5.0)
     with our_device(plugged) as device:
-        plugged.carried.turning_rad_s, plugged.carried.acceleration_m_s2 = turning_rad_s, acceleration_m_s2
+        plugged.ask(lambda controller: controller.set_motion(turning_rad_s, acceleration_m_s2))
         plugged.ask(lambda controller: controller.set_sticks(left=(1.0, -1.0), right=(0.5, 0.25)))
         plugged.ask(lambda controller: controller.set_buttons(frozenset({Button.L1, Button.OPTIONS, Button.LEFT})))
         plugged.ask(lambda controller: controller.set_finger_force(NORMAL_FINGER_FORCE_N, 1.5))
@@ -110,6 +126,7 @@ def writes_effects(plugged: Plugged) -> str:
             device.write(build_output_report(OutputReport(l2=Feedback(number % 10, 1 + number % 8))), 0.0)
         wait_until("all arrive", lambda: plugged.ask(lambda c: c.write_count) == before + len(_EFFECTS) + 41)
         require(plugged.offered.counts.refused == 0, f"{plugged.offered.counts.refused} reports were refused")
+        require(plugged.ask(lambda c: c.bad_checksums) == 0, "there were wrong checksums")
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
     require(plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on")
     return f"{len(_EFFECTS) + 41} writes"

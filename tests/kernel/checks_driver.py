@@ -56,7 +56,11 @@ def binds(plugged: Plugged) -> str:
     require(counts.features >= 3, f"the driver read {counts.features} features")
     require(counts.outputs >= 1, "the driver has not set the lights")
     require(counts.refused == 0, f"{counts.refused} reports were refused")
-    return f"{view.driver}, {hidraw}, {counts.features} features read"
+    require(plugged.ask(lambda controller: controller.bad_checksums) == 0, "there were wrong checksums")
+    require(not plugged.ask(lambda controller: controller.simple_mode), "it still sends Bluetooth's simple reports")
+    lights = plugged.ask(lambda controller: controller.output.lightbar)
+    require(lights is not None, "the driver has not lit the lightbar")
+    return f"{view.driver}, {hidraw}, {counts.features} features read, lightbar {lights}"
 
 
 def sees_the_hands(plugged: Plugged) -> str:
@@ -90,7 +94,7 @@ def feels_motion(plugged: Plugged) -> str:
             return (rx, ry, rz), (x, y, z)
 
         def comes(turning: Vector3, force: Vector3) -> None:
-            plugged.carried.turning_rad_s, plugged.carried.acceleration_m_s2 = turning, force
+            plugged.ask(lambda controller: controller.set_motion(turning, force))
             # One count of the sensor, and the rounding of the driver's own units.
             wait_until(
                 f"motion of {turning} rad/s and {force} m/s²",

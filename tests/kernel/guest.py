@@ -9,13 +9,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.transport import Transport
 from tests.kernel.checks_device import DEVICE_CHECKS
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.checks_operator import OPERATOR_CHECKS, Desk
 from tests.kernel.plugged import Plugged, Variant
 
-VARIANTS = tuple(Variant(transport, edge) for transport in Transport for edge in (False, True))
+VARIANTS = tuple(Variant(transport, model) for transport in Transport for model in Model)
 
 
 @dataclass
@@ -55,7 +56,7 @@ def main(words: Sequence[str]) -> int:
         desks = {
             variant: stack.enter_context(Desk())
             for variant in VARIANTS
-            if not variant.edge and any(score.wanted(variant, check) for check in OPERATOR_CHECKS)
+            if variant.model is Model.DUALSENSE and any(score.wanted(variant, check) for check in OPERATOR_CHECKS)
         }
         for variant in VARIANTS:
             with Plugged(variant) as plugged:

@@ -5,17 +5,31 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from common.clock import MonotonicClock
+from operator_side.dualsense.feature_report import CalibrationReport
+from operator_side.dualsense.models import Model
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.transport import Transport
 from operator_side.dualsense.uhid_controller import UhidController, identity
 from operator_side.dualsense.uhid_file import UhidFile, offer
-from tests.kernel.carried import Carried
 from tests.kernel.waiting import CheckError, wait_until
 
 Value = TypeVar("Value")
+
+
+ADDRESS: Final = "01:02:03:04:05:06"
+CALIBRATION: Final = CalibrationReport(
+    gyro_bias=(0, 0, 0),
+    gyro_plus=(8843, 8850, 8870),
+    gyro_minus=(-8837, -8860, -8866),
+    speed_plus=540,
+    speed_minus=540,
+    acceleration_plus=(8250, 8200, 8100),
+    acceleration_minus=(-8130, -8190, -8240),
+)
+"""As unlike for each axis as real ones are, but for the gyroscope's bias: Linux 6.1 takes it off, later ones do not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,28 +37,25 @@ class Variant:
     """Which controller, and how it is connected."""
 
     transport: Transport
-    edge: bool = False
-
-    @property
-    def model(self) -> str:
-        """Which of the two."""
-        return "DualSense Edge" if self.edge else "DualSense"
+    model: Model = Model.DUALSENSE
 
     @property
     def name(self) -> str:
         """For people."""
-        return f"{self.model} on {self.transport.value}"
+        return f"{self.model.title} on {self.transport.value}"
 
 
 class Plugged:
-    """A simulated controller on /dev/uhid, alive in a thread of its own while it is plugged in."""
+    """A simulated controller on /dev/uhid, alive in a thread of its own while it is plugged in.
+
+    Unplugged, it remembers what it was told, as one would that is back before it loses its power.
+    """
 
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
-        self.identity = identity(variant.transport, edge=variant.edge)
-        self._simulated = SimulatedDualSense()
-        self.carried = Carried(self._simulated, variant.transport)
-        self.offered = UhidController(self.carried, self.identity)
+        self.identity = identity(variant.transport, variant.model, ADDRESS)
+        self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS, calibration=CALIBRATION)
+        self.offered = UhidController(self._simulated, self.identity)
         self._asked: deque[Callable[[], None]] = deque()
         self._ending = False
         self._failure: BaseException | None = None
@@ -95,6 +106,7 @@ class Plugged:
             controller.set_sticks()
             controller.set_buttons(frozenset())
             controller.set_finger_force(0.0, 0.0)
+            controller.set_motion()
 
         self.ask(let_go)
 
