@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test lock clean
+.PHONY: demo test test-kernel lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -26,6 +26,10 @@ test: $(VENV)/.installed $(VENV)/.test-models ## style, types and tests: make te
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest $(ARGS)
+
+# Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
+test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
+	$(BIN)/python -m tests.kernel $(ARGS)
 
 lock: ## pin every dependency anew (needs uv); the file holds hashes and no addresses
 	rm -f uv.lock && uv export --quiet --all-extras --no-emit-project --no-header -o requirements.lock && rm -f uv.lock

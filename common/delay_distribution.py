@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
@@ -91,6 +90,8 @@ def table(shape: Distribution | DelayTable) -> FloatArray | None:
 def _normal_steps(lowest: float = _LOWEST_ENTRY) -> FloatArray:
     """From −4.0 to +3.52: entry k is the quantile of (4 k + 1/2) / 16384, at the tables' resolution."""
     probabilities = (4.0 * np.arange(TABLE_SIZE) + 0.5) / (4.0 * TABLE_SIZE)
+    from scipy.special import ndtri  # noqa: PLC0415  # slow to load, and most runs emulate no such delay
+
     steps: FloatArray = np.maximum(np.rint(STEPS_PER_JITTER * ndtri(probabilities)), lowest)
     return steps
 

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
-from scipy.special import ndtr
 
 from common.arrays import FloatArray
 
@@ -50,6 +49,8 @@ def decisions(
 
 
 def _autoregressive_blocks(generator: np.random.Generator, correlation: float) -> Iterator[FloatArray]:
+    from scipy.special import ndtr  # noqa: PLC0415  # slow to load, and most runs emulate no such link
+
     innovation_sd = math.sqrt(1.0 - correlation**2)
     last = float(generator.standard_normal())
     while True:

@@ -10,12 +10,14 @@ from feelahead.calibrate import calibrate
 from feelahead.demo import demo
 from feelahead.doctor.command import doctor
 from feelahead.keys import keys
+from feelahead.virtual_dualsense import virtual_dualsense
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
     "doctor": (doctor, "what is missing on this machine, and the command that mends it"),
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
+    "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
     "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
 }
 
@@ -28,7 +30,7 @@ def main() -> None:
 def command(arguments: Sequence[str]) -> int:
     """Run the command that the first argument names."""
     if not arguments or arguments[0] in ("-h", "--help"):
-        lines = [f"  {name:<12}{text}" for name, (_, text) in _COMMANDS.items()]
+        lines = [f"  {name:<19}{text}" for name, (_, text) in _COMMANDS.items()]
         sys.stdout.write(
             "usage: feelahead COMMAND [OPTIONS]\n\nTeleoperation in which the operator feels what is ahead.\n\n"
             + "\n".join(lines)

@@ -1,0 +1,157 @@
+"""`feelahead virtual-dualsense`: a controller that every program on this machine sees, with no hardware."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal
+
+import tyro
+
+from common.clock import Clock, MonotonicClock
+from common.command_line import parse_settings
+from common.stop_signal import StopSignal, ignore_broken_output
+from operator_side.dualsense.effects import AnyEffect
+from operator_side.dualsense.models import Model
+from operator_side.dualsense.simulated import INPUT_REPORT_PERIOD_S, SimulatedDualSense
+from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.uhid_controller import UhidController, identity
+from operator_side.dualsense.uhid_file import EventFile, UhidFile, offer
+
+PULL_PERIOD_S = 4.0
+"""R2 and then L2 go down and up in this time, and the left stick once round."""
+DRIVER_PATIENCE_S = 5.0
+"""A driver that is there takes the controller long before."""
+_STICK_RADIUS = 0.8
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class VirtualDualSenseSettings:
+    """A virtual DualSense through /dev/uhid (Linux): games, drivers and feelahead-operator see it as a real one.
+
+    It prints what it is told to do. Ctrl-C unplugs it.
+    """
+
+    transport: Literal["usb", "bluetooth"] = "usb"
+    """What it seems to be connected by."""
+    edge: bool = False
+    """A DualSense Edge."""
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    """Unplug it after this long; without it, at Ctrl-C."""
+    hands: Literal["none", "pulling"] = "none"
+    """Nobody touches it, or somebody pulls R2 and L2 in turn and moves the left stick round."""
+
+    def __post_init__(self) -> None:
+        if self.duration is not None and not 0.0 < self.duration < 1e6:
+            raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
+
+
+def virtual_dualsense(arguments: Sequence[str]) -> int:
+    """Offer a controller until --duration, Ctrl-C or SIGTERM; ConfigurationError where /dev/uhid cannot be used."""
+    settings = parse_settings(VirtualDualSenseSettings, "feelahead virtual-dualsense", arguments)
+    try:
+        with UhidFile() as file, StopSignal() as stop:
+            live(settings, file, MonotonicClock(), lambda: stop.is_set, lambda line: print(line, flush=True))
+    except BrokenPipeError:
+        ignore_broken_output()
+    return 0
+
+
+def live(
+    settings: VirtualDualSenseSettings, file: EventFile, clock: Clock, stopped: Callable[[], bool], say: Say
+) -> None:
+    """One controller from plug to unplug; DeviceError when the kernel lets it go."""
+    transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
+    controller = SimulatedDualSense(transport, Model.EDGE if settings.edge else Model.DUALSENSE)
+    told = identity(transport, controller.model, controller.address)
+    offered = UhidController(_Narrated(controller, say), told)
+    start_s = clock.now()
+    driver = _DriverWatch(offered, start_s, say)
+
+    def going(now_s: float) -> bool:
+        driver.look(now_s)
+        if settings.hands == "pulling":
+            l2_n, r2_n, stick = pulling(now_s - start_s)
+            controller.set_finger_force(l2_n, r2_n)
+            controller.set_sticks(left=stick)
+        return not stopped() and (settings.duration is None or now_s - start_s < settings.duration)
+
+    say(f"plugging in: {told.name} on {transport.value}, {controller.address}")
+    offer(file, offered, clock, INPUT_REPORT_PERIOD_S, going)
+    counts = offered.counts
+    say(f"unplugged: {counts.inputs} reports sent, {counts.outputs} taken, {counts.refused} refused")
+
+
+class _DriverWatch:
+    """Says whether a driver has the controller."""
+
+    def __init__(self, offered: UhidController, start_s: float, say: Say) -> None:
+        self._offered = offered
+        self._say = say
+        self._patient_until_s: float | None = start_s + DRIVER_PATIENCE_S
+        self._driven = False
+
+    def look(self, now_s: float) -> None:
+        """Say what has changed."""
+        if self._offered.driven != self._driven:
+            self._driven, self._patient_until_s = self._offered.driven, None
+            self._say("a driver has taken it" if self._driven else "its driver has let it go")
+        if self._patient_until_s is not None and now_s > self._patient_until_s:
+            self._patient_until_s = None
+            self._say("no driver has taken it so far: sudo modprobe hid-playstation")
+
+
+class _Narrated:
+    """The controller as the kernel is offered it, which says what every output report changes."""
+
+    def __init__(self, controller: SimulatedDualSense, say: Say) -> None:
+        self._controller = controller
+        self._say = say
+        self._shown = self._told()
+
+    def read(self, now_s: float) -> bytes | None:
+        """As the controller's own."""
+        return self._controller.read(now_s)
+
+    def get_feature(self, report_id: int) -> bytes:
+        """As the controller's own."""
+        return self._controller.get_feature(report_id)
+
+    def write(self, report: bytes, now_s: float) -> None:
+        """As the controller's own, and say what is new."""
+        self._controller.write(report, now_s)
+        told = self._told()
+        for part, doing in told.items():
+            if doing != self._shown[part]:
+                self._say(f"{part}: {doing}")
+        self._shown = told
+
+    def _told(self) -> dict[str, str]:
+        l2, r2 = self._controller.effects
+        rumble, output = self._controller.rumble, self._controller.output
+        return {
+            "L2": described(l2),
+            "R2": described(r2),
+            "rumble": f"left {rumble.left:.0%}, right {rumble.right:.0%}",
+            "lightbar": "as it was"
+            if output.lightbar is None
+            else "red {}, green {}, blue {}".format(*output.lightbar),
+            "player lights": "as they were" if output.player_leds is None else f"{output.player_leds:05b}",
+            "mute light": "as it was" if output.mute_led is None else output.mute_led.name.lower(),
+        }
+
+
+def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
+    """What the hands do after `time_s`: the forces on L2 and R2 in N, and the left stick (x, y)."""
+    turns = time_s / PULL_PERIOD_S
+    pull_n = NORMAL_FINGER_FORCE_N * (1.0 - math.cos(2.0 * math.tau * turns)) / 2.0
+    stick = (_STICK_RADIUS * math.cos(math.tau * turns), _STICK_RADIUS * math.sin(math.tau * turns))
+    return (0.0, pull_n, stick) if turns % 1.0 < 0.5 else (pull_n, 0.0, stick)
+
+
+def described(effect: AnyEffect) -> str:
+    """An effect for people: "Feedback, position 3, strength 6"."""
+    values = (f"{field.name.replace('_', ' ')} {getattr(effect, field.name)}" for field in fields(effect))
+    return ", ".join([type(effect).__name__, *values])

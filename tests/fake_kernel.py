@@ -1,0 +1,83 @@
+"""The kernel's end of /dev/uhid, in virtual time, and a controller of the simplest kind."""
+
+import struct
+from collections import deque
+from dataclasses import dataclass, field
+
+from common.clock import VirtualClock
+from common.errors import DeviceError
+from operator_side.dualsense.uhid import EVENT_LENGTH
+
+START, STOP, OPEN, CLOSE, OUTPUT, GET_REPORT, SET_REPORT = 2, 3, 4, 5, 6, 9, 13
+FEATURE, OUT = 0, 1
+
+
+def said(kind: int, payload: bytes = b"") -> bytes:
+    """An event as the kernel gives it: as long as the longest."""
+    return (struct.pack("=I", kind) + payload).ljust(EVENT_LENGTH, b"\0")
+
+
+def output(report: bytes) -> bytes:
+    return said(OUTPUT, report.ljust(4096, b"\0") + struct.pack("=HB", len(report), OUT))
+
+
+def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
+    return said(GET_REPORT, struct.pack("=IBB", request, report_id, kind))
+
+
+def set_report(request: int, report: bytes, kind: int = OUT) -> bytes:
+    return said(SET_REPORT, struct.pack("=IBBH", request, report[0], kind, len(report)) + report)
+
+
+@dataclass
+class FakeKernel:
+    """What the loop reads, waits for and writes; a wait lets the time pass."""
+
+    clock: VirtualClock
+    to_say: deque[tuple[float, bytes]] = field(default_factory=deque)
+    """(when, event), in order."""
+    heard: list[tuple[float, bytes]] = field(default_factory=list)
+    refuses_from_s: float = float("inf")
+
+    def wait(self, timeout_s: float) -> bool:
+        until_s = self.clock.now() + timeout_s
+        comes = bool(self.to_say) and self.to_say[0][0] <= until_s
+        self.clock.advance_to(max(self.clock.now(), self.to_say[0][0]) if comes else until_s)
+        return comes
+
+    def read(self) -> bytes | None:
+        if self.to_say and self.to_say[0][0] <= self.clock.now():
+            return self.to_say.popleft()[1]
+        return None
+
+    def write(self, event: bytes) -> None:
+        if self.clock.now() >= self.refuses_from_s:
+            raise DeviceError("the kernel has let the controller go")
+        self.heard.append((self.clock.now(), event))
+
+    def heard_of(self, kind: int) -> list[tuple[float, bytes]]:
+        return [(now_s, event) for now_s, event in self.heard if event[0] == kind]
+
+
+class PlainController:
+    """A report that counts, at each reading; takes what begins with 2, and has feature 5."""
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+        self.reads = 0
+
+    def read(self, now_s: float) -> bytes | None:
+        del now_s
+        self.reads += 1
+        return bytes([1, self.reads % 256])
+
+    def write(self, report: bytes, now_s: float) -> None:
+        del now_s
+        if report[0] != 2:
+            raise ValueError(f"report {report[0]}")
+        self.written.append(report)
+
+    def get_feature(self, report_id: int) -> bytes:
+        if report_id != 5:
+            raise DeviceError(f"report_id = {report_id}")
+        return b"\x05\x01\x02"

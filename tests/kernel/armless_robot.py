@@ -1,0 +1,77 @@
+"""A robot side without an arm: its real sockets, lease and safety, and stiffness as the test says."""
+
+import secrets
+import threading
+from types import TracebackType
+
+from common.clock import MonotonicClock, clock_domain
+from common.codec import encode
+from common.link_end import LinkEnd
+from common.messages import StiffnessUpdate
+from common.sockets import RobotSockets
+from robot_side.operator_session import OperatorSession
+from robot_side.safety import Safety, SafetySettings
+
+_TICK_S = 0.02
+SLOW_MACHINE = SafetySettings(gap_s=0.4, age_s=2.0, max_delay_s=5.0, healthy_s=0.3, lease_s=5.0)
+"""A processor emulated in software holds no tenth of a second; what is checked is what follows, not how soon."""
+
+
+class ArmlessRobot:
+    """One life of it, in a thread."""
+
+    def __init__(self) -> None:
+        self.r2_stiffness = 0.0
+        self.moving = False
+        """Whether the arm, if there were one, would be told to move now."""
+        self.state = "disarmed"
+        self._sockets = RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0", heartbeat_timeout_s=30.0)
+        epoch = secrets.randbits(53)
+        self._session = OperatorSession(lambda: LinkEnd("robot", epoch, clock_domain()), Safety(SLOW_MACHINE))
+        self._clock = MonotonicClock()
+        self._ending = False
+        self._thread = threading.Thread(target=self._live)
+
+    def __enter__(self) -> "ArmlessRobot":
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending = True
+        self._thread.join()
+        self._sockets.close()
+
+    @property
+    def flags(self) -> list[str]:
+        """How an operator side finds it."""
+        return [f"--connect={self._sockets.control_endpoint}", f"--view-connect={self._sockets.view_endpoint}"]
+
+    @property
+    def commands(self) -> int:
+        """Motion commands that have come."""
+        return self._session.motion_received
+
+    @property
+    def has_operator(self) -> bool:
+        """Whether anybody owns the lease."""
+        return self._session.owner_peer is not None
+
+    def _live(self) -> None:
+        while not self._ending:
+            received = self._sockets.receive()
+            now_s = self._clock.now()
+            for peer, payload in received:
+                self._session.receive(peer, payload, now_s)
+            self._session.update(now_s)
+            permission = self._session.permission(now_s)
+            self.state = permission.state
+            self.moving = permission.command is not None and permission.command.r2 > 0.0
+            for answer in self._session.take_answers(now_s):
+                self._sockets.send(answer.peer, answer.payload)
+            owner = self._session.owner(now_s)
+            if owner is not None:
+                felt = StiffnessUpdate(owner.header, l2=0.0, r2=self.r2_stiffness, rumble=0.0, state=permission.state)
+                self._sockets.send(owner.peer, encode(felt))
+            self._sockets.wait(_TICK_S)
