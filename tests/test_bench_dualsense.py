@@ -6,7 +6,9 @@ import pytest
 
 import feelahead.main
 from common.errors import ConfigurationError
-from feelahead.benchmarks.dualsense_drivers import Conduct, Ours, PyDualSense
+from feelahead.benchmarks.dualsense_conduct import Conduct
+from feelahead.benchmarks.dualsense_ours import Ours
+from feelahead.benchmarks.dualsense_peer import PyDualSense
 from feelahead.generated_part import BEGIN, END
 from operator_side.dualsense.transport import Transport
 

@@ -10,7 +10,9 @@ from rich.console import Console
 
 from common.command_line import parse_settings
 from common.errors import ConfigurationError
-from feelahead.benchmarks.dualsense_drivers import Conduct, Driver, Ours, PyDualSense
+from feelahead.benchmarks.dualsense_conduct import Conduct, Driver
+from feelahead.benchmarks.dualsense_ours import Ours
+from feelahead.benchmarks.dualsense_peer import PyDualSense
 from feelahead.benchmarks.overlap_report import Goal, Table, markdown, show, show_goals
 from feelahead.generated_part import with_generated_part
 from operator_side.dualsense.transport import Transport
