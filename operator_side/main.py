@@ -1,8 +1,10 @@
 """The process `feelahead-operator`: sockets, clock, controller, core; nothing else."""
 
+import dataclasses
 import functools
 import json
 import secrets
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
@@ -20,6 +22,7 @@ from common.status import Status, Value
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.calibration_store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
+from operator_side.dualsense.background_writes import BackgroundWrites
 from operator_side.dualsense.connection import Connection
 from operator_side.dualsense.device import HidBackend, load_backend
 from operator_side.dualsense.finding import find_controller
@@ -79,7 +82,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 loaded = load_backend() if backend is None else backend
                 # Whoever only reads leaves nothing behind.
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-                connection = Connection(BackgroundSearch(functools.partial(find_controller, loaded)), core, guard)
+                connection = Connection(BackgroundSearch(functools.partial(_find, loaded)), core, guard)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
@@ -100,6 +103,13 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         if failure is not None:
             raise failure
     return 0
+
+
+def _find(backend: HidBackend, preferred: str | None) -> OpenController:
+    found = find_controller(backend, preferred)
+    if sys.platform != "linux":
+        return found  # a device is read and written by one thread there
+    return dataclasses.replace(found, device=BackgroundWrites(found.device))
 
 
 class _Loop:

@@ -49,6 +49,7 @@ class FakeHandle:
     written: list[bytes] = field(default_factory=list)
     opened: bytes | None = None
     nonblocking: int = 0
+    times_opened: int = 0
     closed: int = 0
     full_mode: bool = False
 
@@ -59,6 +60,7 @@ class FakeHandle:
         if not self.opens:
             raise OSError("open failed")
         self.opened = path
+        self.times_opened += 1
 
     def set_nonblocking(self, flag: int) -> int:
         self.nonblocking = flag

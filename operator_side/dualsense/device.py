@@ -112,28 +112,27 @@ class Identity:
 
 
 class HidDualSense:
-    """The Device port on a controller that is open, on USB or Bluetooth."""
+    """The Device port on a controller that is open, on USB or Bluetooth.
+
+    On Linux it may be read by one thread and written by another; elsewhere one thread does both.
+    """
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
         """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
 
         On Bluetooth, asking is also what switches it to full reports.
         """
-        handle = backend.device()
+        self._reading, self._writing = _open(backend, path)
         try:
-            handle.open_path(path)
+            self.identity: Final = _ask(self._reading, path)
+            self._reading.set_nonblocking(1)
         except OSError as error:
-            raise not_opened(path, handle.error() or str(error)) from error
-        try:
-            self.identity: Final = _ask(handle, path)
-            handle.set_nonblocking(1)
-        except OSError as error:
-            handle.close()
+            self._close_handles()
             raise gone(str(error)) from error
         except DeviceError:
-            handle.close()
+            self._close_handles()
             raise
-        self._handle: HidHandle | None = handle
+        self._closed = False
         self._sequence = 0
         self._written = False
         self._released = True
@@ -146,11 +145,11 @@ class HidDualSense:
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone."""
         del now_s  # a real controller has a clock of its own
-        handle = self._require_open()
+        self._require_open()
         newest: list[int] = []
         try:
             for _ in range(_MAX_DRAINED):
-                report = handle.read(_READ_LENGTH)
+                report = self._reading.read(_READ_LENGTH)
                 if not report:
                     break
                 newest = report
@@ -165,42 +164,66 @@ class HidDualSense:
         the controller, and no debug effect code passes it. DeviceError when the controller is gone.
         """
         del now_s
-        handle = self._require_open()
+        self._require_open()
         try:
             output = parse_output_report(report)
         except RemoteProtocolError as error:
             raise ValueError(f"report: {error}") from error
         self._written, self._released = True, False
-        self._send(handle, output)
+        self._send(output)
 
     def close(self) -> None:
         """Take effects and rumble off if any were written and the controller still answers; let it go."""
-        handle, self._handle = self._handle, None
-        if handle is None:
+        if self._closed:
             return
+        self._closed = True
         try:
             if self._written:
-                self._send(handle, RELEASED)
+                self._send(RELEASED)
                 self._released = True
         except DeviceError:
             pass  # it is gone: nothing more can be told to it
         finally:
-            handle.close()
+            self._close_handles()
 
-    def _require_open(self) -> HidHandle:
-        if self._handle is None:
+    def _close_handles(self) -> None:
+        self._reading.close()
+        if self._writing is not self._reading:
+            self._writing.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
             raise DeviceError("the controller is closed; open a new one")
-        return self._handle
 
-    def _send(self, handle: HidHandle, output: OutputReport) -> None:
+    def _send(self, output: OutputReport) -> None:
         report = build_output_report(output, self.identity.transport, self._sequence)
         self._sequence = (self._sequence + 1) % _SEQUENCES
         try:
-            written = handle.write(report)
+            written = self._writing.write(report)
         except OSError as error:
             raise gone(str(error)) from error
         if written < len(report):
-            raise gone(handle.error() or f"{written} of {len(report)} bytes written")
+            raise gone(self._writing.error() or f"{written} of {len(report)} bytes written")
+
+
+def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
+    """Handles to read and to write by: two where a device may be opened twice, else one for both.
+
+    hidapi keeps the text of the last failure with each handle and frees it with every call, so that one handle
+    must not be read and written at once (background_writes.py). Both are opened at once, while the path is
+    certainly still this controller's.
+    """
+    handles: list[HidHandle] = []
+    for _ in range(2 if sys.platform == "linux" else 1):
+        handle = backend.device()
+        try:
+            handle.open_path(path)
+        except OSError as error:
+            for opened in handles:
+                opened.close()
+            raise not_opened(path, handle.error() or str(error)) from error
+        handles.append(handle)
+    return handles[0], handles[-1]
 
 
 def write_once(path: bytes, report: bytes) -> None:
