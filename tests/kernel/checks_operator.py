@@ -1,17 +1,13 @@
 """The process feelahead-operator with a controller on a real kernel that comes, goes, and must not stay stiff."""
 
-import json
 import signal
-import subprocess
-import sys
-import threading
 import time
 from types import TracebackType
-from typing import Any
 
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.armless_robot import ArmlessRobot
+from tests.kernel.operator_process import Operator
 from tests.kernel.plugged import Plugged
 from tests.kernel.waiting import require, stays, wait_until
 
@@ -23,65 +19,12 @@ _HOLD_TO_RUN = Button.L1
 _ARM = Button.OPTIONS
 
 
-# The start takes long in emulation, so it is made beforehand; the flags come by the standard input.
-_WAIT_FOR_FLAGS = "import sys, operator_side.main as m; sys.argv[1:] = sys.stdin.readline().split(); m.main()"
-
-
-class Operator:
-    """The process, which waits for `begin`, and what it says."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", _WAIT_FOR_FLAGS],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.notes: list[str] = []
-        self.controller = "unknown"
-        self.complaints: list[str] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def begin(self, robot: ArmlessRobot) -> None:
-        """Run feelahead-operator towards `robot`."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"--device=hid --status=json {' '.join(robot.flags)}\n")
-        self._process.stdin.flush()
-
-    @property
-    def running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def end(self, number: signal.Signals) -> int:
-        """Send a signal; the exit code."""
-        self._process.send_signal(number)
-        code = self._process.wait(_PATIENCE_S)
-        self._reader.join(_PATIENCE_S)
-        return code
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            try:
-                event: dict[str, Any] = json.loads(line)
-            except json.JSONDecodeError:
-                self.complaints.append(line.rstrip())
-                continue
-            if event["event"] == "note":
-                self.notes.append(event["text"])
-            if event["event"] == "status":
-                self.controller = event["controller"]
-
-
 class Desk:
     """An operator side and the robot side that it is connected to, from the first check to the last."""
 
-    def __init__(self) -> None:
+    def __init__(self, operator: Operator) -> None:
+        self.operator = operator
         self.robot = ArmlessRobot()
-        self.operator = Operator()
 
     def __enter__(self) -> "Desk":
         self.robot.__enter__()
@@ -90,13 +33,12 @@ class Desk:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.operator.running:
-            self.operator.end(signal.SIGKILL)
+        self.operator.end(signal.SIGKILL)
         self.robot.__exit__(kind, error, trace)
 
     def connect(self) -> None:
         """Let the operator side begin."""
-        self.operator.begin(self.robot)
+        self.operator.begin(["--device=hid", "--status=json", *self.robot.flags])
         wait_until(
             "the operator side connects",
             lambda: self.robot.has_operator or not self.operator.running,

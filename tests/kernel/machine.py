@@ -16,7 +16,7 @@ class MachineError(Exception):
 
 
 def run_machine(
-    parts: Parts, ramdisk: Path, console: Path, limit_s: float, say: Callable[[str], None], processors: int = 2
+    parts: Parts, ramdisk: Path, console: Path, limit_s: float, say: Callable[[str], None], processors: int = 1
 ) -> int:
     """Boot, pass each line of the test program to `say`, and return its exit code.
 
