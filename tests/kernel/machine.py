@@ -48,6 +48,8 @@ def run_machine(
     finally:
         machine.kill()
         machine.wait()
+        if machine.stdout is not None:
+            machine.stdout.close()
     return code
 
 

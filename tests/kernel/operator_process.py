@@ -49,10 +49,14 @@ class Operator:
                 self._code = os.waitstatus_to_exitcode(status)
         return self._code is None
 
-    def end(self, number: signal.Signals) -> int | None:
-        """Send a signal, and wait; the exit code."""
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal."""
         if self.running:
             os.kill(self._process_id, number)
+
+    def end(self, number: signal.Signals) -> int | None:
+        """Send a signal, and wait; the exit code."""
+        self.send(number)
         wait_until("the operator side ends", lambda: not self.running, 30.0)
         return self._code
 
