@@ -82,9 +82,9 @@ def waits_for_a_controller(plugged: Plugged, desk: Desk) -> str:
     require(robot.commands == 0, f"{robot.commands} commands were sent")
     plugged.plug_in()
     wait_until("commands come", lambda: robot.commands > 10, _PATIENCE_S, instead=lambda: operator.notes)
-    require(operator.notes[-1].startswith(f"controller: {plugged.variant.name}"), f"it says: {operator.notes}")
+    said = operator.note(f"controller: {plugged.variant.name}")
     require(robot.state == "disarmed", f"the robot is {robot.state}")
-    return operator.notes[-1]
+    return said
 
 
 def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
@@ -94,14 +94,13 @@ def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
     plugged.unplug()
     wait_until("the robot stops", lambda: robot.state == "disarmed" and not robot.moving)
     wait_until("the operator side notices", lambda: operator.controller == "lost", instead=lambda: operator.notes)
-    said = operator.notes[-1]
-    require("the controller is gone" in said, f"it says: {said}")
+    said = operator.note("the controller is gone")
     commands = robot.commands
     stays("commands are sent without a controller", lambda: robot.commands == commands)
     # The hands still pull R2 and hold L1.
     plugged.plug_in()
     wait_until("commands come again", lambda: robot.commands > commands + 10, _PATIENCE_S)
-    require(operator.notes[-1].endswith("back again"), f"it says: {operator.notes}")
+    operator.note("back again")
     wait_until("its triggers are free", lambda: plugged.ask(lambda controller: controller.released))
     stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
     return said.partition(";")[0]

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Sequence
 
 import operator_side.main
-from tests.kernel.waiting import wait_until
+from tests.kernel.waiting import require, wait_until
 
 
 class Operator:
@@ -59,6 +59,12 @@ class Operator:
         self.send(number)
         wait_until("the operator side ends", lambda: not self.running, 30.0)
         return self._code
+
+    def note(self, part: str) -> str:
+        """The first note with `part` in it; CheckError when there is none."""
+        found = [note for note in self.notes if part in note]
+        require(bool(found), f"{part!r} is in none of its notes: {self.notes}")
+        return found[0]
 
     def _read(self) -> None:
         with os.fdopen(self._said, encoding="utf-8", errors="replace") as lines:
