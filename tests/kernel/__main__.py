@@ -45,7 +45,7 @@ def main() -> int:
         *(sys.executable, "-P", "-m", "tests.kernel.guest", *given.only),
     ]
     # The guest cannot write, and would compile all of it each time.
-    for package in ("common", "operator_side", "robot_side", "tests/kernel"):
+    for package in ("common", "operator_side", "robot_side", "feelahead", "tests/kernel"):
         compileall.compile_dir(_PROJECT / package, quiet=2)
     modules = module_order(parts.modules)
     print(f"booting {parts.kernel.name.removeprefix('vmlinuz-')}", flush=True)

@@ -10,6 +10,7 @@ from functools import partial
 
 from operator_side.dualsense.models import Model
 from operator_side.dualsense.transport import Transport
+from tests.kernel.checks_command import lives
 from tests.kernel.checks_device import DEVICE_CHECKS
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.checks_operator import OPERATOR_CHECKS, Desk
@@ -65,6 +66,8 @@ def main(words: Sequence[str]) -> int:
         with Desk(operator) as desk, Plugged(variant) as plugged:
             for operator_check in OPERATOR_CHECKS:
                 score.make(variant, operator_check, plugged, desk)
+    wireless = Variant(Transport.BLUETOOTH)
+    score.make(wireless, lives, wireless)
     print(f"{score.passed} passed, {score.failed} failed")
     return 0 if score.passed and not score.failed else 1
 
