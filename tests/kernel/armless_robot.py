@@ -13,7 +13,7 @@ from robot_side.operator_session import OperatorSession
 from robot_side.safety import Safety, SafetySettings
 
 _TICK_S = 0.02
-SLOW_MACHINE = SafetySettings(gap_s=0.4, age_s=2.0, max_delay_s=5.0, healthy_s=0.3, lease_s=5.0)
+SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
 """A processor emulated in software holds no tenth of a second; what is checked is what follows, not how soon."""
 
 

@@ -1,17 +1,13 @@
 """The process feelahead-operator with a controller on a real kernel that comes, goes, and must not stay stiff."""
 
-import json
 import signal
-import subprocess
-import sys
-import threading
 import time
 from types import TracebackType
-from typing import Any
 
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.armless_robot import ArmlessRobot
+from tests.kernel.operator_process import Operator
 from tests.kernel.plugged import Plugged
 from tests.kernel.waiting import require, stays, wait_until
 
@@ -19,69 +15,18 @@ _PATIENCE_S = 90.0
 _HEALTHY_S = 0.7
 """More than the robot side asks for."""
 _PRESSED_S = 0.3
+_SETTLED_S = 0.5
+"""What was written before has arrived."""
 _HOLD_TO_RUN = Button.L1
 _ARM = Button.OPTIONS
-
-
-# The start takes long in emulation, so it is made beforehand; the flags come by the standard input.
-_WAIT_FOR_FLAGS = "import sys, operator_side.main as m; sys.argv[1:] = sys.stdin.readline().split(); m.main()"
-
-
-class Operator:
-    """The process, which waits for `begin`, and what it says."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", _WAIT_FOR_FLAGS],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.notes: list[str] = []
-        self.controller = "unknown"
-        self.complaints: list[str] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def begin(self, robot: ArmlessRobot) -> None:
-        """Run feelahead-operator towards `robot`."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"--device=hid --status=json {' '.join(robot.flags)}\n")
-        self._process.stdin.flush()
-
-    @property
-    def running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def end(self, number: signal.Signals) -> int:
-        """Send a signal; the exit code."""
-        self._process.send_signal(number)
-        code = self._process.wait(_PATIENCE_S)
-        self._reader.join(_PATIENCE_S)
-        return code
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            try:
-                event: dict[str, Any] = json.loads(line)
-            except json.JSONDecodeError:
-                self.complaints.append(line.rstrip())
-                continue
-            if event["event"] == "note":
-                self.notes.append(event["text"])
-            if event["event"] == "status":
-                self.controller = event["controller"]
 
 
 class Desk:
     """An operator side and the robot side that it is connected to, from the first check to the last."""
 
-    def __init__(self) -> None:
+    def __init__(self, operator: Operator) -> None:
+        self.operator = operator
         self.robot = ArmlessRobot()
-        self.operator = Operator()
 
     def __enter__(self) -> "Desk":
         self.robot.__enter__()
@@ -90,13 +35,12 @@ class Desk:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.operator.running:
-            self.operator.end(signal.SIGKILL)
+        self.operator.end(signal.SIGKILL)
         self.robot.__exit__(kind, error, trace)
 
     def connect(self) -> None:
         """Let the operator side begin."""
-        self.operator.begin(self.robot)
+        self.operator.begin(["--device=hid", "--status=json", *self.robot.flags])
         wait_until(
             "the operator side connects",
             lambda: self.robot.has_operator or not self.operator.running,
@@ -138,9 +82,9 @@ def waits_for_a_controller(plugged: Plugged, desk: Desk) -> str:
     require(robot.commands == 0, f"{robot.commands} commands were sent")
     plugged.plug_in()
     wait_until("commands come", lambda: robot.commands > 10, _PATIENCE_S, instead=lambda: operator.notes)
-    require(operator.notes[-1].startswith(f"controller: {plugged.variant.name}"), f"it says: {operator.notes}")
+    said = operator.note(f"controller: {plugged.variant.name}")
     require(robot.state == "disarmed", f"the robot is {robot.state}")
-    return operator.notes[-1]
+    return said
 
 
 def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
@@ -150,14 +94,13 @@ def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
     plugged.unplug()
     wait_until("the robot stops", lambda: robot.state == "disarmed" and not robot.moving)
     wait_until("the operator side notices", lambda: operator.controller == "lost", instead=lambda: operator.notes)
-    said = operator.notes[-1]
-    require("the controller is gone" in said, f"it says: {said}")
+    said = operator.note("the controller is gone")
     commands = robot.commands
     stays("commands are sent without a controller", lambda: robot.commands == commands)
     # The hands still pull R2 and hold L1.
     plugged.plug_in()
     wait_until("commands come again", lambda: robot.commands > commands + 10, _PATIENCE_S)
-    require(operator.notes[-1].endswith("back again"), f"it says: {operator.notes}")
+    operator.note("back again")
     wait_until("its triggers are free", lambda: plugged.ask(lambda controller: controller.released))
     stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
     return said.partition(";")[0]
@@ -165,7 +108,16 @@ def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
 
 def killed(plugged: Plugged, desk: Desk) -> str:
     """Killed with stiff triggers (kill -9), the operator side's watchdog releases them, and the robot stops."""
-    arm_and_pull(plugged, desk.robot)
+
+    def frozen_while_stiff() -> bool:
+        """So that it is not the operator side that releases them, which it does when a stiffness comes late."""
+        desk.operator.send(signal.SIGCONT)
+        arm_and_pull(plugged, desk.robot)
+        desk.operator.send(signal.SIGSTOP)
+        time.sleep(_SETTLED_S)
+        return not plugged.ask(lambda controller: controller.released)
+
+    wait_until("the operator side is frozen while the triggers are stiff", frozen_while_stiff, _PATIENCE_S)
     code = desk.operator.end(signal.SIGKILL)
     require(code == -signal.SIGKILL, f"it ended with code {code}: {desk.operator.complaints}")
     wait_until("the triggers are released", lambda: plugged.ask(lambda controller: controller.released))

@@ -5,15 +5,16 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 
 from operator_side.dualsense.models import Model
 from operator_side.dualsense.transport import Transport
+from tests.kernel.checks_command import lives
 from tests.kernel.checks_device import DEVICE_CHECKS
 from tests.kernel.checks_driver import DRIVER_CHECKS
 from tests.kernel.checks_operator import OPERATOR_CHECKS, Desk
+from tests.kernel.operator_process import Operator
 from tests.kernel.plugged import Plugged, Variant
 
 VARIANTS = tuple(Variant(transport, model) for transport in Transport for model in Model)
@@ -51,21 +52,22 @@ def main(words: Sequence[str]) -> int:
     """0 when every wanted check passed, and there was one."""
     print(f"Linux {platform.release()}, Python {platform.python_version()}")
     score = Score(words)
-    with ExitStack() as stack:
-        # Their processes start while the other checks are made. The operator side is the same for the Edge.
-        desks = {
-            variant: stack.enter_context(Desk())
-            for variant in VARIANTS
-            if variant.model is Model.DUALSENSE and any(score.wanted(variant, check) for check in OPERATOR_CHECKS)
-        }
-        for variant in VARIANTS:
-            with Plugged(variant) as plugged:
-                for check in (*DRIVER_CHECKS, *DEVICE_CHECKS):
-                    score.make(variant, check, plugged)
-        for variant, desk in desks.items():
-            with Plugged(variant) as plugged:
-                for operator_check in OPERATOR_CHECKS:
-                    score.make(variant, operator_check, plugged, desk)
+    # The operator side is the same for the Edge.
+    operators = {
+        variant: Operator()
+        for variant in VARIANTS
+        if variant.model is Model.DUALSENSE and any(score.wanted(variant, check) for check in OPERATOR_CHECKS)
+    }
+    for variant in VARIANTS:
+        with Plugged(variant) as plugged:
+            for check in (*DRIVER_CHECKS, *DEVICE_CHECKS):
+                score.make(variant, check, plugged)
+    for variant, operator in operators.items():
+        with Desk(operator) as desk, Plugged(variant) as plugged:
+            for operator_check in OPERATOR_CHECKS:
+                score.make(variant, operator_check, plugged, desk)
+    wireless = Variant(Transport.BLUETOOTH)
+    score.make(wireless, lives, wireless)
     print(f"{score.passed} passed, {score.failed} failed")
     return 0 if score.passed and not score.failed else 1
 

@@ -16,7 +16,7 @@ class MachineError(Exception):
 
 
 def run_machine(
-    parts: Parts, ramdisk: Path, console: Path, limit_s: float, say: Callable[[str], None], processors: int = 2
+    parts: Parts, ramdisk: Path, console: Path, limit_s: float, say: Callable[[str], None], processors: int = 1
 ) -> int:
     """Boot, pass each line of the test program to `say`, and return its exit code.
 
@@ -48,6 +48,8 @@ def run_machine(
     finally:
         machine.kill()
         machine.wait()
+        if machine.stdout is not None:
+            machine.stdout.close()
     return code
 
 
