@@ -22,7 +22,7 @@ def require(condition: bool, otherwise: str) -> None:
 def wait_until(
     what: str,
     condition: Callable[[], Value | None],
-    limit_s: float = 10.0,
+    limit_s: float = 60.0,
     instead: Callable[[], object] | None = None,
 ) -> Value:
     """The first value of `condition` that is not None or False.
