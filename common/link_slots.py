@@ -2,6 +2,7 @@
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from common.delay_distribution import DelayTable, Distribution, delays_at
 
 SHORTEST_SLOT_S = 1e-4
-_MOST_SLOTS = 1000
-"""A message due after so many of the shortest slots has a slot of its own: what lies between is not drawn."""
+_MOST_SLOTS = 20_000
+"""A message due after so many of the shortest slots leaves in one of its own: what lies between is not drawn."""
+_DRAWN_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ class SlotTimes:
     def __init__(self, slot: Slot, generator: np.random.Generator) -> None:
         self._slot = slot
         self._generator = generator
+        self._gaps_s = self._endless_gaps_s()
         self._times_s: list[float] = []
         self._packets_left: list[float] = []
         self._bytes_left: list[float] = []
@@ -75,17 +78,18 @@ class SlotTimes:
         times_s = self._times_s
         if not times_s or times_s[-1] < now_s:
             self._forget(len(times_s))
-            self._add(now_s + self._gap_s())
+            self._add(now_s + next(self._gaps_s))
         if due_s - times_s[-1] > _MOST_SLOTS * self._slot.least_s:
-            self._add(due_s)
+            # Not among the others: a message that comes later may be due in between.
+            return due_s + float(self._generator.random()) * next(self._gaps_s)
         while times_s[-1] < due_s:
-            self._add(times_s[-1] + self._gap_s())
+            self._add(times_s[-1] + next(self._gaps_s))
         self._forget(bisect_left(times_s, now_s))
         place = bisect_left(times_s, due_s)
         while self._packets_left[place] <= 0.0 or self._bytes_left[place] <= 0.0:
             place += 1
             if place == len(times_s):
-                self._add(times_s[-1] + self._gap_s())
+                self._add(times_s[-1] + next(self._gaps_s))
         self._packets_left[place] -= 1.0
         self._bytes_left[place] -= size_bytes
         return times_s[place]
@@ -99,9 +103,12 @@ class SlotTimes:
         for values in (self._times_s, self._packets_left, self._bytes_left):
             del values[:count]
 
-    def _gap_s(self) -> float:
-        shape = self._slot.shape
-        if shape is None:
-            return float(self._generator.uniform(self._slot.least_s, self._slot.most_s))
-        drawn_s = delays_at(self._generator.random(1), shape.mean_s, shape.jitter_s, shape.distribution)
-        return max(float(drawn_s[0]), SHORTEST_SLOT_S)
+    def _endless_gaps_s(self) -> Iterator[float]:
+        slot, shape = self._slot, self._slot.shape
+        while True:
+            if shape is None:
+                yield from self._generator.uniform(slot.least_s, slot.most_s, _DRAWN_AT_ONCE).tolist()
+                continue
+            probabilities = self._generator.random(_DRAWN_AT_ONCE)
+            drawn_s = delays_at(probabilities, shape.mean_s, shape.jitter_s, shape.distribution)
+            yield from np.maximum(drawn_s, SHORTEST_SLOT_S).tolist()

@@ -74,6 +74,8 @@ def test_a_comparison_prints_every_seed_and_a_verdict(capsys: pytest.CaptureFixt
         (["--seed", "-1"], "--seed -1", "0 or more"),
         (["--seeds", "3"], "--seeds 3", "--virtual --against"),
         (["--spin", "-1"], "--spin -1.0", "microseconds"),
+        (["--virtual", "--spin", "100"], "--spin", "where nothing waits"),
+        (["--virtual", "--realtime"], "--realtime", "where nothing waits"),
         (["--sends", "x.csv"], "--sends x.csv", "--virtual"),
         (["--against", "nowhere.csv"], "nowhere.csv", "delay_ns"),
         (["--csv", "/nowhere/x.csv"], "/nowhere/x.csv", "a file in a folder"),

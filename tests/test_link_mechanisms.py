@@ -181,6 +181,23 @@ def test_a_slot_ends_with_the_message_that_fills_its_bytes() -> None:
     assert [len(line.pop(now_s)) for now_s in (0.0101, 0.0201)] == [3, 1]
 
 
+@pytest.mark.parametrize("spec", ["delay 500ms 400ms", "delay 5s 4s"])
+@pytest.mark.parametrize("period_s", [0.05, 0.2])
+def test_short_slots_far_ahead_add_no_more_than_themselves(spec: str, period_s: float) -> None:
+    delays_s = []
+    for profile in (spec, f"{spec} slot 0.1ms"):
+        line: DelayLine[int] = DelayLine(LinkProfile.parse(profile))
+        for number in range(1000):
+            line.push(period_s * number, number)
+        left_s: dict[int, float] = {}
+        while (due_s := line.next_due()) is not None:
+            left_s |= dict.fromkeys(line.pop(due_s), due_s)
+        delays_s.append(np.array([left_s[number] - period_s * number for number in range(1000)]))
+    added_s = delays_s[1] - delays_s[0]
+    assert added_s.min() >= -1e-9
+    assert added_s.max() <= 0.1e-3 + 1e-9
+
+
 def test_gaps_of_slots_follow_a_distribution() -> None:
     run = Run("slot distribution normal 20ms 2ms", 40_000)
     gaps_s = np.diff(sorted({due_s for due_s, _ in run.deliveries}))

@@ -104,6 +104,15 @@ def test_a_sleep_that_ends_late_does_not_delay_the_turn() -> None:
     assert 0.0 <= clock.now() - pacer.deadline_s <= 2e-6
 
 
+def test_a_wait_that_ends_early_is_taken_up_again() -> None:
+    clock = VirtualClock()
+    waiting = Waiting(clock)
+    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, lambda timeout_s: waiting.wait(timeout_s / 2))
+    # Halves of what is left, instead of half a millisecond of a busy loop.
+    assert len(waiting.slept_s) > 5
+    assert sum(waiting.slept_s) == pytest.approx(PERIOD_S - 200e-6, abs=2e-6)
+
+
 @pytest.mark.parametrize("message_s", [300e-6, 900e-6])
 def test_a_message_ends_the_sleep_and_the_spin(message_s: float) -> None:
     clock = VirtualClock()

@@ -53,15 +53,16 @@ class LinkBenchSettings:
     link_correlation: CorrelationModel = "netem"
     """What correlations mean: netem's own, or proper ones."""
     rate: Annotated[float, tyro.conf.arg(metavar="HZ")] = 1000.0
-    """Messages a second in each direction."""
+    """Messages a second in each direction; not used where a recording gives the send times."""
     count: Annotated[int, tyro.conf.arg(metavar="N")] = 6000
-    """Messages in each direction."""
+    """Messages in each direction; not used where a recording gives the send times."""
     bytes: Annotated[int, tyro.conf.arg(metavar="N")] = 142
     """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Write every message there: seq, sent_ns, received_ns; a lost one has no received_ns."""
-    spin: Annotated[float, tyro.conf.arg(metavar="US")] = 1e6 * SPIN_S
-    """How long the processor is kept busy before a message is due: 0 costs least, more is more exact."""
+    spin: Annotated[float | None, tyro.conf.arg(metavar="US")] = None
+    """How long the processor is kept busy before a message is due: 0 costs least, more is more exact; 200 unless
+    given."""
     realtime: bool = False
     """Run both ends under SCHED_FIFO, where that is permitted: the figures of a machine without other work."""
     virtual: bool = False
@@ -90,17 +91,23 @@ class LinkBenchSettings:
         ):
             if getattr(self, name) is not None and not least <= getattr(self, name) <= most:
                 raise ValueError(f"--{name} {getattr(self, name)}: valid: {least} to {most}")
-        for name in ("seeds", "pairs"):
-            if getattr(self, name) is not None and not (self.virtual and self.against is not None):
-                raise ValueError(f"--{name} {getattr(self, name)}: valid with --virtual --against alone")
-        if not 0.0 <= self.spin <= 1e5:
+        if self.spin is not None and not 0.0 <= self.spin <= 1e5:
             raise ValueError(f"--spin {self.spin}: valid: 0 to 100000 microseconds")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
-        if self.sends is not None and not self.virtual:
-            raise ValueError(f"--sends {self.sends}: valid with --virtual alone")
+        self._refuse_what_would_be_passed_over()
         if self.csv is not None and (self.csv.is_dir() or not self.csv.absolute().parent.is_dir()):
             raise ValueError(f"--csv {self.csv}: valid: a file in a folder that is there")
+
+    def _refuse_what_would_be_passed_over(self) -> None:
+        for name in ("spin", "realtime"):
+            if self.virtual and getattr(self, name) not in (None, False):
+                raise ValueError(f"--{name} with --virtual, where nothing waits; valid: one of them")
+        for name in ("seeds", "pairs"):
+            if getattr(self, name) is not None and not (self.virtual and self.against is not None):
+                raise ValueError(f"--{name} {getattr(self, name)}: valid with --virtual --against alone")
+        if self.sends is not None and not self.virtual:
+            raise ValueError(f"--sends {self.sends}: valid with --virtual alone")
 
     @property
     def spec(self) -> LinkSpec:
@@ -185,11 +192,11 @@ def _real(
         settings.count,
         1.0 / settings.rate,
         settings.bytes,
-        spin_s=1e-6 * settings.spin,
+        spin_s=SPIN_S if settings.spin is None else 1e-6 * settings.spin,
         realtime=settings.realtime,
     )
     # What rests instead of spinning, with and without parts of it: where the processor time goes.
-    resting = dataclasses.replace(plan, count=min(settings.count, _BASELINE), spin_s=0.0)
+    resting = dataclasses.replace(plan, count=min(plan.count, _BASELINE), spin_s=0.0)
     without = dataclasses.replace(resting, link=LinkSpec())
     costs = {
         "without spinning": resting,

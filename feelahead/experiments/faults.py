@@ -19,7 +19,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from common.command_line import parse_settings, run_command
+from common.command_line import parse_settings
+from common.launch import launch
 from feelahead.experiments import real_faults
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.first_side import either_side_first
@@ -137,4 +138,4 @@ def _try_real(repeats: int, progress: Progress, add: Callable[[str, str, str, Ou
 
 
 if __name__ == "__main__":
-    run_command(PROGRAM, command)
+    launch(PROGRAM, lambda: command)

@@ -8,11 +8,12 @@ import os
 import shutil
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 from common.errors import FeelaheadError
 from feelahead.experiments.fault import Outcome
 from feelahead.experiments.real_faults import Advance, Onsets, stands
-from feelahead.experiments.rig import Rig
+from feelahead.experiments.rig import Rig, RigError
 
 _ROBOT, _OPERATOR = "10.91.83.1", "10.91.83.2"
 """Inside namespaces of our own, where no other network is."""
@@ -51,8 +52,11 @@ def _namespaces() -> Iterator[tuple[list[str], list[str]]]:
         raise NotPermittedError("network namespaces need root and iproute2 (apt install iproute2)")
     robot, operator = (f"feelahead-{side}-{os.getpid()}" for side in ("robot", "operator"))
     try:
+        _delete_left_behind()
         for name in (robot, operator):
-            _ip("netns", "add", name)
+            added = _run_ip("netns", "add", name)
+            if added is not None:
+                raise NotPermittedError(added)
         link = ("robot0", "type", "veth", "peer", "name", "operator0")
         _ip("-n", robot, "link", "add", *link)
         _ip("-n", robot, "link", "set", "operator0", "netns", operator)
@@ -63,10 +67,25 @@ def _namespaces() -> Iterator[tuple[list[str], list[str]]]:
         yield ["ip", "netns", "exec", robot], ["ip", "netns", "exec", operator]
     finally:
         for name in (robot, operator):
-            subprocess.run(["ip", "netns", "del", name], capture_output=True, check=False)  # noqa: S607
+            _run_ip("netns", "del", name)
+
+
+def _delete_left_behind() -> None:
+    """Namespaces of runs that were killed: their names end with a process that is no more."""
+    for namespace in Path("/run/netns").glob("feelahead-*-*"):
+        owner = namespace.name.rpartition("-")[2]
+        if owner.isdigit() and not Path("/proc", owner).exists():
+            _run_ip("netns", "del", namespace.name)
 
 
 def _ip(*arguments: str) -> None:
+    """RigError when it fails: what may be missing was asked for before."""
+    failed = _run_ip(*arguments)
+    if failed is not None:
+        raise RigError(failed)
+
+
+def _run_ip(*arguments: str) -> str | None:
+    """Why it failed; None when it did not."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
-    if done.returncode != 0:
-        raise NotPermittedError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
+    return None if done.returncode == 0 else f"ip {' '.join(arguments)}: {done.stderr.strip()}"
