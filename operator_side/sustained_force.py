@@ -7,7 +7,8 @@ for the finger, and low enough to be kind to the motor.
 import math
 from dataclasses import dataclass
 
-from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT
+from operator_side.dualsense.effects import MAX_STRENGTH
+from operator_side.force_profiles import MAX_LEVEL, ForceProfiles
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class SustainedForceSettings:
     longest_s: float = 10.0
     """How long a trigger may ask for full force before it is lowered; 0 lowers it at once."""
     full_strength: int = 6
-    """From this strength on, of 8, a profile is full force."""
+    """A profile is full force when it has this strength, of 8, in any zone that a full pull reaches."""
     sustainable_strength: int = 5
     """What it is lowered to; above the band `near`, so that danger still feels like more."""
     fade_s: float = 5.0
@@ -41,8 +42,13 @@ class SustainedForceLimit:
     limit goes as slowly as it came, and a rest of both makes the trigger fresh again.
     """
 
-    def __init__(self, settings: SustainedForceSettings) -> None:
+    def __init__(self, settings: SustainedForceSettings, profiles: ForceProfiles) -> None:
         self._settings = settings
+        strongest = [max(profiles.felt(level)) for level in range(MAX_LEVEL + 1)]
+        self._full_level = next(level for level, one in enumerate(strongest) if one >= settings.full_strength)
+        self._sustainable_level = max(
+            level for level, one in enumerate(strongest) if one <= settings.sustainable_strength
+        )
         self._exertion_s = 0.0
         self._full = False
         self._last_s: float | None = None
@@ -61,7 +67,7 @@ class SustainedForceLimit:
                 max(self._exertion_s + (step_s if self._full else -step_s), 0.0), settings.longest_s + settings.fade_s
             )
         self._last_s = now_s
-        self._full = level >= ZONE_COUNT * settings.full_strength
+        self._full = level >= self._full_level
         return min(level, self.highest_level)
 
     @property
@@ -69,5 +75,4 @@ class SustainedForceLimit:
         """What no level may exceed now, 80 while the trigger is fresh."""
         settings = self._settings
         lowered = min(max((self._exertion_s - settings.longest_s) / settings.fade_s, 0.0), 1.0)
-        strength = MAX_STRENGTH - lowered * (MAX_STRENGTH - settings.sustainable_strength)
-        return round(ZONE_COUNT * strength)
+        return round(MAX_LEVEL - lowered * (MAX_LEVEL - self._sustainable_level))

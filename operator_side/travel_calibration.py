@@ -10,12 +10,14 @@ from operator_side.dualsense.trigger_model import SENSED_TRAVEL
 
 LARGEST_REST: Final = 0.3
 """A stick that rests farther from its centre is broken, or held."""
+LEAST_SPAN: Final = 0.2
+"""Of a trigger's raw travel between released and fully pulled: with less, a few counts would be full speed."""
 _ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True)
 class TriggerTravel:
-    """Which part of one trigger's raw travel counts: 0 <= dead_zone < saturation <= 1."""
+    """Which part of one trigger's raw travel counts."""
 
     dead_zone: float = 0.05
     """A trigger up to this is released."""
@@ -23,9 +25,11 @@ class TriggerTravel:
     """A trigger from this on is fully pulled."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.dead_zone < self.saturation <= 1.0:
+        # The second part is false for NaN, too.
+        if not (self.dead_zone >= 0.0 and self.dead_zone + LEAST_SPAN <= self.saturation <= 1.0):
             raise ValueError(
-                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone < saturation <= 1"
+                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone, at least"
+                f" {LEAST_SPAN} below saturation, <= 1"
             )
 
     def travel(self, raw: float) -> float:

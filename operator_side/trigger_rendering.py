@@ -9,7 +9,7 @@ from typing import Any
 from common.messages import StiffnessUpdate
 from operator_side.bands import Band, BandSettings
 from operator_side.contact_detent import DetentSelector, with_detent
-from operator_side.dualsense.effects import TriggerEffect
+from operator_side.dualsense.effects import ZONE_COUNT, TriggerEffect
 from operator_side.dualsense.output_report import OutputReport, Rumble
 from operator_side.dualsense.trigger_model import SENSED_TRAVEL
 from operator_side.force_profiles import force_profiles
@@ -30,6 +30,17 @@ class RenderingSettings:
     detent: bool = True
     """A bump in the travel where the gripper would touch."""
 
+    def __post_init__(self) -> None:
+        if not self.bands.marked:
+            return
+        lowered = ZONE_COUNT * self.sustained.sustainable_strength
+        near = self.bands.exact_level(self.bands.danger, Band.NEAR)
+        if lowered <= near:
+            raise ValueError(
+                f"sustained.sustainable_strength = {self.sustained.sustainable_strength} with bands.danger ="
+                f" {self.bands.danger}; valid: above {near / ZONE_COUNT:g}, lest lasting danger feel weaker than near"
+            )
+
 
 class RenderedTrigger:
     """One trigger's way from stiffness to effect, and what it has to remember."""
@@ -42,7 +53,7 @@ class RenderedTrigger:
         self._settings = settings
         self._travel = travel
         self._levels = LevelSelector(settings.bands)
-        self._limit = SustainedForceLimit(settings.sustained)
+        self._limit = SustainedForceLimit(settings.sustained, self.profiles)
         self._detent = DetentSelector()
         self._limited = False
         self._last_s: float | None = None

@@ -81,7 +81,7 @@ def test_a_real_controller_is_measured_and_kept_by_its_address(
     assert "a full pull reaches 7 of 10 zones, in which 57 of 81 levels differ" in said
     # Nothing pushed against the fingers, and nothing is left on.
     assert set(handle.written) == {build_output_report(RELEASED)}
-    assert handle.closed == 1
+    assert handle.closed == handle.times_opened
 
 
 def test_a_simulated_controller_is_kept_only_where_asked_for(
@@ -102,14 +102,14 @@ def test_hands_that_do_not_pull_are_told_why_and_nothing_is_stored(handle: Playe
     with pytest.raises(CalibrationError, match="Pull L2"):
         command(["calibrate"])
     assert list(own_folder.iterdir()) == []
-    assert handle.closed == 1
+    assert handle.closed == handle.times_opened
 
 
 def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
     handle.play(lambda now_s: ControllerState() if now_s < 1.0 else None)
     with pytest.raises(DeviceError, match="said nothing for 5 s"):
         command(["calibrate"])
-    assert handle.closed == 1
+    assert handle.closed == handle.times_opened
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from operator_side.travel_calibration import StickRest, TravelCalibration, Trigg
 REPEATABLE = settings(derandomize=True, deadline=None)
 ADDRESS = "aa:bb:cc:00:11:22"
 MEASURED = TravelCalibration(TriggerTravel(0.06, 0.91), TriggerTravel(0.03, 0.98), StickRest(0.02, -0.01, 0.08))
-TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.4), st.floats(0.5, 1.0))
+TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))
 STICKS = st.builds(StickRest, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.0, 0.6))
 
 

@@ -12,6 +12,7 @@ from common.messages import Header, StiffnessUpdate
 from operator_side.bands import Band, BandSettings
 from operator_side.dualsense.effects import MultiPositionFeedback, Off
 from operator_side.dualsense.output_report import RELEASED, Rumble
+from operator_side.sustained_force import SustainedForceSettings
 from operator_side.travel_calibration import TravelCalibration, TriggerTravel
 from operator_side.trigger_rendering import RenderedTrigger, RenderingSettings, TriggerRendering
 
@@ -145,3 +146,17 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
 def test_what_is_no_stiffness(stiffness: float) -> None:
     with pytest.raises(ValueError, match="stiffness"):
         RenderedTrigger(USUAL, TriggerTravel()).render(stiffness, None, 0.0)
+
+
+def test_danger_that_lasts_never_feels_weaker_than_near() -> None:
+    with pytest.raises(ValueError, match=r"sustainable_strength = 2 with bands\.danger = 0\.6; valid: above 4"):
+        RenderingSettings(sustained=SustainedForceSettings(full_strength=3, sustainable_strength=2))
+    RenderingSettings(
+        bands=BandSettings(marked=False), sustained=SustainedForceSettings(full_strength=3, sustainable_strength=2)
+    )
+
+
+def test_the_least_danger_is_eased_too_when_it_lasts() -> None:
+    trigger = RenderedTrigger(RenderingSettings(), TriggerTravel())
+    felt = [max(trigger.render(0.62, None, 0.1 * turn).zone_strengths[:8]) for turn in range(300)]
+    assert (felt[0], felt[-1]) == (6, 5)
