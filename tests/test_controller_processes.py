@@ -249,4 +249,4 @@ def test_without_hidapi_it_ends_at_once_and_says_how_to_get_it() -> None:
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert line.startswith("feelahead-operator: hidapi cannot be imported")
-    assert "pip install 'feelahead[operator]'" in line
+    assert "pip install --force-reinstall hidapi" in line

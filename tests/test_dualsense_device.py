@@ -213,7 +213,7 @@ def test_hidapi_missing(monkeypatch: pytest.MonkeyPatch) -> None:
         return real_import(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without_hidapi)
-    with pytest.raises(NoDriverError, match=r"No module named .*pip install 'feelahead\[operator\]'") as caught:
+    with pytest.raises(NoDriverError, match=r"No module named .*pip install --force-reinstall hidapi") as caught:
         load_backend()
     assert isinstance(caught.value, ConfigurationError)  # no waiting mends it: the command ends with code 2
     assert "\n" not in str(caught.value)

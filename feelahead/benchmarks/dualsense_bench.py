@@ -34,6 +34,8 @@ class DualSenseBenchSettings:
     """Put the table between the marks of this document."""
 
     def __post_init__(self) -> None:
+        if self.write_docs is not None and not self.write_docs.is_file():
+            raise ValueError(f"--write-docs {self.write_docs}: valid: a document with marks for the generated part")
         if not 1 <= self.rounds <= 10_000:
             raise ValueError(f"--rounds {self.rounds}: valid: 1 to 10000")
 
@@ -105,4 +107,5 @@ def _write(path: Path, shown: Table) -> None:
         document = path.read_text(encoding="utf-8")
         path.write_text(with_generated_part(document, markdown(shown)), encoding="utf-8")
     except (OSError, ValueError) as error:
-        raise ConfigurationError(f"--write-docs {path}: {error}") from error
+        said = error.strerror if isinstance(error, OSError) else error
+        raise ConfigurationError(f"--write-docs {path}: {said}") from error

@@ -15,6 +15,8 @@ EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
     "experiments": ("matplotlib", "pyarrow", "distributed"),
 }
 """Each extra with what it brings; hidapi's module is `hidraw` on Linux and `hid` elsewhere."""
+_PACKAGES: Final = {"mujoco": "mujoco-core", "hidraw": "hidapi", "hid": "hidapi", "foxglove": "foxglove-sdk"}
+"""What brings a module, where its name is another."""
 _PURPOSES: Final = {
     "robot": "the simulated arm: the demo and feelahead-robot",
     "operator": "a real controller and the browser console",
@@ -56,11 +58,11 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
         )
         if part
     )
-    force = " --force-reinstall" if broken else ""
+    again = " ".join(_PACKAGES.get(module, module) for module in failures)
     return Finding(
         name,
         Verdict.MISSING if for_demo else Verdict.NOTE,
         f"{said} (for {_PURPOSES[extra]})",
-        f"pip install{force} 'feelahead[{extra}]'",
+        f"pip install --force-reinstall {again}" if broken else f"pip install 'feelahead[{extra}]'",
         for_demo=for_demo,
     )

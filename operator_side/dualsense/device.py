@@ -85,15 +85,15 @@ def load_backend() -> HidBackend:
             import hidraw as module  # noqa: PLC0415
         else:
             import hid as module  # noqa: PLC0415
-    except ImportError as error:
+    except Exception as error:  # another package's module may fail as it likes
         raise NoDriverError(
-            f"hidapi cannot be imported ({error}): uninstall the other package called hid if it is there (pip uninstall"
-            f" hid), then {INSTALL}; or run without a controller: --device simulated"
+            f"hidapi cannot be imported ({type(error).__name__}: {error}): {INSTALL}, after pip uninstall hid if that"
+            " other package is there; or run without a controller: --device simulated"
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
         raise NoDriverError(
-            f"the module {module.__name__} is not hidapi's but another package's: pip uninstall hid, then {INSTALL}"
-            " --force-reinstall"
+            f"the module {module.__name__} at {getattr(module, '__file__', None)} is not hidapi's: uninstall the package that brings it"
+            f" (for hid: pip uninstall hid), then {INSTALL}"
         )
     return cast(HidBackend, module)
 

@@ -6,7 +6,8 @@ import sys
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.models import PRODUCT_IDS, SONY_VENDOR_ID
 
-INSTALL = "pip install 'feelahead[operator]'"
+INSTALL = "pip install --force-reinstall hidapi"
+"""Over another package's module, too; by its own name, for feelahead may come from a folder."""
 _WITHOUT = "run without one: --device simulated"
 
 
