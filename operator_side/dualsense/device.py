@@ -91,9 +91,10 @@ def load_backend() -> HidBackend:
             " other package is there; or run without a controller: --device simulated"
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
+        place = getattr(module, "__file__", None)
         raise NoDriverError(
-            f"the module {module.__name__} at {getattr(module, '__file__', None)} is not hidapi's: uninstall the package that brings it"
-            f" (for hid: pip uninstall hid), then {INSTALL}"
+            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it (for hid:"
+            f" pip uninstall hid), then {INSTALL}"
         )
     return cast(HidBackend, module)
 
