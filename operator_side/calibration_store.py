@@ -8,7 +8,6 @@ The address is written with dashes in the file's name, because colons are not al
 import dataclasses
 import math
 import os
-import re
 import tempfile
 import tomllib
 from pathlib import Path
@@ -16,10 +15,10 @@ from typing import Any, Final
 
 from common.errors import ConfigurationError
 from common.user_folders import configuration_folder
+from operator_side.dualsense.address import checked_address
 from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _VERSION: Final = 1
-_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 _PARTS: Final[dict[str, type[TriggerTravel] | type[StickRest]]] = {
     "l2": TriggerTravel,
     "r2": TriggerTravel,
@@ -32,9 +31,7 @@ _MEND: Final = "measure it anew with: feelahead calibrate; or delete the file fo
 
 def calibration_path(address: str) -> Path:
     """Where the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff") is; ValueError for another form."""
-    if not _ADDRESS.fullmatch(address):
-        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
-    return configuration_folder() / "controllers" / f"{address.replace(':', '-')}.toml"
+    return configuration_folder() / "controllers" / f"{checked_address(address).replace(':', '-')}.toml"
 
 
 def load_calibration(address: str) -> TravelCalibration | None:
@@ -105,9 +102,7 @@ def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
     _require_keys(content, {"version", "address", *_PARTS}, "")
     if content["version"] != _VERSION:
         raise ValueError(f"version = {content['version']!r}; valid: {_VERSION}")
-    address = content["address"]
-    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
-        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
+    address = checked_address(content["address"])
     parts: dict[str, Any] = {}
     for part, kind in _PARTS.items():
         values = content[part]
