@@ -8,12 +8,13 @@ The address is written with dashes in the file's name, because colons are not al
 import dataclasses
 import math
 import os
+import reprlib
 import tempfile
-import tomllib
 from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
+from common.toml_file import read_toml
 from common.user_folders import configuration_folder
 from operator_side.dualsense.address import checked_address
 from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
@@ -55,18 +56,11 @@ def load_calibration(address: str) -> TravelCalibration | None:
 def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
     """Address and calibration in the file `path`; ConfigurationError, in one line, when it is broken."""
     try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST_BYTES + 1)
+        return _read(read_toml(path, _LARGEST_BYTES))
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(text) > _LARGEST_BYTES:
-        raise ConfigurationError(f"{path}: has more than {_LARGEST_BYTES} bytes; {_MEND}")
-    try:
-        content = tomllib.loads(text.decode("utf-8"))
-        return _read(content)
-    except ValueError as error:  # of TOML, UTF-8 and the values themselves
-        said = " ".join(str(error).split())
-        raise ConfigurationError(f"{path}: {said}; {_MEND}") from error
+    except ValueError as error:  # of the file, of TOML and of the values themselves
+        raise ConfigurationError(f"{path}: {error}; {_MEND}") from error
 
 
 def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
@@ -101,17 +95,17 @@ def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
     """ValueError names the key."""
     _require_keys(content, {"version", "address", *_PARTS}, "")
     if content["version"] != _VERSION:
-        raise ValueError(f"version = {content['version']!r}; valid: {_VERSION}")
+        raise ValueError(f"version = {reprlib.repr(content['version'])}; valid: {_VERSION}")
     address = checked_address(content["address"])
     parts: dict[str, Any] = {}
     for part, kind in _PARTS.items():
         values = content[part]
         if not isinstance(values, dict):
-            raise ValueError(f"{part} = {values!r}; valid: a table")
+            raise ValueError(f"{part} = {reprlib.repr(values)}; valid: a table")
         _require_keys(values, {field.name for field in dataclasses.fields(kind)}, f"{part}.")
         for key, value in values.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise ValueError(f"{part}.{key} = {value!r}; valid: a finite number")
+                raise ValueError(f"{part}.{key} = {reprlib.repr(value)}; valid: a finite number")
         try:
             parts[part] = kind(**{key: float(value) for key, value in values.items()})
         except ValueError as error:

@@ -73,6 +73,13 @@ def test_a_write_that_fails_leaves_what_was_there(monkeypatch: pytest.MonkeyPatc
         ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "is of the controller aa:bb:cc:00:11:23"),
         ("[l2]", "[l2", "Expected"),
         ("#", "#" * 20_000, "more than 10000 bytes"),
+        ("dead_zone = 0.06", f"dead_zone = 1{400 * '0'}", "more than 64 bits"),
+        ("dead_zone = 0.06", f"dead_zone = 1{5000 * '0'}", "more than 64 bits"),
+        ("version = 1", f"version = 0x{8000 * 'f'}", "more than 64 bits"),
+        ("version = 1", f"version = {4500 * '['}", "nested too deeply"),
+        ("version = 1", f"version{4500 * '.a'} = 1", "nested too deeply"),
+        ("version = 1", f"version = '{9000 * 'a'}'", "version = 'aaa"),
+        (ADDRESS, 9000 * "a", "address = 'aaa"),
     ],
 )
 def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: str, named: str) -> None:
@@ -88,6 +95,8 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     assert str(path) in said
     assert "feelahead calibrate" in said
     assert "\n" not in said
+    assert "sys." not in said
+    assert len(said) < 500
 
 
 def test_bytes_that_are_no_text() -> None:
@@ -99,6 +108,14 @@ def test_bytes_that_are_no_text() -> None:
     path.unlink()
     path.mkdir()
     with pytest.raises(ConfigurationError, match="cannot be read"):
+        load_calibration(ADDRESS)
+
+
+def test_a_pipe_is_refused_without_waiting_for_its_writer() -> None:
+    path = calibration_path(ADDRESS)
+    path.parent.mkdir(parents=True)
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match=r"is no regular file.*delete the file"):
         load_calibration(ADDRESS)
 
 
