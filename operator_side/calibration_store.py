@@ -63,9 +63,43 @@ def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
         raise ConfigurationError(f"{path}: {error}; {_MEND}") from error
 
 
+def place_to_write(path: Path, named: str = "") -> Path:
+    """The file that `write_calibration(path, ...)` makes or replaces: `path`, or the file that a link there leads to.
+
+    ConfigurationError, with the path as `named`, where something else stands (a folder, a device, a pipe, a link to
+    nothing), or where the folder is missing: only our own are made.
+    """
+    named = named or str(path)
+    try:
+        target = path.resolve() if path.is_symlink() else path
+        if target.is_dir():
+            raise ConfigurationError(f"{named}: is a folder; valid: a file's path")
+        if target.exists():
+            if not target.is_file():
+                raise ConfigurationError(f"{named}: is no regular file; valid: a file's path")
+        elif target != path:
+            raise ConfigurationError(f"{named}: is a link to {target}, which is missing; valid: a file's path")
+        elif not (_is_ours(path) or path.absolute().parent.is_dir()):
+            raise ConfigurationError(f"{named}: there is no folder {path.absolute().parent}")
+    except (OSError, RuntimeError) as error:  # RuntimeError: links that lead to each other
+        why = error.strerror if isinstance(error, OSError) else "a link that leads to itself"
+        raise ConfigurationError(f"{named}: cannot be written: {why}") from error
+    return target
+
+
+def _is_ours(path: Path) -> bool:
+    return configuration_folder() in path.absolute().parents
+
+
 def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
-    """Write the file whole or not at all, its folders too; OSError names what the system does not let us at."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write the file whole or not at all; a link stays, and what it leads to is written.
+
+    Our own configuration folders are made. OSError names what the system does not let us at, ConfigurationError says
+    what stands in the way (see `place_to_write`).
+    """
+    if _is_ours(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    path = place_to_write(path)
     descriptor, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -94,7 +128,7 @@ def _text(address: str, calibration: TravelCalibration) -> str:
 def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
     """ValueError names the key."""
     _require_keys(content, {"version", "address", *_PARTS}, "")
-    if content["version"] != _VERSION:
+    if isinstance(content["version"], bool) or content["version"] != _VERSION:
         raise ValueError(f"version = {reprlib.repr(content['version'])}; valid: {_VERSION}")
     address = checked_address(content["address"])
     parts: dict[str, Any] = {}
