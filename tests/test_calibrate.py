@@ -2,6 +2,7 @@
 
 import math
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from feelahead.main import command
 from operator_side.calibration_procedure import CalibrationError
 from operator_side.calibration_store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.core import OperatorSide
+from operator_side.dualsense import connection
 from operator_side.dualsense.controller_state import ControllerState
 from operator_side.dualsense.input_report import build_input_report
 from operator_side.dualsense.output_report import RELEASED, build_output_report
@@ -184,3 +186,38 @@ def test_a_broken_file_ends_the_operator_side_in_one_line(operator: Callable[...
     with pytest.raises(ConfigurationError, match="feelahead calibrate") as caught:
         operator()
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    handle = FakeHandle()
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": handle}})
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    taken: list[TravelCalibration] = []
+
+    def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
+        """Each time that it is found, something else is stored and it is unplugged; the third time is the last."""
+        taken.append(calibration)
+        if len(taken) == 1:
+            calibration_path(ADDRESS).write_text("version = 7")
+        elif len(taken) == 2:
+            write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+        else:
+            signal.raise_signal(signal.SIGTERM)
+        handle.plugged_in = False
+
+    def controller_lost(_: OperatorSide, now_s: float) -> None:
+        del now_s
+        handle.plugged_in = True
+
+    monkeypatch.setattr(OperatorSide, "calibrate", calibrate)
+    monkeypatch.setattr(OperatorSide, "controller_lost", controller_lost)
+    monkeypatch.setattr(connection, "LOOK_PERIOD_S", 0.01)
+    options = ["--connect", "tcp://127.0.0.1:9", "--duration", "60", "--no-haptics"]
+    assert operator_side.main.command(options, backend) == 0
+    assert taken == [MEASURED, TravelCalibration(), MEASURED]
+    said = capsys.readouterr().out
+    assert said.count(f"{calibration_path(ADDRESS)}: ") == 1
+    assert "its travel is read by the defaults" in said
+    assert said.count(f"its travel calibration: {calibration_path(ADDRESS)}") == 2
