@@ -6,7 +6,6 @@ import io
 import re
 import signal
 import sys
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -16,10 +15,12 @@ import tyro
 
 from common.errors import ConfigurationError, FeelaheadError
 from common.stop_signal import STOP_SIGNALS
+from common.toml_file import read_toml
 
 Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
+_LARGEST_CONFIG_BYTES = 1_000_000
 
 
 def parse_settings(settings_type: type[Settings], program: str, arguments: Sequence[str]) -> Settings:
@@ -62,18 +63,18 @@ def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str
     said |= {name.removeprefix("no_") for name in said}
     if (path := _config_path(arguments)) is not None:
         with contextlib.suppress(OSError, ValueError):  # parse_settings has said what is wrong with it
-            said |= set(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+            said |= set(read_toml(Path(path), _LARGEST_CONFIG_BYTES))
     return frozenset(said & set(hints))
 
 
 def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
     """Read `settings_type` from a TOML file; ConfigurationError names the file, the key and what is valid."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = read_toml(path, _LARGEST_CONFIG_BYTES)
     except OSError as error:
         raise ConfigurationError(f"--config {path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"--config {path}: is no valid TOML: {error}") from error
+    except ValueError as error:
+        raise ConfigurationError(f"--config {path}: {error}") from error
     _refuse_unknown_keys(content, settings_type, path, "")
     try:
         return msgspec.convert(content, settings_type, dec_hook=_from_toml)
@@ -131,7 +132,7 @@ def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path
     for key, value in content.items():
         if key not in hints:
             raise ConfigurationError(
-                f"--config {path}: unknown key {prefix + key!r}; valid: {', '.join(sorted(hints))}"
+                f"--config {path}: unknown key {_shortened(prefix + key)!r}; valid: {', '.join(sorted(hints))}"
             )
         if isinstance(value, dict) and dataclasses.is_dataclass(hints[key]):
             _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.")

@@ -17,7 +17,7 @@ from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
 from common.stop_signal import StopSignal
 from feelahead.calibration_screen import calibration_lines, calibration_screen
 from operator_side.calibration_procedure import CalibrationProcedure, Step
-from operator_side.calibration_store import calibration_path, write_calibration
+from operator_side.calibration_store import calibration_path, place_to_write, write_calibration
 from operator_side.dualsense.controller_state import ControllerState
 from operator_side.dualsense.device import load_backend
 from operator_side.dualsense.finding import find_controller
@@ -43,16 +43,14 @@ class CalibrateSettings:
     device: Literal["hid", "simulated"] = "hid"
     """A real controller, or a simulated one with simulated hands, of which nothing is kept but with --out."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Write it there instead."""
-
-    def __post_init__(self) -> None:
-        if self.out is not None and self.out.is_dir():
-            raise ValueError(f"--out {self.out}: is a folder; valid: a file's path")
+    """Write it there instead: a new file in a folder that is there, or one that is replaced."""
 
 
 def calibrate(arguments: Sequence[str]) -> int:
     """Run the calibration; exit code 1 when it was given up, and nothing is stored."""
     settings = parse_settings(CalibrateSettings, "feelahead calibrate", arguments)
+    if settings.out is not None:
+        place_to_write(settings.out, f"--out {settings.out}")
     clock: Clock
     if settings.device == "simulated":
         clock, simulated = VirtualClock(), SimulatedDualSense()
@@ -74,6 +72,8 @@ def calibrate(arguments: Sequence[str]) -> int:
                     f"{controller.name} does not tell its address, by which a calibration is kept; valid: a controller"
                     " that does"
                 )
+            if kept_at is not None:
+                place_to_write(kept_at)  # before the hands have worked for it
             console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
             with _Screen(console) as show:
                 done = _measure(controller.device, procedure, clock, hands, stop, show)

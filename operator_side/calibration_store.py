@@ -8,18 +8,18 @@ The address is written with dashes in the file's name, because colons are not al
 import dataclasses
 import math
 import os
-import re
+import reprlib
 import tempfile
-import tomllib
 from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
+from common.toml_file import read_toml
 from common.user_folders import configuration_folder
+from operator_side.dualsense.address import checked_address
 from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _VERSION: Final = 1
-_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 _PARTS: Final[dict[str, type[TriggerTravel] | type[StickRest]]] = {
     "l2": TriggerTravel,
     "r2": TriggerTravel,
@@ -32,9 +32,7 @@ _MEND: Final = "measure it anew with: feelahead calibrate; or delete the file fo
 
 def calibration_path(address: str) -> Path:
     """Where the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff") is; ValueError for another form."""
-    if not _ADDRESS.fullmatch(address):
-        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
-    return configuration_folder() / "controllers" / f"{address.replace(':', '-')}.toml"
+    return configuration_folder() / "controllers" / f"{checked_address(address).replace(':', '-')}.toml"
 
 
 def load_calibration(address: str) -> TravelCalibration | None:
@@ -58,23 +56,50 @@ def load_calibration(address: str) -> TravelCalibration | None:
 def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
     """Address and calibration in the file `path`; ConfigurationError, in one line, when it is broken."""
     try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST_BYTES + 1)
+        return _read(read_toml(path, _LARGEST_BYTES))
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(text) > _LARGEST_BYTES:
-        raise ConfigurationError(f"{path}: has more than {_LARGEST_BYTES} bytes; {_MEND}")
+    except ValueError as error:  # of the file, of TOML and of the values themselves
+        raise ConfigurationError(f"{path}: {error}; {_MEND}") from error
+
+
+def place_to_write(path: Path, named: str = "") -> Path:
+    """The file that `write_calibration(path, ...)` makes or replaces: `path`, or the file that a link there leads to.
+
+    ConfigurationError, with the path as `named`, where something else stands (a folder, a device, a pipe, a link to
+    nothing), or where the folder is missing: only our own are made.
+    """
+    named = named or str(path)
     try:
-        content = tomllib.loads(text.decode("utf-8"))
-        return _read(content)
-    except ValueError as error:  # of TOML, UTF-8 and the values themselves
-        said = " ".join(str(error).split())
-        raise ConfigurationError(f"{path}: {said}; {_MEND}") from error
+        target = path.resolve() if path.is_symlink() else path
+        if target.is_dir():
+            raise ConfigurationError(f"{named}: is a folder; valid: a file's path")
+        if target.exists():
+            if not target.is_file():
+                raise ConfigurationError(f"{named}: is no regular file; valid: a file's path")
+        elif target != path:
+            raise ConfigurationError(f"{named}: is a link to {target}, which is missing; valid: a file's path")
+        elif not (_is_ours(path) or path.absolute().parent.is_dir()):
+            raise ConfigurationError(f"{named}: there is no folder {path.absolute().parent}")
+    except (OSError, RuntimeError) as error:  # RuntimeError: links that lead to each other
+        why = error.strerror if isinstance(error, OSError) else "a link that leads to itself"
+        raise ConfigurationError(f"{named}: cannot be written: {why}") from error
+    return target
+
+
+def _is_ours(path: Path) -> bool:
+    return configuration_folder() in path.absolute().parents
 
 
 def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
-    """Write the file whole or not at all, its folders too; OSError names what the system does not let us at."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write the file whole or not at all; a link stays, and what it leads to is written.
+
+    Our own configuration folders are made. OSError names what the system does not let us at, ConfigurationError says
+    what stands in the way (see `place_to_write`).
+    """
+    if _is_ours(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    path = place_to_write(path)
     descriptor, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -103,20 +128,18 @@ def _text(address: str, calibration: TravelCalibration) -> str:
 def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
     """ValueError names the key."""
     _require_keys(content, {"version", "address", *_PARTS}, "")
-    if content["version"] != _VERSION:
-        raise ValueError(f"version = {content['version']!r}; valid: {_VERSION}")
-    address = content["address"]
-    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
-        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
+    if isinstance(content["version"], bool) or content["version"] != _VERSION:
+        raise ValueError(f"version = {reprlib.repr(content['version'])}; valid: {_VERSION}")
+    address = checked_address(content["address"])
     parts: dict[str, Any] = {}
     for part, kind in _PARTS.items():
         values = content[part]
         if not isinstance(values, dict):
-            raise ValueError(f"{part} = {values!r}; valid: a table")
+            raise ValueError(f"{part} = {reprlib.repr(values)}; valid: a table")
         _require_keys(values, {field.name for field in dataclasses.fields(kind)}, f"{part}.")
         for key, value in values.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise ValueError(f"{part}.{key} = {value!r}; valid: a finite number")
+                raise ValueError(f"{part}.{key} = {reprlib.repr(value)}; valid: a finite number")
         try:
             parts[part] = kind(**{key: float(value) for key, value in values.items()})
         except ValueError as error:

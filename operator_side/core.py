@@ -14,9 +14,8 @@ from common.link_end import LinkEnd
 from common.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.session import OWNING, SessionState
 from common.statistics import RunningStatistics
-from operator_side.dualsense.effects import Off
 from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble, build_output_report
+from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report
 from operator_side.travel_calibration import TravelCalibration
 from operator_side.trigger_motion import OperatorIntent, operator_intent
 from operator_side.trigger_rendering import RenderingSettings, TriggerRendering
@@ -213,23 +212,19 @@ class OperatorSide:
         if felt is not None and felt.state != "armed":
             felt = None
         wanted = self._rendering.render(felt, now_s)
-        if self._written is None:
-            # Nobody knows what the triggers do: released first, then as they should be.
-            self._write_bound.allows(now_s, releasing=True)
-            self._written, self.writes = RELEASED, self.writes + 1
-            return build_output_report(RELEASED)
-        before = self._written
-        if wanted == before:
+        if wanted == self._written:
             return None
+        before, shown = self._written, self._write_bound.next(self._written, wanted, now_s)
+        if shown is None:
+            return None
+        self._written, self.writes = shown, self.writes + 1
+        if before is None:
+            return build_output_report(shown)
         change = OutputReport(
-            l2=wanted.l2 if wanted.l2 != before.l2 else None,
-            r2=wanted.r2 if wanted.r2 != before.r2 else None,
-            rumble=wanted.rumble if wanted.rumble != before.rumble else None,
+            l2=shown.l2 if shown.l2 != before.l2 else None,
+            r2=shown.r2 if shown.r2 != before.r2 else None,
+            rumble=shown.rumble if shown.rumble != before.rumble else None,
         )
-        releasing = change.l2 == Off() or change.r2 == Off() or change.rumble == Rumble()
-        if not self._write_bound.allows(now_s, releasing=releasing):
-            return None
-        self._written, self.writes = wanted, self.writes + 1
         return build_output_report(change)
 
     def status(self, now_s: float) -> dict[str, float | str | None]:

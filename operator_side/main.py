@@ -11,7 +11,7 @@ from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
 from common.command_line import given_fields, parse_settings, run_command
-from common.errors import FeelaheadError
+from common.errors import ConfigurationError, FeelaheadError
 from common.garbage import IdleCollection
 from common.link_model import DelayLine, link_summary, unused_clauses
 from common.pacing import Pacer, wait_for_turn
@@ -191,15 +191,26 @@ class _Loop:
             self._line.push(now_s, payload)
 
     def _calibrate(self) -> None:
-        """Once for each time that a controller is found; ConfigurationError for a stored calibration that is broken."""
+        """Once for each time that a controller is found.
+
+        ConfigurationError when the run's first has a stored calibration that is broken; later it is only said.
+        """
         controller = self._connection.controller
         if controller is None or self._calibrated == self._connection.found:
             return
-        self._calibrated = self._connection.found
+        first, self._calibrated = self._calibrated == 0, self._connection.found
         self._say_what_is_new()
         if not self._stored_travel or controller.address is None:
             return
-        stored = load_calibration(controller.address)
+        try:
+            stored = load_calibration(controller.address)
+        except ConfigurationError as error:
+            if first:
+                raise
+            self._core.calibrate(TravelCalibration())
+            self._told_travel.discard(controller.address)
+            self._status.note(f"{error}; its travel is read by the defaults")
+            return
         self._core.calibrate(stored or TravelCalibration())
         if controller.address in self._told_travel:
             return

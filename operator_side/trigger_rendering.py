@@ -99,6 +99,24 @@ class RenderedTrigger:
         }
 
 
+class RumbleSelector:
+    """Danger along neither trigger to the motors' drive, with hysteresis: each change of a step is a write.
+
+    The drive changes once the exact one has left it by a whole step, so that noise of half a step to either side makes
+    no write once it has settled. Exactly 0 is always off, and 1 always full.
+    """
+
+    def __init__(self) -> None:
+        self._step = 0
+
+    def select(self, rumble: float) -> Rumble:
+        """The motors' drive for `rumble`, 0 to 1."""
+        exact = _RUMBLE_STEPS * rumble
+        if rumble == 0.0 or abs(exact - self._step) >= 1.0:
+            self._step = round(exact)
+        return Rumble(left=self._step / _RUMBLE_STEPS)
+
+
 class TriggerRendering:
     """Both triggers, and the motors for danger that lies along neither."""
 
@@ -109,18 +127,21 @@ class TriggerRendering:
         self._swap_sides = swap_sides
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
+        self._rumble = RumbleSelector()
 
     def render(self, felt: StiffnessUpdate | None, now_s: float) -> OutputReport:
         """What both triggers and the motors have to do at `now_s`; all off for None."""
         if felt is None:
-            return OutputReport(self.l2.render(0.0, None, now_s), self.r2.render(0.0, None, now_s), Rumble())
+            return OutputReport(
+                self.l2.render(0.0, None, now_s), self.r2.render(0.0, None, now_s), self._rumble.select(0.0)
+            )
         left, right = (felt.l2, felt.l2_contact), (felt.r2, felt.r2_contact)
         if self._swap_sides:
             left, right = right, left
         return OutputReport(
             l2=self.l2.render(*left, now_s),
             r2=self.r2.render(*right, now_s),
-            rumble=Rumble(left=round(felt.rumble * _RUMBLE_STEPS) / _RUMBLE_STEPS),
+            rumble=self._rumble.select(felt.rumble),
         )
 
     def summary(self) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """`feelahead calibrate`, and the operator side that uses what it has stored."""
 
 import math
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from feelahead.main import command
 from operator_side.calibration_procedure import CalibrationError
 from operator_side.calibration_store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.core import OperatorSide
+from operator_side.dualsense import connection
 from operator_side.dualsense.controller_state import ControllerState
 from operator_side.dualsense.input_report import build_input_report
 from operator_side.dualsense.output_report import RELEASED, build_output_report
@@ -81,7 +84,7 @@ def test_a_real_controller_is_measured_and_kept_by_its_address(
     assert "a full pull reaches 7 of 10 zones, in which 57 of 81 levels differ" in said
     # Nothing pushed against the fingers, and nothing is left on.
     assert set(handle.written) == {build_output_report(RELEASED)}
-    assert handle.closed == handle.times_opened
+    assert handle.closed == handle.times_opened > 0
 
 
 def test_a_simulated_controller_is_kept_only_where_asked_for(
@@ -90,7 +93,7 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
     assert command(["calibrate", "--device", "simulated"]) == 0
     assert "nothing was stored" in capsys.readouterr().out
     assert list(own_folder.iterdir()) == []
-    out = tmp_path / "new" / "mine.toml"
+    out = tmp_path / "mine.toml"
     assert command(["calibrate", "--device", "simulated", "--out", str(out)]) == 0
     _, calibration = read_calibration(out)
     assert calibration.r2 == TriggerTravel(0.03, 0.97)
@@ -102,19 +105,45 @@ def test_hands_that_do_not_pull_are_told_why_and_nothing_is_stored(handle: Playe
     with pytest.raises(CalibrationError, match="Pull L2"):
         command(["calibrate"])
     assert list(own_folder.iterdir()) == []
-    assert handle.closed == handle.times_opened
+    assert handle.closed == handle.times_opened > 0
 
 
 def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
     handle.play(lambda now_s: ControllerState() if now_s < 1.0 else None)
     with pytest.raises(DeviceError, match="said nothing for 5 s"):
         command(["calibrate"])
-    assert handle.closed == handle.times_opened
+    assert handle.closed == handle.times_opened > 0
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="is a folder"):
         command(["calibrate", "--out", str(tmp_path)])
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [("/dev/null", "is no regular file"), ("new/mine.toml", "there is no folder"), ("pipe", "is no regular file")],
+)
+def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_measured(
+    out: str, said: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    with pytest.raises(ConfigurationError, match=f"--out {out}: {said}"):
+        command(["calibrate", "--out", out])
+    assert handle.now_s == 0.0
+    assert [file.name for file in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_a_pipe_where_it_is_kept_is_refused_before_anything_is_measured(handle: PlayedHandle) -> None:
+    path = calibration_path(ADDRESS)
+    path.parent.mkdir(parents=True)
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match="is no regular file"):
+        command(["calibrate"])
+    assert handle.now_s == 0.0
+    assert handle.closed == handle.times_opened > 0
+    assert path.is_fifo()
 
 
 # The operator side
@@ -157,3 +186,38 @@ def test_a_broken_file_ends_the_operator_side_in_one_line(operator: Callable[...
     with pytest.raises(ConfigurationError, match="feelahead calibrate") as caught:
         operator()
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    handle = FakeHandle()
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": handle}})
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    taken: list[TravelCalibration] = []
+
+    def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
+        """Each time that it is found, something else is stored and it is unplugged; the third time is the last."""
+        taken.append(calibration)
+        if len(taken) == 1:
+            calibration_path(ADDRESS).write_text("version = 7")
+        elif len(taken) == 2:
+            write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+        else:
+            signal.raise_signal(signal.SIGTERM)
+        handle.plugged_in = False
+
+    def controller_lost(_: OperatorSide, now_s: float) -> None:
+        del now_s
+        handle.plugged_in = True
+
+    monkeypatch.setattr(OperatorSide, "calibrate", calibrate)
+    monkeypatch.setattr(OperatorSide, "controller_lost", controller_lost)
+    monkeypatch.setattr(connection, "LOOK_PERIOD_S", 0.01)
+    options = ["--connect", "tcp://127.0.0.1:9", "--duration", "60", "--no-haptics"]
+    assert operator_side.main.command(options, backend) == 0
+    assert taken == [MEASURED, TravelCalibration(), MEASURED]
+    said = capsys.readouterr().out
+    assert said.count(f"{calibration_path(ADDRESS)}: ") == 1
+    assert "its travel is read by the defaults" in said
+    assert said.count(f"its travel calibration: {calibration_path(ADDRESS)}") == 2

@@ -1,6 +1,7 @@
 """Calibrations on disk: by the controller's address, whole or not at all, and refused when broken."""
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from operator_side.calibration_store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.calibration_store import (
+    calibration_path,
+    load_calibration,
+    place_to_write,
+    read_calibration,
+    write_calibration,
+)
 from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 REPEATABLE = settings(derandomize=True, deadline=None)
@@ -60,6 +67,7 @@ def test_a_write_that_fails_leaves_what_was_there(monkeypatch: pytest.MonkeyPatc
     ("old", "new", "named"),
     [
         ("version = 1", "version = 2", "version = 2"),
+        ("version = 1", "version = true", "version = True"),
         ("version = 1\n", "", "version is missing"),
         ("dead_zone = 0.06", "dead_zone = 0.95", "l2: dead_zone = 0.95"),
         ("dead_zone = 0.06", "dead_zone = nan", "l2.dead_zone = nan"),
@@ -73,6 +81,13 @@ def test_a_write_that_fails_leaves_what_was_there(monkeypatch: pytest.MonkeyPatc
         ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "is of the controller aa:bb:cc:00:11:23"),
         ("[l2]", "[l2", "Expected"),
         ("#", "#" * 20_000, "more than 10000 bytes"),
+        ("dead_zone = 0.06", f"dead_zone = 1{400 * '0'}", "more than 64 bits"),
+        ("dead_zone = 0.06", f"dead_zone = 1{5000 * '0'}", "more than 64 bits"),
+        ("version = 1", f"version = 0x{8000 * 'f'}", "more than 64 bits"),
+        ("version = 1", f"version = {4500 * '['}", "nested too deeply"),
+        ("version = 1", f"version{4500 * '.a'} = 1", "nested too deeply"),
+        ("version = 1", f"version = '{9000 * 'a'}'", "version = 'aaa"),
+        (ADDRESS, 9000 * "a", "address = 'aaa"),
     ],
 )
 def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: str, named: str) -> None:
@@ -88,6 +103,8 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     assert str(path) in said
     assert "feelahead calibrate" in said
     assert "\n" not in said
+    assert "sys." not in said
+    assert len(said) < 500
 
 
 def test_bytes_that_are_no_text() -> None:
@@ -102,10 +119,89 @@ def test_bytes_that_are_no_text() -> None:
         load_calibration(ADDRESS)
 
 
+def test_a_pipe_is_refused_without_waiting_for_its_writer() -> None:
+    path = calibration_path(ADDRESS)
+    path.parent.mkdir(parents=True)
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match=r"is no regular file.*delete the file"):
+        load_calibration(ADDRESS)
+
+
 def test_a_folder_that_is_none(own_folder: Path) -> None:
     (own_folder / "feelahead").write_text("a file where a folder should be")
     with pytest.raises(ConfigurationError, match="cannot be read: Not a directory"):
         load_calibration(ADDRESS)
+
+
+def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path: Path) -> None:
+    target, near, far = tmp_path / "target.toml", tmp_path / "near.toml", tmp_path / "far" / "far.toml"
+    target.write_text("before")
+    near.symlink_to("target.toml")
+    far.parent.mkdir()
+    far.symlink_to(near)
+    write_calibration(far, ADDRESS, MEASURED)
+    assert far.is_symlink()
+    assert near.is_symlink()
+    assert not target.is_symlink()
+    assert read_calibration(target) == (ADDRESS, MEASURED)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["far", "near.toml", "target.toml"]
+
+
+def in_the_way(kind: str, path: Path) -> None:
+    """Put something where a file should be written."""
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as end:
+            end.bind(os.path.relpath(path))
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "link to a device":
+        path.symlink_to("/dev/null")
+    elif kind == "link to nothing":
+        path.symlink_to(path.parent / "gone")
+    else:
+        path.symlink_to(path.name)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("pipe", "is no regular file"),
+        ("socket", "is no regular file"),
+        ("folder", "is a folder"),
+        ("link to a device", "is no regular file"),
+        ("link to nothing", "which is missing"),
+        ("link to itself", "cannot be written"),
+    ],
+)
+def test_what_stands_in_the_way_stays_as_it_is(
+    kind: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "mine.toml"
+    in_the_way(kind, path)
+    before = path.lstat()
+    for write in (lambda: write_calibration(path, ADDRESS, MEASURED), lambda: place_to_write(path)):
+        with pytest.raises(ConfigurationError, match=said) as caught:
+            write()
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert (path.lstat().st_ino, path.lstat().st_mode) == (before.st_ino, before.st_mode)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_device_is_never_replaced() -> None:
+    with pytest.raises(ConfigurationError, match="/dev/null: is no regular file"):
+        place_to_write(Path("/dev/null"))
+
+
+def test_only_our_own_folders_are_made(tmp_path: Path, own_folder: Path) -> None:
+    with pytest.raises(ConfigurationError, match="there is no folder"):
+        write_calibration(tmp_path / "new" / "mine.toml", ADDRESS, MEASURED)
+    assert list(own_folder.iterdir()) == []
+    assert place_to_write(calibration_path(ADDRESS)) == calibration_path(ADDRESS)
+    assert list(own_folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("address", ["", "aa:bb", "../../etc/passwd", "AA:BB:CC:00:11:22", "aa-bb-cc-00-11-22"])

@@ -78,6 +78,15 @@ def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: 
         ("[camera]\nsd_m = -1.0", "sd_m = -1.0"),
         ("camera = 3", "camera"),
         ("seed = -4", "-4"),
+        ("seed = 'a\nb'", "no valid TOML"),
+        (f"probability = 1{400 * '0'}", "more than 64 bits"),
+        (f"seed = 1{5000 * '0'}", "more than 64 bits"),
+        (f"seed = 0x{5000 * 'f'}", "more than 64 bits"),
+        (f"seed = {4500 * '['}", "nested too deeply"),
+        (f"camera{4500 * '.a'} = 1", "nested too deeply"),
+        (9000 * "a" + " = 1", "unknown key"),
+        (f"[{9000 * 'a'}]\n[{9000 * 'a'}]", "no valid TOML"),
+        ("#" * 1_000_001, "more than 1000000 bytes"),
     ],
 )
 def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, content: str, named: str) -> None:
@@ -89,6 +98,15 @@ def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, conte
     assert named in text
     assert "bad.toml" in text
     assert "\n" not in text
+    assert "sys." not in text
+    assert len(text) < 1000
+
+
+def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path) -> None:
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match=r"pipe\.toml: is no regular file"):
+        parse("--config", str(path))
 
 
 def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:

@@ -89,7 +89,7 @@ def test_writes_are_bounded_the_newest_wins_and_a_release_does_not_wait(bench: B
 
 
 def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench) -> None:
-    bench.side.calibrate(TravelCalibration(r2=TriggerTravel(0.5, 0.6)))
+    bench.side.calibrate(TravelCalibration(r2=TriggerTravel(0.45, 0.65)))
     bench.device.set_finger_force(0.0, 0.5 + 4.0 * 0.75 * 0.55)
     bench.device.read(bench.now_s)
     bench.now_s += 1.0

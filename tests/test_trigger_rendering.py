@@ -14,7 +14,7 @@ from operator_side.dualsense.effects import MultiPositionFeedback, Off
 from operator_side.dualsense.output_report import RELEASED, Rumble
 from operator_side.sustained_force import SustainedForceSettings
 from operator_side.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.trigger_rendering import RenderedTrigger, RenderingSettings, TriggerRendering
+from operator_side.trigger_rendering import RenderedTrigger, RenderingSettings, RumbleSelector, TriggerRendering
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 USUAL = RenderingSettings()
@@ -130,7 +130,10 @@ def test_each_trigger_gets_its_own() -> None:
     assert wanted.l2 not in (None, Off())
     assert wanted.r2 == MultiPositionFeedback((0, 0, 0, 0, 0, 0, 0, 2, 0, 0))
     assert wanted.rumble == Rumble(left=0.5)
+    assert rendering.render(update(rumble=0.5625 - 1e-4), 1.0).rumble == Rumble(left=0.5)
+    assert rendering.render(update(rumble=0.5625 + 1e-4), 1.0).rumble == Rumble(left=0.5)
     assert rendering.render(None, 1.0) == RELEASED
+    assert rendering.render(update(rumble=0.0625), 1.0) == RELEASED
 
 
 def test_with_swapped_sides_each_gets_the_others() -> None:
@@ -140,6 +143,33 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     plain = RenderedTrigger(USUAL, calibration.l2).render(0.3, 1.0, 1.0)
     assert wanted.l2 == plain
     assert wanted.r2 == RenderedTrigger(USUAL, calibration.r2).render(0.1, None, 1.0)
+
+
+@given(st.floats(0.0, 1.0), st.integers(0, 2**32 - 1))
+@REPEATABLE
+def test_noise_of_half_a_step_does_not_shake_the_motors(rumble: float, seed: int) -> None:
+    selector = RumbleSelector()
+    noise = np.random.default_rng(seed).uniform(-0.5 / 8, 0.5 / 8, 1000)
+    drives = [selector.select(min(max(rumble + float(n), 1e-6), 1.0)).left for n in noise]
+    # It settles, at most a step away from where it began to, and then rests.
+    assert sum(a != b for a, b in itertools.pairwise(drives)) <= 2
+
+
+@given(st.lists(STIFFNESS, min_size=1), STIFFNESS)
+@REPEATABLE
+def test_after_any_past_the_motors_are_within_a_step_and_never_fall_as_danger_grows(
+    past: list[float], other: float
+) -> None:
+    one, two = RumbleSelector(), RumbleSelector()
+    for rumble in past[:-1]:
+        one.select(rumble)
+        two.select(rumble)
+    low, high = sorted((past[-1], other))
+    left = one.select(low).left, two.select(high).left
+    assert left[0] <= left[1]
+    assert abs(left[0] - low) < 1 / 8
+    assert one.select(0.0) == Rumble()
+    assert two.select(1.0) == Rumble(left=1.0)
 
 
 @pytest.mark.parametrize("stiffness", [-0.1, 1.1, math.nan])

@@ -3,12 +3,12 @@
 On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation and the controllers wiki.
 """
 
-import re
 import struct
 from dataclasses import dataclass
 from typing import Final, Self
 
 from common.errors import RemoteProtocolError
+from operator_side.dualsense.address import checked_address
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.transport import Transport, described
 
@@ -19,7 +19,6 @@ FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
 """In bytes, with the id."""
 
 _CALIBRATION: Final = struct.Struct("<17h")
-_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 _HARDWARE, _FIRMWARE, _UPDATE = 24, 28, 44
 
 Three = tuple[int, int, int]
@@ -99,11 +98,9 @@ def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
 
 def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
     """Make feature report 0x09, 20 bytes; ValueError for an address that is not "aa:bb:cc:dd:ee:ff"."""
-    if not _ADDRESS.fullmatch(address):
-        raise ValueError(f"address = {address!r}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff")
     report = bytearray(FEATURE_LENGTHS[ADDRESS_ID])
     report[0] = ADDRESS_ID
-    report[6:0:-1] = bytes.fromhex(address.replace(":", ""))
+    report[6:0:-1] = bytes.fromhex(checked_address(address).replace(":", ""))
     return _finished(report, transport)
 
 

@@ -1,0 +1,68 @@
+"""TOML files that people name or write: read whole, without waiting, and refused in one line when they are no such."""
+
+import errno
+import os
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+_LARGEST_INTEGER: Final = 2**63
+"""TOML's own range; larger ones are no numbers to whatever comes after."""
+_DEEPEST: Final = 50
+"""Levels of nesting: a handful would do, and what follows may descend into them."""
+_LONGEST_COMPLAINT: Final = 400
+_TOO_DEEP: Final = f"is nested too deeply; valid: {_DEEPEST} levels"
+_TOO_LARGE: Final = "has a whole number of more than 64 bits, which is no valid TOML"
+
+
+def read_toml(path: Path, largest_bytes: int) -> dict[str, Any]:
+    """The content of the regular file `path`.
+
+    OSError when the system does not let us at it; ValueError, in one line without the path, for what is no regular
+    file (a pipe would be waited for without end), has more than `largest_bytes`, or is no valid TOML.
+    """
+    data = _read_regular_file(path, largest_bytes)
+    try:
+        content = tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"is no valid TOML: {' '.join(str(error).split())[:_LONGEST_COMPLAINT]}") from error
+    except RecursionError as error:
+        raise ValueError(_TOO_DEEP) from error
+    except ValueError as error:
+        # Python's own limit on the digits of a number, whose text is for programmers.
+        raise ValueError(_TOO_LARGE) from error
+    _refuse_extremes(content)
+    return content
+
+
+def _read_regular_file(path: Path, largest_bytes: int) -> bytes:
+    # Windows has no such flags, and no pipes among its files either.
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+    descriptor = os.open(path, flags)
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
+        if not stat.S_ISREG(mode):
+            raise ValueError("is no regular file; valid: a file's path")
+        data = b""
+        while len(data) <= largest_bytes and (more := os.read(descriptor, largest_bytes + 1 - len(data))):
+            data += more
+    finally:
+        os.close(descriptor)
+    if len(data) > largest_bytes:
+        raise ValueError(f"has more than {largest_bytes} bytes")
+    return data
+
+
+def _refuse_extremes(content: dict[str, Any]) -> None:
+    waiting: list[tuple[Any, int]] = [(content, 0)]
+    while waiting:
+        value, depth = waiting.pop()
+        if depth > _DEEPEST:  # which dotted keys reach without the parser's minding
+            raise ValueError(_TOO_DEEP)
+        if isinstance(value, dict | list):
+            waiting += [(part, depth + 1) for part in (value.values() if isinstance(value, dict) else value)]
+        elif isinstance(value, int) and not -_LARGEST_INTEGER <= value < _LARGEST_INTEGER:
+            raise ValueError(_TOO_LARGE)
