@@ -14,7 +14,7 @@ import msgspec
 import tyro
 
 from common.errors import ConfigurationError, FeelaheadError
-from common.stop_signal import STOP_SIGNALS
+from common.stop_signal import STOP_SIGNALS, ignore_broken_output
 from common.toml_file import read_toml
 
 Settings = TypeVar("Settings")
@@ -89,6 +89,10 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except FeelaheadError as error:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
+    except BrokenPipeError:
+        # Whoever read our output has gone, as `head` does.
+        ignore_broken_output()
+        code = 0
     except OSError as error:
         if error.filename is None:
             raise

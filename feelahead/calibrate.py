@@ -34,7 +34,7 @@ _SILENT_S = 5.0
 
 @dataclass(frozen=True)
 class CalibrateSettings:
-    """Measure one controller's triggers and sticks: a minute with the controller in your hands.
+    """Measure one controller's triggers and sticks: half a minute with the controller in your hands.
 
     It says what to do, and shows what the controller reports. What it finds is kept for that controller, on USB and
     Bluetooth alike, in your configuration folder, where feelahead-operator looks for it.

@@ -150,4 +150,4 @@ def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
 def _require_keys(content: dict[str, Any], wanted: set[str], prefix: str) -> None:
     for key in sorted(content.keys() ^ wanted):
         what = "is missing" if key in wanted else "is unknown"
-        raise ValueError(f"{prefix}{key[:80]} {what}; valid: {', '.join(sorted(wanted))}")
+        raise ValueError(f"{prefix}{key[:80]} {what}; valid keys: {', '.join(sorted(wanted))}")

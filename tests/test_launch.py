@@ -111,3 +111,14 @@ def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
     with start("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") as process:
         said, complaint = process.communicate(timeout=20)
     assert (process.returncode, said, complaint) == (0, "5 ? 1 ?s\n", "")
+
+
+@pytest.mark.processes
+def test_a_reader_that_goes_away_is_no_fault() -> None:
+    code = "from common.command_line import run_command\nrun_command('x', lambda _: print('a' * 100_000) or 0)"
+    with start("-c", code) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.wait(20) == 0
+        assert process.stderr.read() == ""
