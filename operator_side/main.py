@@ -35,6 +35,8 @@ from operator_side.simulated_operator import SimulatedOperator
 from operator_side.travel_calibration import TravelCalibration
 
 MOTION_PERIOD_S = 1 / 250
+_GUARD_PERIOD_S = 0.5
+"""How often the watchdog is looked after."""
 
 
 def main() -> None:
@@ -109,7 +111,8 @@ def _find(backend: HidBackend, preferred: str | None) -> OpenController:
     found = find_controller(backend, preferred)
     if sys.platform != "linux":
         return found  # a device is read and written by one thread there
-    return dataclasses.replace(found, device=BackgroundWrites(found.device))
+    writes = BackgroundWrites(found.device)
+    return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
 class _Loop:
@@ -138,6 +141,7 @@ class _Loop:
         self._sockets = sockets
         self._connection = connection
         self._guard = guard
+        self._guard_s = 0.0
         self._person = person
         self._status = status
         self._clock = MonotonicClock()
@@ -160,6 +164,7 @@ class _Loop:
                     self._core.receive(payload, now_s)
                 for _, payload in seen:
                     self._core.receive_view(payload, now_s)
+                self._connection.beat(now_s)
                 if (output := self._core.output_report(now_s)) is not None:
                     self._connection.write(output, now_s)
                 moved = self._pacer.due(now_s)
@@ -227,9 +232,11 @@ class _Loop:
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
         self._say_what_is_new()
+        if self._guard is not None and now_s >= self._guard_s:
+            self._guard_s = now_s + _GUARD_PERIOD_S
+            for text in self._guard.take_notes():
+                self._status.note(text)
         if self._status.due(now_s):
-            if self._guard is not None and (trouble := self._guard.take_note()) is not None:
-                self._status.note(trouble)
             values: dict[str, Value] = dict(self._core.status(now_s))
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble

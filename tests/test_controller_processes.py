@@ -205,7 +205,18 @@ def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: Worl
     assert world.end() == (0, "")
 
 
-def test_a_watchdog_that_ends_before_us_is_told_of_once(world: World) -> None:
+def test_hung_its_triggers_are_released_and_told_anew_when_it_runs_on(world: World) -> None:
+    world.stiffen()
+    world.process.send_signal(signal.SIGSTOP)
+    assert world.last_written() == RELEASED
+    written = len(world.written)
+    world.process.send_signal(signal.SIGCONT)
+    world.until(lambda: any(report.r2 not in (None, Off()) for report in world.written[written:]))
+    assert world.written[written] == RELEASED
+    assert world.process.poll() is None
+
+
+def test_a_watchdog_that_ends_before_us_is_told_of_once_and_replaced(world: World) -> None:
     world.until(lambda: world.controller() == "connected")
     [watchdog] = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text().split()
     os.kill(int(watchdog), signal.SIGKILL)
@@ -213,7 +224,10 @@ def test_a_watchdog_that_ends_before_us_is_told_of_once(world: World) -> None:
     seen = len(world.events)
     world.until(lambda: len(world.events) > seen + 5)
     assert sum("watchdog" in note for note in world.notes()) == 1
-    assert world.process.poll() is None
+    world.stiffen()
+    world.process.send_signal(signal.SIGKILL)
+    assert world.end() == (-9, "")
+    assert world.last_written() == RELEASED
 
 
 def test_only_reading_starts_no_watchdog_and_writes_nothing(tmp_path: Path) -> None:

@@ -14,7 +14,13 @@ from operator_side.dualsense.device import HidDualSense, load_backend
 from operator_side.dualsense.effects import Feedback, Off
 from operator_side.dualsense.input_report import build_simple_input_report
 from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
-from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.output_report import (
+    RELEASED,
+    OutputReport,
+    Rumble,
+    build_output_report,
+    parse_output_report,
+)
 from operator_side.dualsense.transport import Transport
 from tests.fake_hid import ADDRESS, BLUETOOTH, CALIBRATION, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
 
@@ -192,6 +198,28 @@ def test_close_releases_what_was_written(transport: Transport) -> None:
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
         device.write(build_output_report(OutputReport()), 1.0)
+
+
+def test_it_is_released_when_everything_that_was_written_is_off() -> None:
+    handle = FakeHandle()
+    device = open_fake(handle)
+    steps: list[tuple[OutputReport, bool]] = [
+        (OutputReport(lightbar=(1, 2, 3)), True),
+        (STIFF, False),
+        (OutputReport(l2=Off()), False),
+        (OutputReport(rumble=Rumble(left=0.5)), False),
+        (OutputReport(r2=Off()), False),
+        (OutputReport(rumble=Rumble()), True),
+        (STIFF, False),
+        (RELEASED, True),
+    ]
+    for report, released in steps:
+        device.write(build_output_report(report), 0.0)
+        assert device.released is released
+    handle.plugged_in = False
+    with pytest.raises(DeviceError, match="gone"):
+        device.write(build_output_report(RELEASED), 0.0)
+    assert not device.released
 
 
 def test_close_leaves_a_controller_alone_that_was_only_read() -> None:

@@ -137,10 +137,11 @@ class HidDualSense:
         self._sequence = 0
         self._written = False
         self._released = True
+        self._effects: dict[str, object] = {}
 
     @property
     def released(self) -> bool:
-        """Nothing was ever written, or the triggers have been released by `close`."""
+        """Nothing that was written holds or shakes, as far as it went out."""
         return self._released
 
     def read(self, now_s: float) -> bytes | None:
@@ -172,6 +173,10 @@ class HidDualSense:
             raise ValueError(f"report: {error}") from error
         self._written, self._released = True, False
         self._send(output)
+        for name, part in (("l2", output.l2), ("r2", output.r2), ("rumble", output.rumble)):
+            if part is not None:
+                self._effects[name] = part
+        self._released = all(part == getattr(RELEASED, name) for name, part in self._effects.items())
 
     def close(self) -> None:
         """Take effects and rumble off if any were written and the controller still answers; let it go."""
