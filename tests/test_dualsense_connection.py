@@ -277,6 +277,27 @@ def test_it_comes_back(world: World) -> None:
     assert world.connection.found == 2
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "note"),
+    [
+        ("aa", "bb", "another controller: DualSense on USB"),
+        ("aa", None, "controller: DualSense on USB"),
+        (None, "bb", "controller: DualSense on USB"),
+        (None, None, "controller: DualSense on USB"),
+    ],
+)
+def test_only_the_same_one_comes_back(world: World, before: str | None, after: str | None, note: str) -> None:
+    device = FakeDevice(world.log)
+    world.search.result = OpenController(device, "DualSense on USB", before)
+    world.run(2 * TICK_S)
+    world.unplug(device)
+    world.run(1.5)
+    world.connection.take_notes()
+    world.search.result = OpenController(FakeDevice(world.log), "DualSense on USB", after)
+    world.run(LOOK_PERIOD_S + TICK_S)
+    assert world.connection.take_notes() == [note]
+
+
 def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:
     denied, other = DeviceError("no permission"), DeviceError("in use")
     for result in (denied, other, denied, NoDeviceError("none"), denied):

@@ -192,12 +192,13 @@ class Connection:
         if self._guard is not None and controller.path is not None:
             self._held = True
             self._guard.hold(controller.path, controller.release)
-        self._controller, self._address = controller, controller.address
+        known, self._address = self._address, controller.address
+        self._controller = controller
         self._handle(ConnectionEvent.OPENED)
         self.found += 1
         self._said.clear()
         self._refused = None
-        self._notes.append(f"controller: {controller.name}" + (", back again" if self.found > 1 else ""))
+        self._notes.append(_introduction(controller, known, first=self.found == 1))
         self._listener.controller_found(now_s)
 
     def _lose(self, error: DeviceError, now_s: float) -> None:
@@ -227,3 +228,12 @@ class Connection:
         if text not in self._said:
             self._said.add(text)
             self._notes.append(text)
+
+
+def _introduction(controller: OpenController, known: str | None, *, first: bool) -> str:
+    """Who it is, and whether it is the one from before, whose address is `known`."""
+    if first or known is None or controller.address is None:
+        return f"controller: {controller.name}"  # nobody can tell whether it is the same
+    if controller.address == known:
+        return f"controller: {controller.name}, back again"
+    return f"another controller: {controller.name}"
