@@ -10,7 +10,7 @@ import pytest
 
 from common.errors import ConfigurationError, DeviceError, NoDriverError
 from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidDualSense, load_backend
+from operator_side.dualsense.device import HidDualSense, load_backend, write_once
 from operator_side.dualsense.effects import Feedback, Off
 from operator_side.dualsense.input_report import build_simple_input_report
 from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
@@ -119,6 +119,40 @@ def test_reading_drains_to_the_newest(transport: Transport) -> None:
     handle.waiting = [handle.report(number) for number in range(5)]
     assert device.read(0.1) == handle.report(4)
     assert device.read(0.2) is None
+
+
+@pytest.mark.parametrize(
+    ("transport", "bad"),
+    [
+        (USB, b"\x01" + bytes(62)),
+        (USB, b"\x05" + bytes(63)),
+        (BLUETOOTH, b"\x31" + bytes(77)),
+        (BLUETOOTH, b"\x31" + bytes(10)),
+    ],
+)
+def test_a_bad_report_does_not_hide_the_good_ones_before_it(transport: Transport, bad: bytes) -> None:
+    handle = FakeHandle(transport)
+    device = open_fake(handle)
+    handle.waiting = [handle.report(1), bad, handle.report(2), bad, bad]
+    assert device.read(0.0) == handle.report(2)
+    assert device.bad_reports == 2
+    handle.waiting = [bad]
+    assert device.read(0.1) == bad  # for whoever parses it to say what is wrong
+    assert device.bad_reports == 3
+
+
+def test_writing_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = FakeHandle()
+    backend = FakeBackend({0x0CE6: {PATH: handle}})
+    monkeypatch.setattr("operator_side.dualsense.device.load_backend", lambda: backend)
+    write_once(PATH, b"report")
+    assert (handle.written, handle.closed) == ([b"report"], 1)
+    handle.plugged_in = False
+    with pytest.raises(DeviceError, match="gone"):
+        write_once(PATH, b"report")
+    assert (handle.written, handle.closed) == ([b"report"], 2)
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        write_once(b"/dev/nowhere", b"report")
 
 
 def test_draining_is_bounded() -> None:
