@@ -25,7 +25,7 @@ from operator_side.core import OperatorSide
 from operator_side.dualsense.background_writes import BackgroundWrites
 from operator_side.dualsense.connection import Connection
 from operator_side.dualsense.device import HidBackend, load_backend
-from operator_side.dualsense.finding import find_controller
+from operator_side.dualsense.finding import Finding
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.release_guard import ReleaseGuard
 from operator_side.dualsense.search import BackgroundSearch, Ready
@@ -35,6 +35,8 @@ from operator_side.simulated_operator import SimulatedOperator
 from operator_side.travel_calibration import TravelCalibration
 
 MOTION_PERIOD_S = 1 / 250
+_GUARD_PERIOD_S = 0.5
+"""How often the watchdog is looked after."""
 
 
 def main() -> None:
@@ -82,7 +84,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 loaded = load_backend() if backend is None else backend
                 # Whoever only reads leaves nothing behind.
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-                connection = Connection(BackgroundSearch(functools.partial(_find, loaded)), core, guard)
+                connection = Connection(BackgroundSearch(functools.partial(_find, Finding(loaded))), core, guard)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
@@ -105,11 +107,12 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     return 0
 
 
-def _find(backend: HidBackend, preferred: str | None) -> OpenController:
-    found = find_controller(backend, preferred)
+def _find(finding: Finding, preferred: str | None) -> OpenController:
+    found = finding(preferred)
     if sys.platform != "linux":
         return found  # a device is read and written by one thread there
-    return dataclasses.replace(found, device=BackgroundWrites(found.device))
+    writes = BackgroundWrites(found.device)
+    return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
 class _Loop:
@@ -138,6 +141,7 @@ class _Loop:
         self._sockets = sockets
         self._connection = connection
         self._guard = guard
+        self._guard_s = 0.0
         self._person = person
         self._status = status
         self._clock = MonotonicClock()
@@ -160,6 +164,7 @@ class _Loop:
                     self._core.receive(payload, now_s)
                 for _, payload in seen:
                     self._core.receive_view(payload, now_s)
+                self._connection.beat(now_s)
                 if (output := self._core.output_report(now_s)) is not None:
                     self._connection.write(output, now_s)
                 moved = self._pacer.due(now_s)
@@ -227,9 +232,11 @@ class _Loop:
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
         self._say_what_is_new()
+        if self._guard is not None and now_s >= self._guard_s:
+            self._guard_s = now_s + _GUARD_PERIOD_S
+            for text in self._guard.take_notes():
+                self._status.note(text)
         if self._status.due(now_s):
-            if self._guard is not None and (trouble := self._guard.take_note()) is not None:
-                self._status.note(trouble)
             values: dict[str, Value] = dict(self._core.status(now_s))
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble

@@ -3,11 +3,12 @@
     python plugged_operator.py FOLDER [feelahead-operator's flags]
 
 FOLDER/hidraw3 is a FIFO that gets what is written to the controller. While FOLDER/plugged exists, the controller is
-plugged in; FOLDER/broken makes reading it fail as no driver should.
+plugged in; FOLDER/broken makes reading it fail as no driver should. While FOLDER/hangs exists, no write returns.
 """
 
 import os
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,8 @@ class PluggedHandle(FakeHandle):
 
     def write(self, data: bytes) -> int:
         self._look()
+        while (FOLDER / "hangs").exists():
+            threading.Event().wait(0.01)
         return os.write(self._file, data) if self.plugged_in else -1
 
     def close(self) -> None:

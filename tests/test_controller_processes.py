@@ -17,7 +17,7 @@ import pytest
 
 from feelahead.benchmarks.stiffness_source import StiffnessSource
 from operator_side.dualsense.effects import Off
-from operator_side.dualsense.output_report import RELEASED, OutputReport, parse_output_report
+from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble, parse_output_report
 
 pytestmark = [
     pytest.mark.processes,
@@ -129,6 +129,15 @@ class World:
         os.close(self._controller)
 
 
+def stiff(report: OutputReport) -> bool:
+    return report.r2 not in (None, Off())
+
+
+def tells_all(report: OutputReport) -> bool:
+    """It is RELEASED, or what followed so soon that both went out as one."""
+    return report.l2 == Off() and report.r2 is not None and report.rumble == Rumble()
+
+
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
     with World(tmp_path) as made:
@@ -188,9 +197,8 @@ def test_unplugged_in_mid_run_it_commands_nothing_and_is_found_again(world: Worl
     written = len(world.written)
     world.plug(True)
     # The robot side still says that it is armed: until it has stopped, nothing is commanded.
-    world.until(lambda: world.controller() == "connected" and len(world.written) >= written + 2)
-    assert world.written[written] == RELEASED
-    assert world.written[written + 1].r2 not in (None, Off())
+    world.until(lambda: world.controller() == "connected" and any(map(stiff, world.written[written:])))
+    assert tells_all(world.written[written])
     assert world.source.commands == commands
     world.source.state = "disarmed"
     world.until(lambda: world.source.commands > commands + 10)
@@ -205,7 +213,30 @@ def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: Worl
     assert world.end() == (0, "")
 
 
-def test_a_watchdog_that_ends_before_us_is_told_of_once(world: World) -> None:
+def test_hung_its_triggers_are_released_and_told_anew_when_it_runs_on(world: World) -> None:
+    world.stiffen()
+    world.process.send_signal(signal.SIGSTOP)
+    assert world.last_written() == RELEASED
+    written = len(world.written)
+    world.process.send_signal(signal.SIGCONT)
+    world.until(lambda: any(stiff(report) for report in world.written[written:]))
+    assert tells_all(world.written[written])
+    assert world.process.poll() is None
+
+
+def test_released_while_a_write_does_not_return_and_told_anew_when_it_does(world: World, tmp_path: Path) -> None:
+    world.stiffen()
+    (tmp_path / "hangs").touch()
+    world.source.r2 = 0.4  # what to write
+    world.until(lambda: world.written[-1] == RELEASED)
+    world.until(lambda: any("does not return" in note for note in world.notes()))
+    written = len(world.written)
+    (tmp_path / "hangs").unlink()
+    world.until(lambda: any(map(tells_all, world.written[written:])) and stiff(world.written[-1]))
+    assert world.process.poll() is None
+
+
+def test_a_watchdog_that_ends_before_us_is_told_of_once_and_replaced(world: World) -> None:
     world.until(lambda: world.controller() == "connected")
     [watchdog] = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text().split()
     os.kill(int(watchdog), signal.SIGKILL)
@@ -213,7 +244,10 @@ def test_a_watchdog_that_ends_before_us_is_told_of_once(world: World) -> None:
     seen = len(world.events)
     world.until(lambda: len(world.events) > seen + 5)
     assert sum("watchdog" in note for note in world.notes()) == 1
-    assert world.process.poll() is None
+    world.stiffen()
+    world.process.send_signal(signal.SIGKILL)
+    assert world.end() == (-9, "")
+    assert world.last_written() == RELEASED
 
 
 def test_only_reading_starts_no_watchdog_and_writes_nothing(tmp_path: Path) -> None:

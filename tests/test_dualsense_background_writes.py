@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from common.errors import DeviceError
-from operator_side.dualsense.background_writes import BackgroundWrites
+from operator_side.dualsense.background_writes import STALL_S, BackgroundWrites
 from operator_side.dualsense.effects import Feedback, Off
 from operator_side.dualsense.output_report import (
     RELEASED,
@@ -77,6 +77,28 @@ def test_what_waits_is_merged_and_the_newest_wins(device: SlowDevice) -> None:
     assert not writes.released
     writes.close()
     assert writes.released
+
+
+def test_one_that_does_not_return_stalls_and_nothing_counts_as_released(device: SlowDevice) -> None:
+    writes = BackgroundWrites(device)
+    assert writes.released
+    assert not writes.stalls(100.0)
+    writes.write(L2, 0.0)
+    assert not writes.released
+    assert device.entered.acquire(timeout=LIMIT_S)
+    assert not writes.released
+    assert not writes.stalls(STALL_S)
+    assert writes.stalls(2 * STALL_S)
+    device.let.release()
+    assert device.done.acquire(timeout=LIMIT_S)
+    device.released = True  # as after an effect of none
+    writes.write(L2, 0.1)
+    assert device.entered.acquire(timeout=LIMIT_S)
+    assert not writes.stalls(0.1 + STALL_S / 2)
+    device.let.release()
+    writes.close()
+    assert writes.released
+    assert not writes.stalls(100.0)
 
 
 def test_a_close_drops_what_waits_and_releases(device: SlowDevice) -> None:

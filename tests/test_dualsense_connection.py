@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
 from operator_side.dualsense.connection import (
+    BEAT_PERIOD_S,
     LOOK_PERIOD_S,
+    RETELL_AFTER_S,
     TABLE,
     Connection,
     ConnectionEvent,
@@ -94,6 +96,12 @@ class World:
     def let_go(self) -> None:
         self.log.append("let go")
 
+    def beat(self) -> None:
+        self.log.append("beat")
+
+    def rest(self) -> None:
+        self.log.append("rest")
+
     # The world
 
     def plug_in(self, path: str = "/dev/hidraw3") -> FakeDevice:
@@ -108,6 +116,7 @@ class World:
     def run(self, duration_s: float) -> None:
         for _ in range(round(duration_s / TICK_S)):
             self.now_s += TICK_S
+            self.connection.beat(self.now_s)
             self.connection.update(self.now_s)
             self.connection.read(self.now_s)
 
@@ -152,7 +161,71 @@ def test_one_appears(world: World) -> None:
 def test_the_watchdog_knows_before_anything_is_written(world: World) -> None:
     world.connected()
     world.connection.write(b"stiff", world.now_s)
-    assert world.log == ["hold /dev/hidraw3 off", "found", "write stiff"]
+    assert world.log == ["hold /dev/hidraw3 off", "found", "beat", "write stiff"]
+
+
+def test_while_an_effect_is_on_it_beats_and_at_rest_it_does_not(world: World) -> None:
+    device = world.connected()
+    world.run(3.0)
+    assert "beat" not in world.log
+    world.connection.write(b"stiff", world.now_s)
+    world.log.clear()
+    world.run(3.0)
+    assert set(world.log) == {"beat"}
+    assert 0.9 * 3.0 / BEAT_PERIOD_S <= len(world.log) <= 3.0 / BEAT_PERIOD_S
+    device.released = True
+    world.log.clear()
+    world.run(3.0)
+    assert world.log == ["rest"]
+    world.connection.write(b"stiff", world.now_s)
+    assert world.log == ["rest", "beat", "write stiff"]
+
+
+def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
+    world.connected()
+    world.connection.write(b"stiff", world.now_s)
+    world.run(1.0)
+    world.log.clear()
+    world.now_s += RETELL_AFTER_S
+    world.run(TICK_S)
+    assert world.log == ["beat", "found"]
+    world.run(1.0)
+    assert set(world.log[2:]) == {"beat"}
+    assert world.connection.found == 1
+
+
+def test_a_silence_at_rest_is_none(world: World) -> None:
+    world.connected()
+    world.log.clear()
+    world.now_s += 10.0
+    world.run(1.0)
+    assert world.log == []
+
+
+def test_a_write_that_does_not_return_is_a_silence(world: World) -> None:
+    stalls = False
+    device = FakeDevice(world.log)
+    world.search.result = OpenController(device, "DualSense on USB", "aa", b"/dev/hidraw3", b"off", lambda _: stalls)
+    world.run(2 * TICK_S)
+    world.connection.write(b"stiff", world.now_s)
+    world.connection.take_notes()
+    world.log.clear()
+    stalls = True
+    world.run(3.0)
+    assert world.log == []
+    [note] = world.connection.take_notes()
+    assert "does not return" in note
+    stalls = False
+    world.run(TICK_S)
+    assert world.log == ["beat", "found"]
+
+
+def test_what_nobody_watches_over_gets_no_beats(world: World) -> None:
+    world.search.result = OpenController(FakeDevice(world.log), "simulated DualSense")
+    world.run(1.0)
+    world.connection.write(b"stiff", world.now_s)
+    world.run(1.0)
+    assert world.log == ["found", "write stiff"]
 
 
 def test_no_look_while_there_is_one(world: World) -> None:
@@ -202,6 +275,27 @@ def test_it_comes_back(world: World) -> None:
     assert world.log == ["hold /dev/hidraw7 off", "found"]
     assert world.connection.take_notes() == ["controller: DualSense on USB, back again"]
     assert world.connection.found == 2
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "note"),
+    [
+        ("aa", "bb", "another controller: DualSense on USB"),
+        ("aa", None, "controller: DualSense on USB"),
+        (None, "bb", "controller: DualSense on USB"),
+        (None, None, "controller: DualSense on USB"),
+    ],
+)
+def test_only_the_same_one_comes_back(world: World, before: str | None, after: str | None, note: str) -> None:
+    device = FakeDevice(world.log)
+    world.search.result = OpenController(device, "DualSense on USB", before)
+    world.run(2 * TICK_S)
+    world.unplug(device)
+    world.run(1.5)
+    world.connection.take_notes()
+    world.search.result = OpenController(FakeDevice(world.log), "DualSense on USB", after)
+    world.run(LOOK_PERIOD_S + TICK_S)
+    assert world.connection.take_notes() == [note]
 
 
 def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:

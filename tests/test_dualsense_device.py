@@ -10,11 +10,17 @@ import pytest
 
 from common.errors import ConfigurationError, DeviceError, NoDriverError
 from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidDualSense, load_backend
+from operator_side.dualsense.device import HidDualSense, load_backend, write_once
 from operator_side.dualsense.effects import Feedback, Off
 from operator_side.dualsense.input_report import build_simple_input_report
 from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
-from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.output_report import (
+    RELEASED,
+    OutputReport,
+    Rumble,
+    build_output_report,
+    parse_output_report,
+)
 from operator_side.dualsense.transport import Transport
 from tests.fake_hid import ADDRESS, BLUETOOTH, CALIBRATION, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
 
@@ -115,6 +121,40 @@ def test_reading_drains_to_the_newest(transport: Transport) -> None:
     assert device.read(0.2) is None
 
 
+@pytest.mark.parametrize(
+    ("transport", "bad"),
+    [
+        (USB, b"\x01" + bytes(62)),
+        (USB, b"\x05" + bytes(63)),
+        (BLUETOOTH, b"\x31" + bytes(77)),
+        (BLUETOOTH, b"\x31" + bytes(10)),
+    ],
+)
+def test_a_bad_report_does_not_hide_the_good_ones_before_it(transport: Transport, bad: bytes) -> None:
+    handle = FakeHandle(transport)
+    device = open_fake(handle)
+    handle.waiting = [handle.report(1), bad, handle.report(2), bad, bad]
+    assert device.read(0.0) == handle.report(2)
+    assert device.bad_reports == 2
+    handle.waiting = [bad]
+    assert device.read(0.1) == bad  # for whoever parses it to say what is wrong
+    assert device.bad_reports == 3
+
+
+def test_writing_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = FakeHandle()
+    backend = FakeBackend({0x0CE6: {PATH: handle}})
+    monkeypatch.setattr("operator_side.dualsense.device.load_backend", lambda: backend)
+    write_once(PATH, b"report")
+    assert (handle.written, handle.closed) == ([b"report"], 1)
+    handle.plugged_in = False
+    with pytest.raises(DeviceError, match="gone"):
+        write_once(PATH, b"report")
+    assert (handle.written, handle.closed) == ([b"report"], 2)
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        write_once(b"/dev/nowhere", b"report")
+
+
 def test_draining_is_bounded() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
@@ -192,6 +232,28 @@ def test_close_releases_what_was_written(transport: Transport) -> None:
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
         device.write(build_output_report(OutputReport()), 1.0)
+
+
+def test_it_is_released_when_everything_that_was_written_is_off() -> None:
+    handle = FakeHandle()
+    device = open_fake(handle)
+    steps: list[tuple[OutputReport, bool]] = [
+        (OutputReport(lightbar=(1, 2, 3)), True),
+        (STIFF, False),
+        (OutputReport(l2=Off()), False),
+        (OutputReport(rumble=Rumble(left=0.5)), False),
+        (OutputReport(r2=Off()), False),
+        (OutputReport(rumble=Rumble()), True),
+        (STIFF, False),
+        (RELEASED, True),
+    ]
+    for report, released in steps:
+        device.write(build_output_report(report), 0.0)
+        assert device.released is released
+    handle.plugged_in = False
+    with pytest.raises(DeviceError, match="gone"):
+        device.write(build_output_report(RELEASED), 0.0)
+    assert not device.released
 
 
 def test_close_leaves_a_controller_alone_that_was_only_read() -> None:

@@ -101,7 +101,13 @@ def test_a_strange_address_is_not_built(address: str) -> None:
 def test_values_that_do_not_fit() -> None:
     with pytest.raises(ValueError, match="update_version = 65536"):
         Firmware(0, 0, 65536)
-    with pytest.raises(ValueError, match="gyro_plus = "):
+    with pytest.raises(ValueError, match=r"gyro_plus\[1\] = 40000"):
         CalibrationReport((0, 0, 0), (0, 40_000, 0), (0, 0, 0), 0, 0, (0, 0, 0), (0, 0, 0))
+    with pytest.raises(ValueError, match=r"hardware_version = 0\.5; valid: an integer"):
+        Firmware(0.5, 0, 0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"gyro_bias\[1\] = 0.5"):
+        CalibrationReport((0, 0.5, 0), (0, 0, 0), (0, 0, 0), 0, 0, (0, 0, 0), (0, 0, 0))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"speed_plus = 0\.5"):
+        CalibrationReport((0, 0, 0), (0, 0, 0), (0, 0, 0), 0.5, 0, (0, 0, 0), (0, 0, 0))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="speed_minus = 32768"):
         CalibrationReport((0, 0, 0), (0, 0, 0), (0, 0, 0), 0, 32768, (0, 0, 0), (0, 0, 0))

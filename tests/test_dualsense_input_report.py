@@ -1,5 +1,6 @@
 """Input reports: every field in its place on both transports, round trips, one error for all that is no report."""
 
+from random import Random
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from operator_side.dualsense.controller_state import Button, ControllerState, Tr
 from operator_side.dualsense.input_report import (
     build_input_report,
     build_simple_input_report,
+    is_input_report,
     parse_input_report,
 )
 from operator_side.dualsense.transport import Transport
@@ -263,3 +265,24 @@ def test_a_bluetooth_report_with_a_wrong_bit_is_refused(block: bytes, bit: int) 
     report[bit // 8] ^= 1 << bit % 8
     with pytest.raises(RemoteProtocolError, match="checksum" if bit >= 8 else "id 0x"):
         parse_input_report(bytes(report))
+
+
+@given(
+    st.sampled_from([b"\x01", b"\x31", b"\x02", b""]),
+    st.sampled_from([0, 9, 10, 63, 64, 77]),
+    st.randoms(),
+    st.booleans(),
+)
+@REPEATABLE
+def test_what_can_be_parsed_is_known_without_parsing(
+    report_id: bytes, length: int, random: Random, with_checksum: bool
+) -> None:
+    report = report_id + random.randbytes(length)
+    if with_checksum and length > 4:
+        report = sealed(Seed.INPUT, report[:-4])
+    try:
+        parse_input_report(report)
+    except RemoteProtocolError:
+        assert not is_input_report(report)
+    else:
+        assert is_input_report(report)

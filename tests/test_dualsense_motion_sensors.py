@@ -109,10 +109,18 @@ def test_beyond_the_range_is_its_end() -> None:
     assert NOMINAL_MOTION.gyro_counts((1e9, -1e9, 0.0)) == (32767, -32768, 0)
 
 
+def test_a_tiny_scale_reaches_the_end_of_the_range() -> None:
+    tiny = MotionCalibration((5e-324,) * 3, (5e-324,) * 3)
+    assert tiny.gyro_counts((1e308, -1e308, 0.0)) == (32767, -32768, 0)
+    assert tiny.acceleration_counts((1e308, -1e308, 0.0)) == (32767, -32768, 0)
+
+
 def test_arguments_out_of_range() -> None:
     with pytest.raises(ValueError, match="gyro_rad_s = "):
         MotionCalibration(gyro_rad_s=(0.0, 1.0, 1.0))
     with pytest.raises(ValueError, match="acceleration_m_s2 = "):
         MotionCalibration(acceleration_m_s2=(1.0, float("nan"), 1.0))
+    with pytest.raises(ValueError, match="acceleration_m_s2 = "):
+        MotionCalibration(acceleration_m_s2=(1.0, 1e308, 1.0))  # its readings would be infinite
     with pytest.raises(ValueError, match="acceleration_zero = "):
         MotionCalibration(acceleration_zero=(float("nan"), 0.0, 0.0))

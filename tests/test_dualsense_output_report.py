@@ -206,8 +206,11 @@ def test_nothing_but_the_effect_values_can_choose_a_code() -> None:
 @pytest.mark.parametrize(
     ("fields", "name"),
     [
-        ({"lightbar": (0, 0, 256)}, "lightbar"),
+        ({"lightbar": (0, 0, 256)}, r"lightbar\[2\]"),
         ({"lightbar": (0, 0)}, "lightbar"),
+        ({"lightbar": 5}, "lightbar"),
+        ({"rumble": 0.5}, "rumble"),
+        ({"player_leds": 0.5}, "player_leds"),
         ({"player_leds": 32}, "player_leds"),
         ({"mute_led": 1}, "mute_led"),
         ({"trigger_power_reduction": 8}, "trigger_power_reduction"),
@@ -229,3 +232,5 @@ def test_rumble_out_of_range() -> None:
 def test_sequence_out_of_range() -> None:
     with pytest.raises(ValueError, match="sequence = 16"):
         build_output_report(FULL, Transport.BLUETOOTH, 16)
+    with pytest.raises(ValueError, match=r"sequence = 0\.5"):
+        build_output_report(FULL, Transport.BLUETOOTH, 0.5)  # type: ignore[arg-type]

@@ -11,8 +11,8 @@ from types import TracebackType
 
 import pytest
 
-from operator_side.dualsense.release_guard import ReleaseGuard
-from operator_side.dualsense.release_watchdog import LinuxTarget
+from operator_side.dualsense.release_guard import MOST_REPLACEMENTS, ReleaseGuard
+from operator_side.dualsense.release_watchdog import SILENCE_S, LinuxTarget, Watch
 
 pytestmark = [
     pytest.mark.processes,
@@ -63,6 +63,11 @@ with ReleaseGuard() as guard:
             guard.hold(path.encode(), report)
         elif action == "let-go":
             guard.let_go()
+        elif action == "beat":
+            guard.beat()
+        elif action == "beat-and-rest":
+            guard.beat()
+            guard.rest()
         elif action == "leave":
             break
         print("done", flush=True)
@@ -140,7 +145,9 @@ def test_a_killed_operator_leaves_a_released_controller_and_no_orphan(
     assert controller.written(0.0) == b""
 
 
-def test_nothing_is_written_while_the_parent_lives(parent: Parent, controller: FakeController) -> None:
+def test_nothing_is_written_while_the_parent_lives_and_nothing_is_on(
+    parent: Parent, controller: FakeController
+) -> None:
     parent.say(f"hold {os.fsdecode(controller.path)}")
     wait_until_open(parent.watchdog_id, controller.path)
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
@@ -148,6 +155,47 @@ def test_nothing_is_written_while_the_parent_lives(parent: Parent, controller: F
     assert controller.written(0.3) == b""
     parent.kill()
     assert controller.written(LIMIT_S) == REPORT
+
+
+def test_when_the_beats_cease_it_releases_once_for_each_silence(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    for _ in range(2):
+        parent.say("beat")
+        assert controller.written(LIMIT_S) == REPORT
+        assert controller.written(3 * SILENCE_S) == b""
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+
+
+def test_at_rest_no_beat_is_missed(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    parent.say("beat-and-rest")
+    assert controller.written(3 * SILENCE_S) == b""
+
+
+def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
+    with FakeController(tmp_path / "hidraw3") as controller, (tmp_path / "answers").open("wb", 0) as answers:
+        watched = Watch(answers.fileno())
+        hold = f"hold {controller.path.hex()} {REPORT.hex()}".encode()
+        watched.follow(b"beat", 1.0)  # of whatever was held before
+        watched.follow(hold, 1.0)
+        assert watched.patience_s(1.0) is None
+        watched.follow(b"beat", 2.0)
+        assert watched.patience_s(2.05) == pytest.approx(SILENCE_S - 0.05)
+        assert watched.patience_s(3.0) == 0.0
+        watched.follow(b"nonsense", 3.0)
+        watched.follow(b"rest", 3.0)
+        assert watched.patience_s(3.0) is None
+        watched.follow(b"beat", 4.0)
+        watched.release()
+        assert (controller.written(0.0), watched.patience_s(4.0)) == (REPORT, None)
+        watched.follow(b"beat", 5.0)
+        watched.follow(b"let-go", 5.0)
+        watched.release()
+        assert (controller.written(0.0), watched.patience_s(5.0)) == (b"", None)
+        watched.follow(b"hold " + bytes(tmp_path / "nothing").hex().encode() + b" 00", 6.0)
+        assert (tmp_path / "answers").read_bytes() == b"held\nrefused\n"
 
 
 @pytest.mark.parametrize("last_words", [[], ["hold {path}", "let-go"]])
@@ -227,6 +275,52 @@ def test_without_a_watchdog_the_guard_says_so_and_goes_on(controller: FakeContro
         assert not guard.running
         guard.hold(controller.path, REPORT)
         guard.let_go()
+
+
+def end_watchdog(guard: ReleaseGuard) -> None:
+    assert guard.process_id is not None
+    os.kill(guard.process_id, signal.SIGKILL)
+    wait_for_end(guard.process_id)
+
+
+def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        guard.hold(controller.path, REPORT)
+        first = guard.process_id
+        end_watchdog(guard)
+        assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
+        assert guard.take_notes() == []
+        assert guard.running
+        assert guard.process_id != first
+    assert controller.written(LIMIT_S) == REPORT  # by the other one: it was still held when we left
+
+
+def test_watchdogs_that_end_again_and_again_are_given_up(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        notes = []
+        for _ in range(MOST_REPLACEMENTS + 1):
+            end_watchdog(guard)
+            notes += guard.take_notes()
+        assert len(notes) == MOST_REPLACEMENTS + 1
+        assert "there is no other" in notes[-1]
+        assert not guard.running
+        guard.hold(controller.path, REPORT)
+        guard.beat()
+        assert guard.take_notes() == []
+
+
+def test_a_controller_that_the_watchdog_cannot_open_is_told_of_once(tmp_path: Path) -> None:
+    with ReleaseGuard() as guard, select.epoll() as pause:
+        guard.hold(os.fsencode(tmp_path / "nothing"), REPORT)
+        notes: list[str] = []
+        for _ in range(round(LIMIT_S / 0.01)):
+            notes += guard.take_notes()
+            if notes:
+                break
+            pause.poll(0.01)
+        pause.poll(0.2)
+        [note] = notes + guard.take_notes()
+        assert "cannot open the controller" in note
 
 
 def test_a_controller_that_refuses_is_tried_a_few_times() -> None:

@@ -1,8 +1,10 @@
 """Parts of a controller's state besides sticks and buttons: the fingers on its pad, its battery, its sockets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from typing import Final
+
+from operator_side.dualsense.field_checks import check_integer, check_kind, check_number
 
 TOUCHPAD_SIZE: Final = (1920, 1080)
 """The pad's width and height in its own units, from the top left."""
@@ -21,15 +23,19 @@ class TouchPoint:
     """Downwards, in pad units: below 1080."""
 
     def __post_init__(self) -> None:
-        if 0 <= self.identity <= 127 and 0 <= self.x <= _TWELVE_BITS and 0 <= self.y <= _TWELVE_BITS:
-            return  # made for every report while a finger is down
+        # Made for every report while a finger is down, hence at one go: a float has no `|`, and the lowest number of
+        # too many bits, or any below 0, leaves the range whatever the others are.
+        try:
+            if 0 <= (self.identity << 5 | self.x | self.y) <= _TWELVE_BITS:
+                return
+        except TypeError:
+            pass  # said below
         for name, value, highest in (
             ("identity", self.identity, 127),
             ("x", self.x, _TWELVE_BITS),
             ("y", self.y, _TWELVE_BITS),
         ):
-            if not 0 <= value <= highest:
-                raise ValueError(f"{name} = {value}; valid: 0 to {highest}")
+            check_integer(name, value, 0, highest)
 
 
 class BatteryState(Enum):
@@ -53,8 +59,9 @@ class Battery:
     state: BatteryState = BatteryState.FULL
 
     def __post_init__(self) -> None:
-        if self.fraction is not None and not 0.0 <= self.fraction <= 1.0:
-            raise ValueError(f"fraction = {self.fraction}; valid: 0 to 1, or None")
+        if self.fraction is not None:
+            check_number("fraction", self.fraction, 0.0, 1.0)
+        check_kind("state", self.state, BatteryState)
 
 
 CHARGED: Final = Battery()
@@ -69,6 +76,10 @@ class Connections:
     muted: bool = False
     usb_data: bool = True
     usb_power: bool = True
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            check_kind(part.name, getattr(self, part.name), bool)
 
 
 ON_USB: Final = Connections()

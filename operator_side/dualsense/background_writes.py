@@ -14,6 +14,8 @@ from operator_side.dualsense.port import Device
 
 CLOSE_TIMEOUT_S: Final = 0.3
 """A write that has not returned by then is left to itself; the watchdog releases the triggers."""
+STALL_S: Final = 0.05
+"""A write takes some milliseconds: one that has not returned by then hangs for now."""
 
 
 class BackgroundWrites:
@@ -25,6 +27,7 @@ class BackgroundWrites:
         self._changed = threading.Condition()
         self._waiting: OutputReport | None = None
         self._now_s = 0.0
+        self._written_since_s: float | None = None
         self._failure: Exception | None = None
         self._ends = False
         self._stuck = False
@@ -34,8 +37,15 @@ class BackgroundWrites:
 
     @property
     def released(self) -> bool:
-        """As the device says; False when a write has not returned."""
-        return not self._stuck and self._device.released
+        """As the device says; False while anything waits, and when a write has not returned."""
+        with self._changed:
+            under_way = self._stuck or self._waiting is not None or self._written_since_s is not None
+        return not under_way and self._device.released
+
+    def stalls(self, now_s: float) -> bool:
+        """Whether what is being written was asked for more than STALL_S ago."""
+        with self._changed:
+            return self._written_since_s is not None and now_s - self._written_since_s > STALL_S
 
     def read(self, now_s: float) -> bytes | None:
         """As the device's; DeviceError also when a write has failed since."""
@@ -72,13 +82,17 @@ class BackgroundWrites:
             with self._changed:
                 self._changed.wait_for(lambda: self._ends or self._waiting is not None)
                 output, self._waiting, now_s = self._waiting, None, self._now_s
-            if output is None:
-                return
+                if output is None:
+                    return
+                self._written_since_s = now_s
             try:
                 self._device.write(build_output_report(output), now_s)
             except Exception as error:  # raised again where it can be answered
                 self._failure = error
                 return
+            finally:
+                with self._changed:
+                    self._written_since_s = None
 
     def _raise_failure(self) -> None:
         if self._failure is None:

@@ -14,6 +14,11 @@ from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.release_guard import Guard
 from operator_side.dualsense.search import Search
 
+BEAT_PERIOD_S: Final = 0.05
+"""From one sign of life for the watchdog to the next, while an effect is on."""
+RETELL_AFTER_S: Final = 0.1
+"""Half the watchdog's patience: when it has released the triggers, one of two gaps in a row was longer than this,
+however long we were kept between looking at the clock and beating."""
 LOOK_PERIOD_S: Final = 1.0
 """From one look to the next, and from a loss to the first look: by then the robot side has long stopped."""
 
@@ -77,6 +82,8 @@ class Connection:
         self._search = search
         self._listener = listener
         self._guard = guard
+        self._held = False
+        self._beat_s: float | None = None
         self._controller: OpenController | None = None
         self._address: str | None = None
         self._next_look_s: float | None = None
@@ -114,6 +121,32 @@ class Connection:
             self._next_look_s = now_s + LOOK_PERIOD_S
             self._search.begin(self._address)
 
+    def beat(self, now_s: float) -> None:
+        """While an effect is on, show the watchdog that we live; to be called at every turn, before what is written.
+
+        After a silence in which it may have released the triggers, the listener is told as of a controller that has
+        just been found: nobody knows what they do. A write that does not return is a silence, too.
+        """
+        if self._guard is None or self._controller is None or not self._held:
+            return
+        if self._controller.device.released:
+            if self._beat_s is not None:
+                self._beat_s = None
+                self._guard.rest()
+            return
+        silence_s = 0.0 if self._beat_s is None else now_s - self._beat_s
+        if self._beat_s is not None and silence_s < BEAT_PERIOD_S:
+            return
+        silent = silence_s > RETELL_AFTER_S
+        if self._controller.stalls(now_s):
+            if silent:
+                self._say_once("a write to the controller does not return; until it does, its triggers are released")
+            return
+        self._beat_s = now_s
+        self._guard.beat()
+        if silent:
+            self._listener.controller_found(now_s)
+
     def read(self, now_s: float) -> bytes | None:
         """The newest input report; None without a new one, or without a controller."""
         if self._controller is None:
@@ -128,6 +161,9 @@ class Connection:
         """Send an output report, if there is anybody to send it to; whether it went out."""
         if self._controller is None:
             return False
+        if self._guard is not None and self._held and self._beat_s is None:
+            self._beat_s = now_s  # before the effect is on: we may hang at once
+            self._guard.beat()
         try:
             self._controller.device.write(report, now_s)
         except DeviceError as error:
@@ -152,14 +188,17 @@ class Connection:
 
     def _connect(self, controller: OpenController, now_s: float) -> None:
         # Before anything is written to it.
+        self._held, self._beat_s = False, None
         if self._guard is not None and controller.path is not None:
+            self._held = True
             self._guard.hold(controller.path, controller.release)
-        self._controller, self._address = controller, controller.address
+        known, self._address = self._address, controller.address
+        self._controller = controller
         self._handle(ConnectionEvent.OPENED)
         self.found += 1
         self._said.clear()
         self._refused = None
-        self._notes.append(f"controller: {controller.name}" + (", back again" if self.found > 1 else ""))
+        self._notes.append(_introduction(controller, known, first=self.found == 1))
         self._listener.controller_found(now_s)
 
     def _lose(self, error: DeviceError, now_s: float) -> None:
@@ -189,3 +228,12 @@ class Connection:
         if text not in self._said:
             self._said.add(text)
             self._notes.append(text)
+
+
+def _introduction(controller: OpenController, known: str | None, *, first: bool) -> str:
+    """Who it is, and whether it is the one from before, whose address is `known`."""
+    if first or known is None or controller.address is None:
+        return f"controller: {controller.name}"  # nobody can tell whether it is the same
+    if controller.address == known:
+        return f"controller: {controller.name}, back again"
+    return f"another controller: {controller.name}"

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import Final
 
 from operator_side.dualsense.attachments import CHARGED, ON_USB, Battery, Connections, TouchPoint
+from operator_side.dualsense.field_checks import check_integer, check_kind, check_number, check_numbers
 
 Stick = tuple[float, float]
 Vector3 = tuple[float, float, float]
@@ -67,8 +68,7 @@ class TriggerFeedback:
             ("status", self.status),
             ("active_effect", self.active_effect),
         ):
-            if not 0 <= value <= 15:
-                raise ValueError(f"{name} = {value}; valid: 0 to 15")
+            check_integer(name, value, 0, 15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,23 +104,29 @@ class ControllerState:
 
     def __post_init__(self) -> None:
         for name, stick in (("left_stick", self.left_stick), ("right_stick", self.right_stick)):
-            if not all(-1.0 <= axis <= 1.0 for axis in stick):
-                raise ValueError(f"{name} = {stick}; valid: -1 to 1 for each axis")
+            check_numbers(name, stick, 2, -1.0, 1.0)
         for name, travel in (("l2", self.l2), ("r2", self.r2)):
-            if not 0.0 <= travel <= 1.0:
-                raise ValueError(f"{name} = {travel}; valid: 0 to 1")
-        if not 0 <= self.sequence <= 255:
-            raise ValueError(f"sequence = {self.sequence}; valid: 0 to 255")
+            check_number(name, travel, 0.0, 1.0)
+        check_integer("sequence", self.sequence, 0, 255)
         time_s = self.sensor_time_s
-        if time_s is not None and not (math.isfinite(time_s) and 0.0 <= time_s < SENSOR_TIME_SPAN_S):
+        if time_s is not None and not (isinstance(time_s, int | float) and 0.0 <= time_s < SENSOR_TIME_SPAN_S):
             raise ValueError(f"sensor_time_s = {time_s}; valid: from 0 to below {SENSOR_TIME_SPAN_S}")
         for one, opposite in ((Button.UP, Button.DOWN), (Button.LEFT, Button.RIGHT)):
             if one in self.pressed and opposite in self.pressed:
                 raise ValueError(f"pressed has {one.value} and {opposite.value}; valid: one of the two")
         for name, vector in (("gyro_rad_s", self.gyro_rad_s), ("acceleration_m_s2", self.acceleration_m_s2)):
-            if vector is not None and not (len(vector) == 3 and all(math.isfinite(axis) for axis in vector)):
-                raise ValueError(f"{name} = {vector}; valid: three finite numbers")
+            if vector is not None:
+                check_numbers(name, vector, 3, -math.inf, math.inf)
         if self.touches is not None and len(self.touches) > 2:
             raise ValueError(f"touches has {len(self.touches)} points; valid: two at most")
-        if self.device_timestamp is not None and not 0 <= self.device_timestamp < 2**32:
-            raise ValueError(f"device_timestamp = {self.device_timestamp}; valid: 0 to below 2^32")
+        if self.device_timestamp is not None:
+            check_integer("device_timestamp", self.device_timestamp, 0, 2**32 - 1)
+        for name, part, kind in (
+            ("l2_feedback", self.l2_feedback, TriggerFeedback),
+            ("r2_feedback", self.r2_feedback, TriggerFeedback),
+            ("battery", self.battery, Battery),
+            ("connections", self.connections, Connections),
+            *(("touches", touch, TouchPoint) for touch in self.touches or ()),
+        ):
+            if part is not None:
+                check_kind(name, part, kind)

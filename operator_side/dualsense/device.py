@@ -15,6 +15,7 @@ from operator_side.dualsense.feature_report import (
     Firmware,
     parse_address,
 )
+from operator_side.dualsense.input_report import is_input_report
 from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
 from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report, parse_output_report
 from operator_side.dualsense.transport import Transport, transport_of_input
@@ -137,26 +138,38 @@ class HidDualSense:
         self._sequence = 0
         self._written = False
         self._released = True
+        self.bad_reports = 0
+        """Input reports of a wrong id, length or checksum that were met while looking for a good one."""
+        self._effects: dict[str, object] = {}
 
     @property
     def released(self) -> bool:
-        """Nothing was ever written, or the triggers have been released by `close`."""
+        """Nothing that was written holds or shakes, as far as it went out."""
         return self._released
 
     def read(self, now_s: float) -> bytes | None:
-        """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone."""
+        """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
+
+        One that no controller sends is passed over and counted (`bad_reports`) as long as there is a good one; else
+        the newest is returned as it is, and whoever parses it says what is wrong.
+        """
         del now_s  # a real controller has a clock of its own
         self._require_open()
-        newest: list[int] = []
+        drained: list[list[int]] = []
         try:
             for _ in range(_MAX_DRAINED):
                 report = self._reading.read(_READ_LENGTH)
                 if not report:
                     break
-                newest = report
+                drained.append(report)
         except OSError as error:
             raise gone(str(error)) from error
-        return bytes(newest) if newest else None
+        for report in reversed(drained):
+            newest = bytes(report)
+            if is_input_report(newest):
+                return newest
+            self.bad_reports += 1
+        return bytes(drained[-1]) if drained else None
 
     def write(self, report: bytes, now_s: float) -> None:
         """Send an output report, of whichever transport, in this controller's framing.
@@ -172,6 +185,10 @@ class HidDualSense:
             raise ValueError(f"report: {error}") from error
         self._written, self._released = True, False
         self._send(output)
+        for name, part in (("l2", output.l2), ("r2", output.r2), ("rumble", output.rumble)):
+            if part is not None:
+                self._effects[name] = part
+        self._released = all(part == getattr(RELEASED, name) for name, part in self._effects.items())
 
     def close(self) -> None:
         """Take effects and rumble off if any were written and the controller still answers; let it go."""
@@ -199,12 +216,7 @@ class HidDualSense:
     def _send(self, output: OutputReport) -> None:
         report = build_output_report(output, self.identity.transport, self._sequence)
         self._sequence = (self._sequence + 1) % _SEQUENCES
-        try:
-            written = self._writing.write(report)
-        except OSError as error:
-            raise gone(str(error)) from error
-        if written < len(report):
-            raise gone(self._writing.error() or f"{written} of {len(report)} bytes written")
+        _write(self._writing, report)
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
@@ -227,14 +239,24 @@ def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
     return handles[0], handles[-1]
 
 
+def _write(handle: HidHandle, report: bytes) -> None:
+    try:
+        written = handle.write(report)
+    except OSError as error:
+        raise gone(str(error)) from error
+    if written < len(report):
+        raise gone(handle.error() or f"{written} of {len(report)} bytes written")
+
+
 def write_once(path: bytes, report: bytes) -> None:
     """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
     handle = load_backend().device()
     try:
         handle.open_path(path)
-        handle.write(report)
     except OSError as error:
         raise not_opened(path, handle.error() or str(error)) from error
+    try:
+        _write(handle, report)
     finally:
         handle.close()
 

@@ -19,20 +19,6 @@ NO_ZONES: Final = (0,) * ZONE_COUNT
 _FREQUENCY_AT: Final = 9
 
 
-def check_integer(name: str, value: int, lowest: int, highest: int) -> None:
-    """ValueError that names what is no integer from `lowest` to `highest`."""
-    if not isinstance(value, int) or not lowest <= value <= highest:
-        raise ValueError(f"{name} = {value}; valid: an integer from {lowest} to {highest}")
-
-
-def check_zones(name: str, values: tuple[int, ...]) -> None:
-    """ValueError for anything but ten strengths of 0 to 8."""
-    if len(values) != ZONE_COUNT:
-        raise ValueError(f"{name} has {len(values)} values; valid: {ZONE_COUNT}")
-    for zone, value in enumerate(values):
-        check_integer(f"{name}[{zone}]", value, 0, MAX_STRENGTH)
-
-
 def packed(code: int, *parameters: int) -> bytes:
     """The code, its parameters and zeros: 11 bytes."""
     return bytes([code, *parameters]).ljust(EFFECT_LENGTH, b"\0")

@@ -10,6 +10,7 @@ from typing import Final, Self
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.address import checked_address
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
+from operator_side.dualsense.field_checks import check_integer, check_integers
 from operator_side.dualsense.transport import Transport, described
 
 CALIBRATION_ID: Final = 0x05
@@ -57,12 +58,9 @@ class CalibrationReport:
 
     def __post_init__(self) -> None:
         for name in ("gyro_bias", "gyro_plus", "gyro_minus", "acceleration_plus", "acceleration_minus"):
-            values = getattr(self, name)
-            if len(values) != 3 or not all(-(2**15) <= value < 2**15 for value in values):
-                raise ValueError(f"{name} = {values}; valid: three from -32768 to 32767")
+            check_integers(name, getattr(self, name), 3, -(2**15), 2**15 - 1)
         for name in ("speed_plus", "speed_minus"):
-            if not -(2**15) <= getattr(self, name) < 2**15:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: -32768 to 32767")
+            check_integer(name, getattr(self, name), -(2**15), 2**15 - 1)
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:
@@ -117,8 +115,7 @@ class Firmware:
 
     def __post_init__(self) -> None:
         for name, bits in (("hardware_version", 32), ("firmware_version", 32), ("update_version", 16)):
-            if not 0 <= getattr(self, name) < 2**bits:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: {bits} bits")
+            check_integer(name, getattr(self, name), 0, 2**bits - 1)
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:

@@ -2,14 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
-from common.errors import DeviceError
+from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.device import HidBackend, HidDualSense, Identity
 from operator_side.dualsense.device_messages import none_found
 from operator_side.dualsense.models import PRODUCT_IDS, SONY_VENDOR_ID
 from operator_side.dualsense.output_report import RELEASED, build_output_report
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.transport import Transport
+
+LOOKS_FOR_THE_SAME: Final = 3
+"""So many looks in a row are for the controller from before alone; then another one will do."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +29,27 @@ def sightings(backend: HidBackend) -> list[Sighting]:
     return list(dict.fromkeys(_listed(backend)))  # one that serves several purposes is listed for each
 
 
-def find_controller(backend: HidBackend, preferred: str | None = None) -> OpenController:
+class Finding:
+    """One look after the other, for the controller from before: another is taken only when that does not come back."""
+
+    def __init__(self, backend: HidBackend) -> None:
+        self._backend = backend
+        self._looks = 0
+
+    def __call__(self, preferred: str | None) -> OpenController:
+        """A look: `find_controller`, whose `others` is False for the first looks in a row that find nothing."""
+        self._looks += 1
+        found = find_controller(self._backend, preferred, others=self._looks > LOOKS_FOR_THE_SAME)
+        self._looks = 0
+        return found
+
+
+def find_controller(backend: HidBackend, preferred: str | None = None, *, others: bool = True) -> OpenController:
     """Open the controller of the address `preferred`, else the first; NoDeviceError and DeviceError say why none.
 
     A controller that is there on USB and on Bluetooth at once is one: USB is taken, the other way is left alone.
+    With a `preferred` one, another is taken only if `others` allows it and none refuses to be opened, for that may be
+    the one: the system gives permission a moment after a controller appears.
     """
     seen = sightings(backend)
     if not seen:
@@ -43,9 +64,15 @@ def find_controller(backend: HidBackend, preferred: str | None = None) -> OpenCo
     if failure is not None and not opened:
         raise failure
     sighting, chosen = min(opened, key=lambda pair: _rank(pair[1].identity, preferred))
+    is_another = preferred is not None and chosen.identity.address != preferred
+    left_alone = is_another and (failure is not None or not others)
     for _, other in opened:
-        if other is not chosen:
+        if left_alone or other is not chosen:
             other.close()
+    if left_alone:
+        raise failure or NoDeviceError(
+            f"the controller {preferred} is not there, only another: {chosen.identity.address}"
+        )
     transport = chosen.identity.transport
     return OpenController(
         device=chosen,

@@ -20,7 +20,7 @@ from operator_side.dualsense.attachment_codes import (
 )
 from operator_side.dualsense.attachments import TouchPoint
 from operator_side.dualsense.button_codes import AXIS, AXIS_DOWN, TRAVEL, byte_of_axis, code_of, pressed_of
-from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
+from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, is_sealed, sealed
 from operator_side.dualsense.controller_state import (
     SENSOR_TICKS_PER_S,
     ControllerState,
@@ -33,6 +33,7 @@ from operator_side.dualsense.transport import (
     SIMPLE_REPORT_ID,
     SIMPLE_REPORT_LENGTH,
     Transport,
+    is_simple_report,
     transport_of_input,
 )
 
@@ -106,6 +107,16 @@ def parse_input_report(report: bytes, motion: MotionCalibration = NOMINAL_MOTION
     _set_connections(state, CONNECTIONS[connections])
     _set_device_timestamp(state, device_timestamp)
     return state
+
+
+def is_input_report(report: bytes) -> bool:
+    """Whether `parse_input_report` can read it: by its id, its length and, where it has one, its checksum."""
+    length = len(report)
+    if length == _USB_LENGTH and report[0] == _USB_ID:
+        return True
+    if length == _BLUETOOTH_LENGTH and report[0] == _BLUETOOTH_ID:
+        return is_sealed(Seed.INPUT, report)
+    return is_simple_report(report)
 
 
 def _touches(first: int, second: int) -> tuple[TouchPoint, ...]:

@@ -10,6 +10,7 @@ from typing import Final, Self
 
 from operator_side.dualsense.controller_state import STANDARD_GRAVITY_M_S2, Vector3
 from operator_side.dualsense.feature_report import CalibrationReport
+from operator_side.dualsense.field_checks import check_numbers
 from operator_side.dualsense.transport import Transport
 
 NOMINAL_GYRO_RAD_S: Final = math.radians(1.0 / 16.0)
@@ -19,6 +20,8 @@ NOMINAL_ACCELERATION_M_S2: Final = STANDARD_GRAVITY_M_S2 / 8192.0
 PLAUSIBLE_RATIO: Final = 2.0
 """A calibrated scale further from the nominal one than this, either way, is a broken or missing calibration."""
 
+_LARGEST_SCALE: Final = 1e6
+"""What is finite stays finite in every count; nothing turns or falls so fast."""
 _COUNTS: Final = range(-(2**15), 2**15)
 
 
@@ -38,10 +41,10 @@ class MotionCalibration:
     def __post_init__(self) -> None:
         for name in ("gyro_rad_s", "acceleration_m_s2"):
             scales = getattr(self, name)
-            if len(scales) != 3 or not all(math.isfinite(scale) and scale > 0.0 for scale in scales):
-                raise ValueError(f"{name} = {scales}; valid: three finite numbers above 0")
-        if len(self.acceleration_zero) != 3 or not all(abs(zero) <= 2**15 for zero in self.acceleration_zero):
-            raise ValueError(f"acceleration_zero = {self.acceleration_zero}; valid: three from -32768 to 32768")
+            check_numbers(name, scales, 3, 0.0, _LARGEST_SCALE)
+            if 0.0 in scales:
+                raise ValueError(f"{name} = {scales}; valid: above 0")
+        check_numbers("acceleration_zero", self.acceleration_zero, 3, -(2.0**15), 2.0**15)
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:
@@ -99,4 +102,4 @@ def _three(values: list[float]) -> Vector3:
 
 
 def _count(exact: float) -> int:
-    return max(_COUNTS[0], min(_COUNTS[-1], round(exact)))
+    return round(max(_COUNTS[0], min(_COUNTS[-1], exact)))  # a tiny scale may make it infinite

@@ -12,6 +12,7 @@ from typing import Final
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.effects import DEBUG_CODES, EFFECT_LENGTH, AnyEffect, Off, decode_effect
+from operator_side.dualsense.field_checks import check_integer, check_integers, check_kind, check_number
 from operator_side.dualsense.transport import OUTPUT_FRAMING, Transport, described
 from operator_side.dualsense.unofficial_effects import UnofficialEffect
 
@@ -40,8 +41,7 @@ class Rumble:
 
     def __post_init__(self) -> None:
         for name, drive in (("left", self.left), ("right", self.right)):
-            if not 0.0 <= drive <= 1.0:
-                raise ValueError(f"{name} = {drive}; valid: 0 to 1")
+            check_number(name, drive, 0.0, 1.0)
 
 
 class MuteLed(IntEnum):
@@ -71,18 +71,18 @@ class OutputReport:
         for name, effect in (("l2", self.l2), ("r2", self.r2)):
             if effect is not None and not isinstance(effect, AnyEffect):
                 raise ValueError(f"{name} = {effect!r}; valid: a trigger effect or None")
-        if self.lightbar is not None and not (
-            len(self.lightbar) == 3 and all(isinstance(part, int) and 0 <= part <= 255 for part in self.lightbar)
-        ):
-            raise ValueError(f"lightbar = {self.lightbar}; valid: three integers from 0 to 255")
-        if self.mute_led is not None and not isinstance(self.mute_led, MuteLed):
-            raise ValueError(f"mute_led = {self.mute_led!r}; valid: a MuteLed")
+        if self.rumble is not None:
+            check_kind("rumble", self.rumble, Rumble)
+        if self.lightbar is not None:
+            check_integers("lightbar", self.lightbar, 3, 0, 255)
+        if self.mute_led is not None:
+            check_kind("mute_led", self.mute_led, MuteLed)
         for name, value, highest in (
             ("player_leds", self.player_leds, 31),
             ("trigger_power_reduction", self.trigger_power_reduction, 7),
         ):
-            if value is not None and not (isinstance(value, int) and 0 <= value <= highest):
-                raise ValueError(f"{name} = {value}; valid: an integer from 0 to {highest}")
+            if value is not None:
+                check_integer(name, value, 0, highest)
 
 
 RELEASED: Final = OutputReport(l2=Off(), r2=Off(), rumble=Rumble())
@@ -102,8 +102,7 @@ def build_output_report(
         for name, effect in (("l2", output.l2), ("r2", output.r2)):
             if isinstance(effect, UnofficialEffect):
                 raise ValueError(f"{name} = {effect}; valid: an official effect, unless unofficial=True")
-    if not 0 <= sequence <= 15:
-        raise ValueError(f"sequence = {sequence}; valid: 0 to 15")
+    check_integer("sequence", sequence, 0, 15)
     framing = OUTPUT_FRAMING[transport]
     report = bytearray(framing.length)
     report[0] = framing.report_id

@@ -3,6 +3,7 @@
 Bytes only: input_report.py and output_report.py know what is in them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,6 +32,11 @@ class Device(Protocol):
         ...
 
 
+def _never_stalls(now_s: float) -> bool:
+    del now_s
+    return False
+
+
 @dataclass(frozen=True)
 class OpenController:
     """A controller that a search has found and opened."""
@@ -44,3 +50,5 @@ class OpenController:
     """Where the system has it; None for what is no hardware."""
     release: bytes = b""
     """The output report, as it goes over the wire, that takes every effect off; for the watchdog."""
+    stalls: Callable[[float], bool] = _never_stalls
+    """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""

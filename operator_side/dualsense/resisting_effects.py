@@ -11,13 +11,12 @@ from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
-    check_integer,
-    check_zones,
     pack_ends,
     pack_zones,
     packed,
     stepped,
 )
+from operator_side.dualsense.field_checks import check_integer, check_integers
 
 OFF_CODE: Final = 0x05
 FEEDBACK_CODE: Final = 0x21
@@ -75,7 +74,7 @@ class MultiPositionFeedback:
     """Ten strengths, 0 to 8, the first for the zone where the finger starts; ten zeros encode as off."""
 
     def __post_init__(self) -> None:
-        check_zones("strengths", self.strengths)
+        check_integers("strengths", self.strengths, ZONE_COUNT, 0, MAX_STRENGTH)
 
     @property
     def zone_strengths(self) -> tuple[int, ...]:

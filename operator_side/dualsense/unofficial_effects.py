@@ -12,11 +12,11 @@ from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
-    check_integer,
     pack_ends,
     packed,
     unpack_ends,
 )
+from operator_side.dualsense.field_checks import check_integer
 
 _BOW_CODE, _GALLOPING_CODE, _MACHINE_CODE = 0x22, 0x23, 0x27
 _SIMPLE_FEEDBACK_CODE, _SIMPLE_WEAPON_CODE, _SIMPLE_VIBRATION_CODE = 0x01, 0x02, 0x06

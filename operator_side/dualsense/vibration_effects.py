@@ -10,11 +10,10 @@ from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
-    check_integer,
-    check_zones,
     pack_zones,
     stepped,
 )
+from operator_side.dualsense.field_checks import check_integer, check_integers
 from operator_side.dualsense.resisting_effects import Off
 
 VIBRATION_CODE: Final = 0x26
@@ -71,7 +70,7 @@ class MultiPositionVibration:
     """0 to 255; 0 encodes as off."""
 
     def __post_init__(self) -> None:
-        check_zones("amplitudes", self.amplitudes)
+        check_integers("amplitudes", self.amplitudes, ZONE_COUNT, 0, MAX_STRENGTH)
         check_integer("frequency_hz", self.frequency_hz, 0, _MAX_FREQUENCY_HZ)
 
     @property
