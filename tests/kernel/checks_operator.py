@@ -15,8 +15,6 @@ _PATIENCE_S = 90.0
 _HEALTHY_S = 0.7
 """More than the robot side asks for."""
 _PRESSED_S = 0.3
-_SETTLED_S = 0.5
-"""What was written before has arrived."""
 _HOLD_TO_RUN = Button.L1
 _ARM = Button.OPTIONS
 
@@ -106,18 +104,21 @@ def unplugged_in_mid_run(plugged: Plugged, desk: Desk) -> str:
     return said.partition(";")[0]
 
 
+def hangs(plugged: Plugged, desk: Desk) -> str:
+    """Stopped with stiff triggers (SIGSTOP), the operator side's watchdog releases them, and the robot stops."""
+    arm_and_pull(plugged, desk.robot)
+    desk.operator.send(signal.SIGSTOP)
+    try:
+        wait_until("the triggers are released", lambda: plugged.ask(lambda controller: controller.released))
+        wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)
+    finally:
+        desk.operator.send(signal.SIGCONT)
+    return "released"
+
+
 def killed(plugged: Plugged, desk: Desk) -> str:
     """Killed with stiff triggers (kill -9), the operator side's watchdog releases them, and the robot stops."""
-
-    def frozen_while_stiff() -> bool:
-        """So that it is not the operator side that releases them, which it does when a stiffness comes late."""
-        desk.operator.send(signal.SIGCONT)
-        arm_and_pull(plugged, desk.robot)
-        desk.operator.send(signal.SIGSTOP)
-        time.sleep(_SETTLED_S)
-        return not plugged.ask(lambda controller: controller.released)
-
-    wait_until("the operator side is frozen while the triggers are stiff", frozen_while_stiff, _PATIENCE_S)
+    arm_and_pull(plugged, desk.robot)
     code = desk.operator.end(signal.SIGKILL)
     require(code == -signal.SIGKILL, f"it ended with code {code}: {desk.operator.complaints}")
     wait_until("the triggers are released", lambda: plugged.ask(lambda controller: controller.released))
@@ -125,5 +126,5 @@ def killed(plugged: Plugged, desk: Desk) -> str:
     return "released"
 
 
-OPERATOR_CHECKS = (waits_for_a_controller, unplugged_in_mid_run, killed)
+OPERATOR_CHECKS = (waits_for_a_controller, unplugged_in_mid_run, hangs, killed)
 """In this order: each goes on from where the one before left off."""
