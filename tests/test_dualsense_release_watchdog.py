@@ -1,5 +1,6 @@
 """The watchdog as a real process, with a FIFO in the place of the controller's device node."""
 
+import contextlib
 import os
 import select
 import signal
@@ -244,8 +245,10 @@ def wait_until_open(process_id: int, path: bytes) -> None:
     with select.epoll() as pause:
         for _ in range(round(LIMIT_S / 0.01)):
             files = Path(f"/proc/{process_id}/fd").iterdir()
-            if any(os.fsencode(file.readlink()) == path for file in files):
-                return
+            # It opens and closes others meanwhile, while it starts.
+            with contextlib.suppress(FileNotFoundError):
+                if any(os.fsencode(file.readlink()) == path for file in files):
+                    return
             pause.poll(0.01)
     raise AssertionError(f"{path!r} was never opened")
 
