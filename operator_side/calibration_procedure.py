@@ -170,11 +170,14 @@ class CalibrationProcedure:
 
 
 def _trigger(name: str, highest_rest: float, peaks: list[float]) -> TriggerTravel:
-    dead_zone = max(highest_rest + _REST_MARGIN, _LEAST_TRIGGER_DEAD_ZONE)
-    saturation = min(peaks) - _PULL_MARGIN
-    if saturation <= dead_zone:  # a guard: _LEAST_PULL and _LARGEST_TRIGGER_REST keep them apart
-        raise CalibrationError(f"{name} rests at {highest_rest:.2f} and ends at {min(peaks):.2f}: there is no travel")
-    return TriggerTravel(round(dead_zone, 4), round(saturation, 4))
+    dead_zone = round(max(highest_rest + _REST_MARGIN, _LEAST_TRIGGER_DEAD_ZONE), 4)
+    saturation = round(min(peaks) - _PULL_MARGIN, 4)
+    try:
+        return TriggerTravel(dead_zone, saturation)
+    except ValueError as error:
+        raise CalibrationError(
+            f"{name} rests at {highest_rest:.2f} and ends at {min(peaks):.2f}: there is too little travel"
+        ) from error
 
 
 def _stick(name: str, before: tuple[tuple[float, float], float], after: tuple[tuple[float, float], float]) -> StickRest:

@@ -25,7 +25,7 @@ from operator_side.core import OperatorSide
 from operator_side.dualsense.background_writes import BackgroundWrites
 from operator_side.dualsense.connection import Connection
 from operator_side.dualsense.device import HidBackend, load_backend
-from operator_side.dualsense.finding import Finding
+from operator_side.dualsense.finding import Finder
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.release_guard import ReleaseGuard
 from operator_side.dualsense.search import BackgroundSearch, Ready
@@ -84,7 +84,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 loaded = load_backend() if backend is None else backend
                 # Whoever only reads leaves nothing behind.
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-                connection = Connection(BackgroundSearch(functools.partial(_find, Finding(loaded))), core, guard)
+                connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
@@ -107,8 +107,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     return 0
 
 
-def _find(finding: Finding, preferred: str | None) -> OpenController:
-    found = finding(preferred)
+def _find(find: Finder, preferred: str | None) -> OpenController:
+    found = find(preferred)
     if sys.platform != "linux":
         return found  # a device is read and written by one thread there
     writes = BackgroundWrites(found.device)

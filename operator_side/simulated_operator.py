@@ -20,11 +20,10 @@ import numpy as np
 
 from common.messages import Telemetry, Vector2, Vector3
 from operator_side.button_map import Action, button_of
-from operator_side.dualsense.controller_state import Button
+from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.simulated import SimulatedDualSense
 from operator_side.dualsense.trigger_model import (
     NORMAL_FINGER_FORCE_N,
-    SENSED_TRAVEL,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )

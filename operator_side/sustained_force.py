@@ -7,8 +7,8 @@ for the finger, and low enough to be kind to the motor.
 import math
 from dataclasses import dataclass
 
-from operator_side.dualsense.effects import MAX_STRENGTH
-from operator_side.force_profiles import MAX_LEVEL, ForceProfiles
+from operator_side.dualsense.effects import MAX_STRENGTH, ZONE_COUNT
+from operator_side.force_profiles import MAX_LEVEL
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,11 @@ class SustainedForceLimit:
     limit goes as slowly as it came, and a rest of both makes the trigger fresh again.
     """
 
-    def __init__(self, settings: SustainedForceSettings, profiles: ForceProfiles) -> None:
+    def __init__(self, settings: SustainedForceSettings) -> None:
         self._settings = settings
-        strongest = [max(profiles.felt(level)) for level in range(MAX_LEVEL + 1)]
-        self._full_level = next(level for level, one in enumerate(strongest) if one >= settings.full_strength)
-        self._sustainable_level = max(
-            level for level, one in enumerate(strongest) if one <= settings.sustainable_strength
-        )
+        # A round of ten levels gives one strength more to each zone, and begins with one that a full pull reaches.
+        self._full_level = ZONE_COUNT * (settings.full_strength - 1) + 1
+        self._sustainable_level = ZONE_COUNT * settings.sustainable_strength
         self._exertion_s = 0.0
         self._full = False
         self._last_s: float | None = None

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from operator_side.dualsense.controller_state import Stick
+from operator_side.dualsense.controller_state import SENSED_TRAVEL, Stick
 from operator_side.dualsense.effects import ZONE_COUNT
-from operator_side.dualsense.trigger_model import SENSED_TRAVEL
 
 LARGEST_REST: Final = 0.3
 """A stick that rests farther from its centre is broken, or held."""

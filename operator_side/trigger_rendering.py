@@ -9,9 +9,9 @@ from typing import Any
 from common.messages import StiffnessUpdate
 from operator_side.bands import Band, BandSettings
 from operator_side.contact_detent import DetentSelector, with_detent
+from operator_side.dualsense.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.effects import ZONE_COUNT, TriggerEffect
 from operator_side.dualsense.output_report import OutputReport, Rumble
-from operator_side.dualsense.trigger_model import SENSED_TRAVEL
 from operator_side.force_profiles import force_profiles
 from operator_side.sustained_force import SustainedForceLimit, SustainedForceSettings
 from operator_side.travel_calibration import TravelCalibration, TriggerTravel
@@ -53,7 +53,7 @@ class RenderedTrigger:
         self._settings = settings
         self._travel = travel
         self._levels = LevelSelector(settings.bands)
-        self._limit = SustainedForceLimit(settings.sustained, self.profiles)
+        self._limit = SustainedForceLimit(settings.sustained)
         self._detent = DetentSelector()
         self._limited = False
         self._last_s: float | None = None

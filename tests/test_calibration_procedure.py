@@ -83,6 +83,12 @@ def test_half_pulls_are_refused() -> None:
         Hands(Wear(), lambda *_: 0.45).run()
 
 
+def test_a_trigger_with_hardly_any_travel_is_refused() -> None:
+    # The most rest and the least pull that count by themselves.
+    with pytest.raises(CalibrationError, match=r"L2 rests at 0\.25 and ends at 0\.50: there is too little travel"):
+        Hands(Wear(l2=(0.25, 0.5))).run()
+
+
 def test_the_wrong_trigger_is_pointed_out_and_does_not_count() -> None:
     hands = Hands(Wear())
     while hands.procedure.step is not Step.PULL_L2:

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
-from operator_side.dualsense.finding import LOOKS_FOR_THE_SAME, Finding, Sighting, find_controller, sightings
+from operator_side.dualsense.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
 from operator_side.dualsense.output_report import RELEASED, build_output_report
 from operator_side.dualsense.port import OpenController
 from operator_side.dualsense.search import BackgroundSearch, Find, Ready
@@ -52,7 +52,7 @@ def test_the_one_from_before_comes_first_even_on_bluetooth() -> None:
 def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> None:
     same, other = FakeHandle(), FakeHandle(USB, OTHER)
     backend = FakeBackend({0x0CE6: {B: other}})
-    look = Finding(backend)
+    look = Finder(backend)
     for _ in range(2):  # whoever was found is looked for as often again
         for _ in range(LOOKS_FOR_THE_SAME):
             with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only another: {OTHER}"):
@@ -69,12 +69,12 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
 
 
 def test_the_first_one_is_taken_at_once() -> None:
-    assert Finding(FakeBackend({0x0CE6: {A: FakeHandle()}}))(None).address == ADDRESS
+    assert Finder(FakeBackend({0x0CE6: {A: FakeHandle()}}))(None).address == ADDRESS
 
 
 def test_no_other_is_taken_while_one_refuses_that_may_be_the_one_from_before() -> None:
     same, other = FakeHandle(opens=False, reason="Permission denied"), FakeHandle(USB, OTHER)
-    look = Finding(FakeBackend({0x0CE6: {A: same, B: other}}))
+    look = Finder(FakeBackend({0x0CE6: {A: same, B: other}}))
     for _ in range(2 * LOOKS_FOR_THE_SAME):
         with pytest.raises(DeviceError, match="no permission to open the controller at /dev/hidraw3"):
             look(ADDRESS)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.controller_state import TriggerFeedback
+from operator_side.dualsense.controller_state import SENSED_TRAVEL, TriggerFeedback
 from operator_side.dualsense.effects import (
     Feedback,
     MultiPositionFeedback,
@@ -20,7 +20,6 @@ from operator_side.dualsense.effects import (
 from operator_side.dualsense.trigger_model import (
     FINGER_TIME_CONSTANT_S,
     NORMAL_FINGER_FORCE_N,
-    SENSED_TRAVEL,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
     STRENGTH_STEP_N,

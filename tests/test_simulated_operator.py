@@ -5,10 +5,9 @@ import math
 import pytest
 
 from common.messages import Vector3
-from operator_side.dualsense.controller_state import Button
+from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.trigger_model import (
     NORMAL_FINGER_FORCE_N,
-    SENSED_TRAVEL,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )

@@ -2,7 +2,6 @@
 
 import os
 import select
-import weakref
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Self
@@ -51,7 +50,7 @@ class SocketShell:
         self._clock = MonotonicClock()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
-        self._descriptors: weakref.WeakKeyDictionary[zmq.Socket[bytes], int] = weakref.WeakKeyDictionary()
+        self._descriptors: dict[zmq.Socket[bytes], int] = {}
         self._control = self._open_control(control_type)
         self._view = self._open_view(view_type)
 
@@ -133,7 +132,7 @@ class SocketShell:
             select.select(descriptors, [], [], 0.0 if pending else remaining_s)
 
     def _descriptor(self, part: "zmq.Socket[bytes]") -> int:
-        """The one to wait for, which is a socket's for life."""
+        """The one to wait for, a socket's for life; the sockets that are waited for live as long as we do."""
         descriptor = self._descriptors.get(part)
         if descriptor is None:
             descriptor = self._descriptors[part] = part.fileno()

@@ -15,6 +15,8 @@ SENSOR_TICKS_PER_S: Final = 3_000_000
 """The sensor timestamp counts thirds of a microsecond."""
 SENSOR_TIME_SPAN_S: Final = 2**32 / SENSOR_TICKS_PER_S
 """The sensor timestamp starts again at 0 after this long: 1431.7 s."""
+SENSED_TRAVEL: Final = 0.75
+"""The mechanical travel at which the controller reports 255 (about; DS4Windows issue 1751)."""
 STANDARD_GRAVITY_M_S2: Final = 9.80665
 AT_REST_M_S2: Final[Vector3] = (0.0, STANDARD_GRAVITY_M_S2, 0.0)
 """What the accelerometer says of a controller that lies flat: the table pushes it up, along y (SDL)."""

@@ -54,6 +54,11 @@ def stepped(position: int, strength: int) -> tuple[int, ...]:
     return (0,) * position + (strength,) * (ZONE_COUNT - position)
 
 
+def between(start: int, end: int, strength: int) -> tuple[int, ...]:
+    """One strength from the zone `start` up to, and without, the zone `end`."""
+    return (0,) * start + (strength,) * (end - start) + (0,) * (ZONE_COUNT - end)
+
+
 def pack_ends(start: int, end: int) -> tuple[int, int]:
     """The two bytes of a mask with the first and the last zone."""
     mask = 1 << start | 1 << end

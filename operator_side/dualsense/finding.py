@@ -29,7 +29,7 @@ def sightings(backend: HidBackend) -> list[Sighting]:
     return list(dict.fromkeys(_listed(backend)))  # one that serves several purposes is listed for each
 
 
-class Finding:
+class Finder:
     """One look after the other, for the controller from before: another is taken only when that does not come back."""
 
     def __init__(self, backend: HidBackend) -> None:

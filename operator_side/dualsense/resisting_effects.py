@@ -11,6 +11,7 @@ from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
+    between,
     pack_ends,
     pack_zones,
     packed,
@@ -138,8 +139,7 @@ class Weapon:
     @property
     def zone_strengths(self) -> tuple[int, ...]:
         """The resistance of each of the ten zones before it has given way."""
-        held = self.end - self.start
-        return (0,) * self.start + (self.strength,) * held + (0,) * (ZONE_COUNT - self.end)
+        return between(self.start, self.end, self.strength)
 
     def encode(self) -> bytes:
         """The code, the mask of the two zones and the strength less one: 11 bytes."""

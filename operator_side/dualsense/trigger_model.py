@@ -8,7 +8,7 @@ trigger forces exists.
 import math
 from typing import Final
 
-from operator_side.dualsense.controller_state import TriggerFeedback
+from operator_side.dualsense.controller_state import SENSED_TRAVEL, TriggerFeedback
 from operator_side.dualsense.effects import (
     MAX_STRENGTH,
     ZONE_COUNT,
@@ -28,8 +28,6 @@ SPRING_RISE_N: Final = 4.0
 """How much more it takes at the end of the travel, growing linearly (assumed)."""
 STRENGTH_STEP_N: Final = 0.25
 """The resistance that one strength of an effect adds within its zone (assumed)."""
-SENSED_TRAVEL: Final = 0.75
-"""The mechanical travel at which the controller reports 255 (about; DS4Windows issue 1751)."""
 FINGER_TIME_CONSTANT_S: Final = 0.04
 """How fast a finger gets to where its force balances (assumed)."""
 NORMAL_FINGER_FORCE_N: Final = 3.7

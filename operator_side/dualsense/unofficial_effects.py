@@ -11,7 +11,7 @@ from typing import ClassVar, Final, final
 from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
-    ZONE_COUNT,
+    between,
     pack_ends,
     packed,
     unpack_ends,
@@ -54,8 +54,7 @@ class Bow:
     @property
     def zone_strengths(self) -> tuple[int, ...]:
         """The resistance of each of the ten zones before the snap."""
-        held = self.end - self.start
-        return (0,) * self.start + (self.strength,) * held + (0,) * (ZONE_COUNT - self.end)
+        return between(self.start, self.end, self.strength)
 
     def encode(self) -> bytes:
         """The code, the mask of the two zones and both forces less one: 11 bytes."""
