@@ -220,12 +220,7 @@ class OperatorSide:
         self._written, self.writes = shown, self.writes + 1
         if before is None:
             return build_output_report(shown)
-        change = OutputReport(
-            l2=shown.l2 if shown.l2 != before.l2 else None,
-            r2=shown.r2 if shown.r2 != before.r2 else None,
-            rumble=shown.rumble if shown.rumble != before.rumble else None,
-        )
-        return build_output_report(change)
+        return build_output_report(shown.change_from(before))
 
     def status(self, now_s: float) -> dict[str, float | str | None]:
         """A few figures for the status line."""

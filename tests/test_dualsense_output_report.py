@@ -1,6 +1,6 @@
 """Output reports: exact bytes in each framing, only our flags, round trips, and no debug code in any place."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
@@ -234,3 +234,35 @@ def test_sequence_out_of_range() -> None:
         build_output_report(FULL, Transport.BLUETOOTH, 16)
     with pytest.raises(ValueError, match=r"sequence = 0\.5"):
         build_output_report(FULL, Transport.BLUETOOTH, 0.5)  # type: ignore[arg-type]
+
+
+@given(OUTPUTS, OUTPUTS)
+@REPEATABLE
+def test_two_in_a_row_set_what_both_together_set(first: OutputReport, second: OutputReport) -> None:
+    both = second.following(first)
+    for part in fields(OutputReport):
+        newer, older = getattr(second, part.name), getattr(first, part.name)
+        assert getattr(both, part.name) == (older if newer is None else newer)
+    assert OutputReport().following(first) == first.following(OutputReport()) == first
+
+
+@given(OUTPUTS, OUTPUTS)
+@REPEATABLE
+def test_a_change_leads_from_the_one_to_the_other(before: OutputReport, after: OutputReport) -> None:
+    wanted = after.following(before)
+    assert wanted.change_from(before).following(before) == wanted
+    assert wanted.change_from(wanted) == OutputReport()
+
+
+@pytest.mark.parametrize(
+    ("output", "releases"),
+    [
+        (OutputReport(), True),
+        (RELEASED, True),
+        (OutputReport(r2=Off(), lightbar=(1, 2, 3)), True),
+        (OutputReport(l2=Off(), r2=Feedback(3, 6)), False),
+        (OutputReport(rumble=Rumble(right=0.1)), False),
+    ],
+)
+def test_what_holds_or_shakes_releases_nothing(output: OutputReport, releases: bool) -> None:
+    assert output.releases is releases

@@ -4,7 +4,6 @@ On USB a write takes until the controller fetches it, some milliseconds (its int
 on a bad cable. Only the newest of what waits goes out, part by part: latest wins here, too.
 """
 
-import dataclasses
 import threading
 from typing import Final
 
@@ -63,7 +62,7 @@ class BackgroundWrites:
             raise ValueError(f"report: {error}") from error
         self._raise_failure()
         with self._changed:
-            self._waiting = output if self._waiting is None else _latest(self._waiting, output)
+            self._waiting = output if self._waiting is None else output.following(self._waiting)
             self._now_s = now_s
             self._changed.notify()
 
@@ -100,9 +99,3 @@ class BackgroundWrites:
         if isinstance(self._failure, DeviceError):
             raise DeviceError(str(self._failure)) from self._failure
         raise self._failure
-
-
-def _latest(before: OutputReport, after: OutputReport) -> OutputReport:
-    """Each part of `after`, and of `before` what `after` leaves as it is."""
-    parts = {part.name: getattr(after, part.name) for part in dataclasses.fields(after)}
-    return dataclasses.replace(before, **{name: value for name, value in parts.items() if value is not None})

@@ -140,7 +140,7 @@ class HidDualSense:
         self._released = True
         self.bad_reports = 0
         """Input reports of a wrong id, length or checksum that were met while looking for a good one."""
-        self._effects: dict[str, object] = {}
+        self._told = OutputReport()
 
     @property
     def released(self) -> bool:
@@ -185,10 +185,8 @@ class HidDualSense:
             raise ValueError(f"report: {error}") from error
         self._written, self._released = True, False
         self._send(output)
-        for name, part in (("l2", output.l2), ("r2", output.r2), ("rumble", output.rumble)):
-            if part is not None:
-                self._effects[name] = part
-        self._released = all(part == getattr(RELEASED, name) for name, part in self._effects.items())
+        self._told = output.following(self._told)
+        self._released = self._told.releases
 
     def close(self) -> None:
         """Take effects and rumble off if any were written and the controller still answers; let it go."""

@@ -5,7 +5,7 @@ of what is asked for are ever set here, so that the lights and the mute key stay
 whosever it is. Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Final
 
@@ -83,6 +83,22 @@ class OutputReport:
         ):
             if value is not None:
                 check_integer(name, value, 0, highest)
+
+    def following(self, before: "OutputReport") -> "OutputReport":
+        """What both together set when this one comes after `before`: each part by the newest that sets it."""
+        newer = {part.name: value for part in fields(self) if (value := getattr(self, part.name)) is not None}
+        return replace(before, **newer)
+
+    def change_from(self, before: "OutputReport") -> "OutputReport":
+        """The parts of this one that `before` does not set alike; the others are None."""
+        same = {part.name: None for part in fields(self) if getattr(self, part.name) == getattr(before, part.name)}
+        return replace(self, **same)
+
+    @property
+    def releases(self) -> bool:
+        """Whether nothing that it sets holds or shakes."""
+        parts = ((self.l2, RELEASED.l2), (self.r2, RELEASED.r2), (self.rumble, RELEASED.rumble))
+        return all(part in (None, off) for part, off in parts)
 
 
 RELEASED: Final = OutputReport(l2=Off(), r2=Off(), rumble=Rumble())

@@ -1,7 +1,6 @@
 """A DualSense made of bytes: the same port as a real one, with a simulated person's hands on it."""
 
 import math
-from dataclasses import fields, replace
 from typing import Final
 
 from common.errors import DeviceError, RemoteProtocolError
@@ -232,8 +231,7 @@ class SimulatedDualSense(SimulatedHands):
             raise DeviceError("the simulated controller is closed; open a new one")
 
     def _apply(self, output: OutputReport) -> None:
-        told = {part.name: getattr(output, part.name) for part in fields(output)}
-        self._told = replace(self._told, **{name: value for name, value in told.items() if value is not None})
+        self._told = output.following(self._told)
         power = 1.0 - (self._told.trigger_power_reduction or 0) / 8.0
         self._l2.set_effect(self._told.l2 or Off(), power)
         self._r2.set_effect(self._told.r2 or Off(), power)
