@@ -13,6 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from common.regular_file import read_regular_file
 
 Distribution = Literal["uniform", "normal", "pareto", "paretonormal", "exponential"]
 
@@ -21,6 +22,8 @@ TABLE_SIZE = 4096
 """Entries of the tables that are built in, one for each 1/4096 of probability."""
 _LARGEST_TABLE = 16384
 """The most entries that the kernel takes."""
+_LARGEST_BYTES = 100 * _LARGEST_TABLE
+"""With room for comments."""
 _LOWEST_ENTRY, _HIGHEST_ENTRY = -(2**15), 2**15 - 1
 _PARETO_SHAPE = 3.0
 _PARETO_MEAN = _PARETO_SHAPE / (_PARETO_SHAPE - 1.0)
@@ -43,8 +46,7 @@ class DelayTable:
         anything else.
         """
         try:
-            # Not open to devices and pipes, whose end may never come.
-            text = path.read_text(encoding="utf-8") if path.is_file() or not path.exists() else ""
+            text = read_regular_file(path, _LARGEST_BYTES).decode("utf-8")
         except (OSError, UnicodeDecodeError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else "is no text"
             raise ConfigurationError(

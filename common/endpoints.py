@@ -6,6 +6,7 @@ import socket
 from dataclasses import dataclass
 
 from common.errors import ConfigurationError
+from common.keys import default_folder
 
 _ADDRESS = re.compile(r"tcp://(?:\[(?P<v6>[^\[\]]+)\]|(?P<host>[^\s:/\[\];]+)):(?P<port>[^\s:/]+)")
 _EPHEMERAL = 0
@@ -74,7 +75,7 @@ def refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
     """ConfigurationError with the way out when others than this machine's users could reach `endpoint`."""
     if not endpoint.is_loopback():
         raise ConfigurationError(
-            f"{flag}: {text!r} would be open to anyone on the network; valid: --keys ~/.config/feelahead/keys "
+            f"{flag}: {text!r} would be open to anyone on the network; valid: --keys {default_folder()} "
             "(first: `feelahead keys make robot`), a loopback address such as tcp://127.0.0.1:5555, or --insecure"
         )
 

@@ -16,15 +16,21 @@ from pathlib import Path
 from typing import Literal
 
 from common.errors import ConfigurationError
+from common.regular_file import read_regular_file
+from common.user_folders import configuration_folder
 
 Side = Literal["robot", "operator"]
 
-DEFAULT_FOLDER = Path("~/.config/feelahead/keys")
 PEER_LIMIT = 256
 """Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
+
+
+def default_folder() -> Path:
+    """Where keys are unless another folder is named."""
+    return configuration_folder() / "keys"
 
 
 def checked_key(text: str, what: str) -> str:
@@ -64,7 +70,7 @@ def read_public_key(key_or_file: str, what: str) -> str:
 class KeyFolder:
     """One folder of keys; nothing is kept in memory."""
 
-    path: Path = DEFAULT_FOLDER
+    path: Path = field(default_factory=default_folder)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", self.path.expanduser())
@@ -165,7 +171,7 @@ class KeyFolder:
 
     def command(self, rest: str) -> str:
         """The command line that does `rest` to this folder."""
-        folder = "" if self.path == DEFAULT_FOLDER.expanduser() else f" --folder {self.path}"
+        folder = "" if self.path == default_folder() else f" --folder {self.path}"
         return f"feelahead keys {rest}{folder}"
 
     def peer_path(self, name: str) -> Path:
@@ -243,15 +249,13 @@ class AllowList:
 
 def _read_key(path: Path, what: str) -> str:
     try:
-        # Opening a pipe would wait for ever.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise ConfigurationError(f"{what}: {path} is no file; valid: a key file")
-        with path.open(encoding="ascii") as file:
-            content = file.read(_FILE_LIMIT_BYTES)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(
-            f"{what}: {path} cannot be read: {getattr(error, 'strerror', 'no ASCII text')}; valid: a key file"
-        ) from error
+        content = read_regular_file(path, _FILE_LIMIT_BYTES).decode("ascii")
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{what}: {path} cannot be read: no ASCII text; valid: a key file") from error
+    except OSError as error:
+        raise ConfigurationError(f"{what}: {path} cannot be read: {error.strerror}; valid: a key file") from error
+    except ValueError as error:
+        raise ConfigurationError(f"{what}: {path} {error}") from error
     lines = [line for line in content.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) != 1:
         raise ConfigurationError(f"{what}: {path} holds {len(lines)} lines; valid: one key of 64 hexadecimal digits")

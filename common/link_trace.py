@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import ConfigurationError
+from common.regular_file import read_regular_file
 
 _MOST_ROWS = 1_000_000
+_LARGEST_BYTES = 100 * _MOST_ROWS
 _COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where rows are not in order of sending"
 
 
@@ -55,10 +57,10 @@ class Sample:
 
 def read_samples(path: Path, field: str) -> list[Sample]:
     """Every message of a recording in order of sending, as `Trace.read` reads it, send times kept."""
-    if path.exists() and not path.is_file():
-        raise ConfigurationError(f"{field}: {str(path)!r} is no file; valid: a CSV with {_COLUMNS}")
     try:
-        text = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+        text = read_regular_file(path, _LARGEST_BYTES)
+        if path.suffix == ".gz":
+            text = gzip.decompress(text)
         lines = text.decode("utf-8-sig").splitlines()
     except (OSError, EOFError, ValueError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or "is no CSV"

@@ -1,11 +1,10 @@
 """TOML files that people name or write: read whole, without waiting, and refused in one line when they are no such."""
 
-import errno
-import os
-import stat
 import tomllib
 from pathlib import Path
 from typing import Any, Final
+
+from common.regular_file import read_regular_file
 
 _LARGEST_INTEGER: Final = 2**63
 """TOML's own range; larger ones are no numbers to whatever comes after."""
@@ -22,7 +21,7 @@ def read_toml(path: Path, largest_bytes: int) -> dict[str, Any]:
     OSError when the system does not let us at it; ValueError, in one line without the path, for what is no regular
     file (a pipe would be waited for without end), has more than `largest_bytes`, or is no valid TOML.
     """
-    data = _read_regular_file(path, largest_bytes)
+    data = read_regular_file(path, largest_bytes)
     try:
         content = tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -34,26 +33,6 @@ def read_toml(path: Path, largest_bytes: int) -> dict[str, Any]:
         raise ValueError(_TOO_LARGE) from error
     _refuse_extremes(content)
     return content
-
-
-def _read_regular_file(path: Path, largest_bytes: int) -> bytes:
-    # Windows has no such flags, and no pipes among its files either.
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
-    descriptor = os.open(path, flags)
-    try:
-        mode = os.fstat(descriptor).st_mode
-        if stat.S_ISDIR(mode):
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
-        if not stat.S_ISREG(mode):
-            raise ValueError("is no regular file; valid: a file's path")
-        data = b""
-        while len(data) <= largest_bytes and (more := os.read(descriptor, largest_bytes + 1 - len(data))):
-            data += more
-    finally:
-        os.close(descriptor)
-    if len(data) > largest_bytes:
-        raise ValueError(f"has more than {largest_bytes} bytes")
-    return data
 
 
 def _refuse_extremes(content: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NoReturn, get_args
 
 from common.errors import ConfigurationError
-from common.keys import DEFAULT_FOLDER, KeyFolder, Side, checked_name, passed_over_note, read_public_key
+from common.keys import KeyFolder, Side, checked_name, default_folder, passed_over_note, read_public_key
 from common.sockets.authentication import make_key_pair, public_part
 
 _STEPS = """\
@@ -53,10 +53,10 @@ def keys(arguments: Sequence[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    default = str(DEFAULT_FOLDER)
+    default = default_folder()
     common = _Parser(add_help=False)
     common.add_argument(
-        "--folder", type=Path, default=DEFAULT_FOLDER, metavar="FOLDER", help=f"where the keys are ({default})"
+        "--folder", type=Path, default=default, metavar="FOLDER", help=f"where the keys are ({default})"
     )
     parser = _Parser(
         prog="feelahead keys",

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from common import keys
+from common.endpoints import parse_bind, refuse_open
 from common.errors import ConfigurationError
 from common.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
@@ -204,7 +205,7 @@ def test_a_pipe_among_the_peers_lets_nobody_in_and_holds_nobody_up(folder: KeyFo
     peers = AllowList(folder)
     peers.refresh()
     assert peers.names == {}
-    assert "is no file" in str(peers.unreadable)
+    assert "is no regular file" in str(peers.unreadable)
 
 
 def test_a_list_that_cannot_be_read_is_not_taken_for_an_empty_one(
@@ -230,3 +231,13 @@ def test_a_key_that_is_let_in_twice_is_named_when_one_name_is_revoked(folder: Ke
     assert "still let in as zed" in complaint(lambda: folder.revoke("alice"))
     folder.revoke("zed")
     assert folder.allowed() == {}
+
+
+def test_keys_are_where_each_system_keeps_a_persons_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    # They once were in ~/.config whatever XDG_CONFIG_HOME said, and on macOS.
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert keys.default_folder() == KeyFolder().path == tmp_path / "feelahead" / "keys"
+    assert str(tmp_path / "feelahead" / "keys") in complaint(
+        lambda: refuse_open(parse_bind("tcp://0.0.0.0:5555", "--bind"), "tcp://0.0.0.0:5555", "--bind")
+    )

@@ -1,0 +1,30 @@
+"""Files that people name: read whole and without waiting, for a pipe or a device might never end."""
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+
+def read_regular_file(path: Path, largest_bytes: int) -> bytes:
+    """The content of the regular file `path`, or of the one that a link there leads to.
+
+    OSError when the system does not let us at it, a folder included; ValueError, in one line without the path, for
+    what is no regular file or has more than `largest_bytes`.
+    """
+    # Windows has no such flags, and no pipes among its files either.
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+    descriptor = os.open(path, flags)
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            raise ValueError("is no regular file; valid: a file's path")
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            data = file.read(largest_bytes + 1)
+    finally:
+        os.close(descriptor)
+    if len(data) > largest_bytes:
+        raise ValueError(f"has more than {largest_bytes} bytes")
+    return data
