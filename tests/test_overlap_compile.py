@@ -37,7 +37,7 @@ def test_machine_code_is_kept_on_disk_until_any_source_changes(tmp_path: Path, m
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     assert _kernel().cache_hits == 0
     assert _kernel().cache_hits == 1
-    monkeypatch.setattr(compile_module, "package_digest", lambda: "another version")
+    monkeypatch.setattr(compile_module, "digest", lambda _: "another version")
     assert _kernel().cache_hits == 0
 
 
@@ -55,10 +55,10 @@ def test_damaged_machine_code_is_compiled_anew(
 
 
 def test_a_kernel_works_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_place(_: object) -> None:
+    def no_place(*_: object) -> None:
         raise RuntimeError("cannot cache function: no locator available")
 
-    monkeypatch.setattr(compile_module, "_PackageCache", no_place)
+    monkeypatch.setattr(compile_module, "keep_on_disk", no_place)
     assert _kernel().cache_hits == 0
 
 

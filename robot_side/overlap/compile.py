@@ -5,18 +5,15 @@ Numba is imported untyped; everything else in this package sees ordinary typed f
 
 import contextlib
 import functools
-import hashlib
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import numba.extending
-from numba.core.caching import FunctionCache
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import LoweringPass, register_pass
-from numba.core.typed_passes import NativeLowering
+
+from robot_side.overlap.kernel_sources import digest
+from robot_side.overlap.numba_inside import WithoutMachineCode, keep_on_disk
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -56,42 +53,7 @@ COUNT: Any = numba.types.int64
 """The Numba type of an int."""
 
 
-@register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
-class _ForCallers(LoweringPass):
-    """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
-
-    _name = "for_callers"
-
-    def __init__(self) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
-
-    def run_pass(self, state: Any) -> bool:
-        """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
-        entry_point = object().__reduce_ex__
-        state["cr"] = state["cr"]._replace(cfunc=entry_point)
-        state.targetctx.insert_user_function(entry_point, state["cr"].fndesc, [state["library"]])
-        return True
-
-
-class _WithoutMachineCode(CompilerBase):
-    """Compile to what a kernel needs to link the function in.
-
-    By default Numba also makes machine code of it, and wrappers by which Python and C may call it: more than half
-    of the time in all, as nothing but kernels calls these functions.
-    """
-
-    def define_pipelines(self) -> list[Any]:
-        """The ordinary passes and `_ForCallers`."""
-        self.state.flags.no_cpython_wrapper = True
-        self.state.flags.no_cfunc_wrapper = True
-        self.state.flags.no_compile = True
-        passes: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
-        passes.add_pass_after(_ForCallers, NativeLowering)
-        passes.finalize()
-        return [passes]
-
-
-_FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": _WithoutMachineCode}
+_FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode}
 
 
 def inlined(function: _Function) -> _Function:
@@ -145,9 +107,8 @@ class Compiled:
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
         self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
-        # Without any writable place for it (a read-only image, say) the kernel works uncached.
-        with contextlib.suppress(RuntimeError):
-            self._dispatcher._cache = cast(Any, _PackageCache)(function)
+        self.function = function
+        """What it is compiled from."""
         self._signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
@@ -158,6 +119,10 @@ class Compiled:
         """Compile or load now."""
         with self._preparing:
             if not self.ready:
+                # Only now does every building block exist. Without any writable place for it (a read-only image,
+                # say) the kernel works uncached.
+                with contextlib.suppress(RuntimeError):
+                    keep_on_disk(self._dispatcher, self.function, digest)
                 self._dispatcher.compile(self._signature)
                 self._dispatcher.disable_compile()
                 self.ready = True
@@ -180,38 +145,3 @@ def compiled(*arguments: Any, returns: Any = None) -> Callable[[Callable[..., An
     It fills its output arrays, and returns a value of the type `returns` unless that is None.
     """
     return functools.partial(Compiled, arguments=arguments, returns=returns)
-
-
-@functools.cache
-def package_digest() -> str:
-    """A digest of every source file of this package."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-class _PackageCache(FunctionCache):
-    """Numba's cache on disk, with the whole package in its key.
-
-    Numba by itself looks only at the file of the kernel, and would go on running machine code with an old
-    version of a building block from another file. A kernel outside of this package therefore takes its building
-    blocks from here or from its own file.
-    """
-
-    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        key: tuple[Any, ...] = super()._index_key(signature, codegen)  # type: ignore[no-untyped-call]
-        return (*key, package_digest())
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled kernel, or None where there is none.
-
-        What a damaged file holds (after a crash or a full disk) is thrown away and compiled again.
-        """
-        try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except Exception:
-            # Unpickling may raise anything.
-            with contextlib.suppress(OSError):
-                self.flush()  # type: ignore[no-untyped-call]
-            return None
