@@ -1,6 +1,6 @@
 """The console script `feelahead`, also `python -m feelahead`."""
 
-from common.launch import Command, launch
+from common.command.launch import Command, launch
 
 
 def main() -> None:

@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.live import Live
 
 from common.clock import Clock, MonotonicClock, VirtualClock
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
+from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
-from common.stop_signal import StopSignal
 from feelahead.calibration_screen import calibration_lines, calibration_screen
 from operator_side.calibration_procedure import CalibrationProcedure, Step
 from operator_side.calibration_store import calibration_path, place_to_write, write_calibration

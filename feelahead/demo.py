@@ -11,12 +11,12 @@ from typing import Annotated, Any
 
 import tyro
 
-from common.command_line import given_fields, parse_settings
-from common.link_figures import report_lines
-from common.link_model import Direction, Stream, unused_clauses
-from common.run_options import RunOptions
-from common.status import Status, Value
-from common.stop_signal import StopSignal, ignore_broken_output
+from common.command.command_line import given_fields, parse_settings
+from common.command.run_options import RunOptions
+from common.command.status import Status, Value
+from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.emulation.figures import report_lines
+from common.emulation.spec import Direction, Stream, unused_clauses
 from feelahead.processes import SideFailedError, SideProcess
 from feelahead.summary import merge_summaries
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NoReturn, get_args
 
 from common.errors import ConfigurationError
-from common.keys import KeyFolder, Side, checked_name, default_folder, passed_over_note, read_public_key
 from common.sockets.authentication import make_key_pair, public_part
+from common.sockets.keys import KeyFolder, Side, checked_name, default_folder, passed_over_note, read_public_key
 
 _STEPS = """\
 Two machines, from nothing to a link that is encrypted and open to nobody else:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from common.clock import VirtualClock
-from common.link_model import DelayLine, Stream, link_summary
+from common.emulation.delay_line import DelayLine, link_summary
+from common.emulation.spec import Stream
 from common.statistics import RunningStatistics
 from feelahead.summary import merge_summaries
 from operator_side.core import OperatorSide

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Sequence
 
-from common.command_line import run_command
+from common.command.command_line import run_command
 from common.errors import ConfigurationError
 from feelahead.bench import bench
 from feelahead.calibrate import calibrate

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
+from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
-from common.stop_signal import StopSignal
 
 _BAD_INPUT = 2
 _STOP_PERIOD_S = 0.05

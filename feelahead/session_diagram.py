@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
-from common.command_line import run_command
+from common.command.command_line import run_command
 from common.errors import ConfigurationError
-from common.session import OWNING, TRANSITIONS, SessionState, Transition
+from common.protocol.session import OWNING, TRANSITIONS, SessionState, Transition
 from feelahead.generated_part import with_generated_part
 
 PROGRAM = "python -m feelahead.session_diagram"

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import tyro
 
 from common.clock import Clock, MonotonicClock
-from common.command_line import parse_settings
-from common.stop_signal import StopSignal, ignore_broken_output
+from common.command.command_line import parse_settings
+from common.command.stop_signal import StopSignal, ignore_broken_output
 from operator_side.dualsense.effects import AnyEffect
 from operator_side.dualsense.models import Model
 from operator_side.dualsense.simulated import INPUT_REPORT_PERIOD_S, SimulatedDualSense

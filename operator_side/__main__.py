@@ -1,6 +1,6 @@
 """The console script `feelahead-operator`, also `python -m operator_side`."""
 
-from common.launch import Command, launch
+from common.command.launch import Command, launch
 
 
 def main() -> None:

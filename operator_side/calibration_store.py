@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
-from common.toml_file import read_toml
-from common.user_folders import configuration_folder
+from common.files.toml_file import read_toml
+from common.files.user_folders import configuration_folder
 from operator_side.dualsense.address import checked_address
 from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 

@@ -8,11 +8,11 @@ view payloads ─▶ receive_view ─▶ screen
 import math
 from typing import Any
 
-from common.codec import decode, encode
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.link_end import LinkEnd
-from common.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
-from common.session import OWNING, SessionState
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.dualsense.input_report import parse_input_report
 from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report

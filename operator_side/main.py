@@ -10,16 +10,17 @@ from contextlib import ExitStack
 from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
-from common.command_line import given_fields, parse_settings, run_command
+from common.command.command_line import given_fields, parse_settings, run_command
+from common.command.status import Status, Value
+from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.emulation.delay_line import DelayLine, link_summary
+from common.emulation.spec import unused_clauses
 from common.errors import ConfigurationError, FeelaheadError
-from common.garbage import IdleCollection
-from common.link_model import DelayLine, link_summary, unused_clauses
-from common.pacing import Pacer, wait_for_turn
-from common.priority import make_realtime, raise_priority
-from common.sockets import OperatorSockets
+from common.realtime.garbage import IdleCollection
+from common.realtime.pacing import Pacer, wait_for_turn
+from common.realtime.priority import make_realtime, raise_priority
 from common.sockets.authentication import OperatorKeys
-from common.status import Status, Value
-from common.stop_signal import StopSignal, ignore_broken_output
+from common.sockets.operator import OperatorSockets
 from operator_side.calibration_store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
 from operator_side.dualsense.background_writes import BackgroundWrites

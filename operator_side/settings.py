@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from common.run_options import RunOptions
+from common.command.run_options import RunOptions
 from operator_side.simulated_operator import PersonSettings
 from operator_side.travel_calibration import TravelCalibration
 from operator_side.trigger_rendering import RenderingSettings

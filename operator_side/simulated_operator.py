@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from common.messages import Telemetry, Vector2, Vector3
+from common.protocol.messages import Telemetry, Vector2, Vector3
 from operator_side.button_map import Action, button_of
 from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.simulated import SimulatedDualSense

@@ -6,7 +6,7 @@ stiffness ─▶ band ─▶ level ─▶ limit on sustained force ─▶ profil
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.messages import StiffnessUpdate
+from common.protocol.messages import StiffnessUpdate
 from operator_side.bands import Band, BandSettings
 from operator_side.contact_detent import DetentSelector, with_detent
 from operator_side.dualsense.controller_state import SENSED_TRAVEL

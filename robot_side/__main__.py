@@ -1,6 +1,6 @@
 """The console script `feelahead-robot`, also `python -m robot_side`."""
 
-from common.launch import Command, launch, single_threaded_algebra
+from common.command.launch import Command, launch, single_threaded_algebra
 
 
 def main() -> None:

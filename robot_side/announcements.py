@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import msgspec
 
-from common.codec import encode
-from common.link_end import LinkEnd
-from common.messages import Header, LeaseNotice
-from common.session import SessionState
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, LeaseNotice
+from common.protocol.session import SessionState
 from robot_side.lease import Lease
 from robot_side.participant import Participant
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from common.arrays import FloatArray
-from common.delay import LoopAge
 from common.errors import ConfigurationError
-from common.link_end import LinkEnd
+from common.protocol.link_end import LinkEnd
+from common.timing.ages import LoopAge
 from robot_side.arm import MujocoArm, MujocoKinematics
 from robot_side.arm_port import Arm, ArmState
 from robot_side.contact import ContactPredictor

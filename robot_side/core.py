@@ -11,9 +11,9 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from common.arrays import FloatArray
-from common.codec import encode
-from common.delay import LoopAge
-from common.messages import MotionState, StiffnessUpdate, Telemetry
+from common.protocol.codec import encode
+from common.protocol.messages import MotionState, StiffnessUpdate, Telemetry
+from common.timing.ages import LoopAge
 from robot_side.arm_port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.contact import Contact, ContactPredictor
 from robot_side.held_object import HeldObject, grip, gripped_object, with_held

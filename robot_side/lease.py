@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterator
 
-from common.session import SessionEvent, SessionState
+from common.protocol.session import SessionEvent, SessionState
 from robot_side.participant import Participant
 from robot_side.safety import Safety
 

@@ -8,20 +8,21 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from common.admission import Admission
 from common.clock import MonotonicClock, clock_domain
-from common.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings, run_command
+from common.command.status import Status
+from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
+from common.emulation.delay_line import BitFlip, DelayLine, link_summary
+from common.emulation.spec import LinkSpec, Stream, unused_clauses
 from common.errors import FeelaheadError
-from common.garbage import IdleCollection
-from common.keys import passed_over_note
-from common.link_model import BitFlip, DelayLine, LinkSpec, Stream, link_summary, unused_clauses
-from common.pacing import Pacer, wait_for_turn
-from common.priority import make_realtime, raise_descriptor_limit, raise_priority
-from common.sockets import RobotSockets
+from common.realtime.garbage import IdleCollection
+from common.realtime.pacing import Pacer, wait_for_turn
+from common.realtime.priority import make_realtime, raise_descriptor_limit, raise_priority
+from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
+from common.sockets.keys import passed_over_note
+from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
-from common.status import Status
-from common.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
 from robot_side.assembly import build_robot_side
 from robot_side.core import Outgoing, RobotSide
 from robot_side.overlap.kernels import warm_up

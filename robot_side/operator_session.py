@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from common.codec import decode
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.link_end import Arrival, LinkEnd
-from common.messages import Header, Hello, MotionCommand
-from common.session import SessionEvent, SessionState
+from common.protocol.codec import decode
+from common.protocol.link_end import Arrival, LinkEnd
+from common.protocol.messages import Header, Hello, MotionCommand
+from common.protocol.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
 from robot_side.announcements import Announcements, Answer
 from robot_side.lease import MOST_OBSERVERS, Lease

@@ -2,8 +2,8 @@
 
 import math
 
-from common.link_end import LinkEnd
-from common.session import Session, SessionState
+from common.protocol.link_end import LinkEnd
+from common.protocol.session import Session, SessionState
 
 
 class Participant:

@@ -9,9 +9,9 @@ while a steady delay, however long, ages nothing.
 from collections import deque
 from dataclasses import dataclass
 
-from common.link_end import Arrival
-from common.messages import MotionCommand, MotionState
-from common.session import Session, SessionEvent, SessionState
+from common.protocol.link_end import Arrival
+from common.protocol.messages import MotionCommand, MotionState
+from common.protocol.session import Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
 """Travel below this counts as released: a calibrated trigger at rest reads 0, give or take a count."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from common.run_options import RunOptions
+from common.command.run_options import RunOptions
 from robot_side.contact import ContactSettings
 from robot_side.enlargement import EnlargementSettings
 from robot_side.kinematic_error import VarianceMeasure

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
-from common.messages import MotionCommand
+from common.protocol.messages import MotionCommand
 
 
 @dataclass(frozen=True)

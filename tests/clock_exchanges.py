@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from common.clock_offset import ClockOffset
+from common.timing.clock_offset import ClockOffset
 
 Clock = Callable[[float], float]
 

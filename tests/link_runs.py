@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from common.link_model import DelayLine, LinkModel, LinkProfile
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import LinkModel, LinkProfile
 
 PERIOD_S = 1e-3
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from common.clock import MonotonicClock
-from common.launch import launch
+from common.command.launch import launch
 from operator_side.dualsense.device import HidHandle
 from operator_side.main import command
 from tests.fake_hid import FakeHandle

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from common.messages import Header, Telemetry, Vector3
+from common.protocol.messages import Header, Telemetry, Vector3
 from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button, Stick
 from operator_side.dualsense.effects import TriggerEffect
 from operator_side.dualsense.output_report import OutputReport, build_output_report

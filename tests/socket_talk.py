@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from common.sockets import OperatorSockets, RobotSockets
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0

@@ -1,4 +1,4 @@
-from common.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
+from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
 
 
 def admitted(admission: Admission, *peers: bytes, operator: bytes | None = b"operator") -> list[bytes]:

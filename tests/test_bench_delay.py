@@ -88,7 +88,7 @@ def test_an_estimate_that_is_wrong_is_told() -> None:
 
 
 def test_a_bound_that_is_too_tight_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("common.clock_offset.ClockOffset.bound_at", lambda *_: 1e-9)
+    monkeypatch.setattr("common.timing.clock_offset.ClockOffset.bound_at", lambda *_: 1e-9)
     assert measure(scenarios()[0], 1, 0, 1.0, lambda: None).violations > 100
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import feelahead.main
+from common.emulation.trace import Trace
 from common.errors import ConfigurationError
-from common.link_trace import Trace
 
 BENCH = ["bench", "link"]
 

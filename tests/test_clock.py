@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.clock import Clock, MonotonicClock, VirtualClock, clock_domain
-from common.link_end import LinkEnd
+from common.protocol.link_end import LinkEnd
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.clock_offset import MAX_SKEW, ClockOffset
-from common.difference_blocks import MOST_BLOCKS
+from common.timing.clock_offset import MAX_SKEW, ClockOffset
+from common.timing.difference_blocks import MOST_BLOCKS
 from tests.clock_exchanges import ahead, error_s, exchange, talk
 
 repeatable = settings(derandomize=True, deadline=None)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.clock_offset import MAX_SKEW, ClockOffset
+from common.timing.clock_offset import MAX_SKEW, ClockOffset
 from tests.clock_exchanges import ahead, error_s, exchange
 
 repeatable = settings(derandomize=True, deadline=None)

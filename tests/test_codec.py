@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.messages import AnyMessage, Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
-from common.session import SessionState
+from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
+from common.protocol.messages import AnyMessage, Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.session import SessionState
 
 unit = st.floats(0.0, 1.0)
 signed_unit = st.floats(-1.0, 1.0)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from common.command_line import load_toml, parse_settings
+from common.command.command_line import load_toml, parse_settings
+from common.command.run_options import RunOptions
 from common.errors import ConfigurationError
-from common.run_options import RunOptions
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.delay import LoopAge, QueueingAge
+from common.timing.ages import LoopAge, QueueingAge
 
 repeatable = settings(derandomize=True, deadline=None)
 delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.delay_distribution import DelayTable, cells, delays_at, moments, table
+from common.emulation.distribution import DelayTable, cells, delays_at, moments, table
 from common.errors import ConfigurationError
 
 IPROUTE2_TABLES = Path("/usr/lib/x86_64-linux-gnu/tc")

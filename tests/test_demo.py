@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from common.command_line import given_fields, parse_settings
+from common.command.command_line import given_fields, parse_settings
 from common.errors import ConfigurationError
 from feelahead import demo as module
 from feelahead.demo import DemoSettings, demo

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.difference_blocks import MOST_BLOCKS, Block, BlockTrack
+from common.timing.difference_blocks import MOST_BLOCKS, Block, BlockTrack
 
 repeatable = settings(derandomize=True, deadline=None)
 samples = st.lists(st.tuples(st.floats(0.0, 0.1), st.floats(-0.5, 0.5)), min_size=1, max_size=60)

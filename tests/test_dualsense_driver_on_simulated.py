@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 
 from common.clock import VirtualClock
-from common.codec import encode
 from common.errors import DeviceError
-from common.link_end import LinkEnd
-from common.messages import StiffnessUpdate
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import StiffnessUpdate
 from operator_side.core import OperatorSide
 from operator_side.dualsense.connection import LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.device import HidDualSense, HidHandle

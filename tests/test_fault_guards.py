@@ -10,10 +10,10 @@ from typing import Any
 import msgspec
 import pytest
 
-import common.session
-from common.link_end import Arrival, LinkEnd
-from common.messages import AnyMessage
-from common.session import SessionEvent, SessionState
+import common.protocol.session
+from common.protocol.link_end import Arrival, LinkEnd
+from common.protocol.messages import AnyMessage
+from common.protocol.session import SessionEvent, SessionState
 from feelahead.experiments import virtual_session_faults as session_faults
 from feelahead.experiments import virtual_stream_faults as stream_faults
 from feelahead.experiments.fault import Outcome
@@ -90,9 +90,9 @@ def gap_by_the_wall_clock(patch: pytest.MonkeyPatch) -> None:
 
 def leads_to(state: SessionState, event: SessionEvent, after: SessionState) -> Patch:
     """Change one row of the session's table."""
-    rows: Mapping[Any, Any] = common.session.TABLE
+    rows: Mapping[Any, Any] = common.protocol.session.TABLE
     row = replace(rows[state, event], after=after)
-    return put(common.session, "TABLE", MappingProxyType({**rows, (state, event): row}))
+    return put(common.protocol.session, "TABLE", MappingProxyType({**rows, (state, event): row}))
 
 
 def any_command_of_the_owner(self: OperatorSession, participant: Any, _: Any) -> bool:
@@ -140,7 +140,7 @@ GUARDS = (
     Guard("a known loop age", put(Safety, "_loop_is_young", lambda *_: True), session_faults.wrong_arming),
     Guard("the emergency stop", put(Safety, "emergency_stop", nothing), session_faults.emergency_stop),
     Guard("the latch of the stop", forget_the_stop, session_faults.emergency_stop),
-    Guard("ranges of fields", put("common.messages", "_in_range", nothing), session_faults.bad_messages),
+    Guard("ranges of fields", put("common.protocol.messages", "_in_range", nothing), session_faults.bad_messages),
     Guard("no clock but now", gap_by_the_wall_clock, session_faults.wall_clock_jumps),
     Guard("room for observers", put("robot_side.lease", "MOST_OBSERVERS", 10_000), session_faults.reconnect_storm),
 )

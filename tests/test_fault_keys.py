@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from common.clock import MonotonicClock
-from common.keys import KeyFolder
 from common.sockets.authentication import make_key_pair
+from common.sockets.keys import KeyFolder
 from feelahead.processes import SideProcess
 from robot_side.main import KEYS_PERIOD_S
 

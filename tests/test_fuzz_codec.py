@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
 from common.errors import RemoteProtocolError
-from common.messages import AnyMessage, Header, Hello, MotionCommand, StiffnessUpdate
+from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
+from common.protocol.messages import AnyMessage, Header, Hello, MotionCommand, StiffnessUpdate
 from feelahead.experiments.hostile_inputs import payload
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0, echo_sent_s=2.5, echo_held_s=0.25)

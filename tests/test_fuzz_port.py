@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from common.keys import AllowList, KeyFolder
-from common.sockets import OperatorSockets, RobotSockets, shell
 from common.sockets import robot as robot_sockets
+from common.sockets import shell
 from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES
 from feelahead.experiments.hostile_inputs import Attacker
 from feelahead.experiments.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready

@@ -3,9 +3,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from common import garbage
 from common.clock import VirtualClock
-from common.garbage import IdleCollection
+from common.realtime import garbage
+from common.realtime.garbage import IdleCollection
 
 
 @pytest.fixture(autouse=True)

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from common.keys import AllowList, KeyFolder
-from common.sockets import OperatorSockets, RobotSockets, shell
+from common.sockets import shell
 from common.sockets.authentication import Authenticator, RobotKeys, make_key_pair
+from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from tests import test_fuzz_port as port
 from tests import test_keys as files
 from tests import test_keys_on_the_wire as wire

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from common import keys
-from common.endpoints import parse_bind, refuse_open
 from common.errors import ConfigurationError
-from common.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
+from common.sockets import keys
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.sockets.endpoints import parse_bind, refuse_open
+from common.sockets.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
 
 KEY, OTHER = "ab" * 32, "cd" * 32
 

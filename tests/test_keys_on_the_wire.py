@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from common.clock import MonotonicClock
-from common.keys import AllowList, KeyFolder
-from common.sockets import OperatorSockets, RobotSockets
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0

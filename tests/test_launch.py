@@ -27,7 +27,7 @@ def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
 SLOW_IMPORT = """
 import sys, time
 sys.argv = ["command"]
-from common.launch import launch
+from common.command.launch import launch
 def load():
     print("importing", flush=True)
     time.sleep(60)
@@ -36,7 +36,7 @@ launch("command", load)
 SLOW_START = """
 import sys, time
 sys.argv = ["command"]
-from common.launch import launch
+from common.command.launch import launch
 def command(arguments):
     print("building", flush=True)
     time.sleep(60)
@@ -47,12 +47,12 @@ launch("command", lambda: command)
 SLOW_END = """
 import sys, time
 sys.argv = ["command"]
-import common.command_line
-from common.launch import launch
+import common.command.command_line
+from common.command.launch import launch
 def run_command(program, command):
     print("ending", flush=True)
     time.sleep(60)
-common.command_line.run_command = run_command
+common.command.command_line.run_command = run_command
 launch("command", lambda: None)
 """
 
@@ -98,7 +98,7 @@ def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
 
 
 def test_a_module_of_ours_that_is_missing_is_a_fault_and_not_an_installation() -> None:
-    code = "import sys\nfrom common.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
+    code = "import sys\nfrom common.command.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
     with start("-c", code) as process:
         _, complaint = process.communicate(timeout=20)
     assert process.returncode == 1
@@ -107,7 +107,10 @@ def test_a_module_of_ours_that_is_missing_is_a_fault_and_not_an_installation() -
 
 @pytest.mark.processes
 def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
-    code = "from common.launch import launch\nlaunch('x', lambda: lambda arguments: print('5 \\u00b1 1 \\u00b5s') or 0)"
+    code = (
+        "from common.command.launch import launch\n"
+        "launch('x', lambda: lambda arguments: print('5 \\u00b1 1 \\u00b5s') or 0)"
+    )
     with start("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") as process:
         said, complaint = process.communicate(timeout=20)
     assert (process.returncode, said, complaint) == (0, "5 ? 1 ?s\n", "")
@@ -115,7 +118,7 @@ def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
 
 @pytest.mark.processes
 def test_a_reader_that_goes_away_is_no_fault() -> None:
-    code = "from common.command_line import run_command\nrun_command('x', lambda _: print('a' * 100_000) or 0)"
+    code = "from common.command.command_line import run_command\nrun_command('x', lambda _: print('a' * 100_000) or 0)"
     with start("-c", code) as process:
         assert process.stdout is not None
         assert process.stderr is not None

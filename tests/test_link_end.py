@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.clock_offset import MAX_SKEW
-from common.link_end import LinkEnd
-from common.messages import Header, MotionCommand, StiffnessUpdate
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
+from common.timing.clock_offset import MAX_SKEW
 from feelahead.benchmarks.delay_traffic import Estimate, Scenario, Traffic, Way
 
 CLOCK = "one clock"

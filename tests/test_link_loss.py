@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from common.link_loss import GilbertElliott, StateLoss
+from common.emulation.loss import GilbertElliott, StateLoss
 from tests.link_runs import Run, bursts, lag_one
 
 # Loss

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.link_model import DelayLine, LinkModel, LinkProfile
-from common.link_profile import Outage
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import LinkModel, LinkProfile, Outage
 from tests.link_runs import PERIOD_S, Run
 
 repeatable = settings(derandomize=True, deadline=None)

@@ -7,17 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import QUEUE_LIMIT, LinkModel, LinkProfile
+from common.emulation.spec import Direction, LinkSpec, Stream, unused_clauses
 from common.errors import ConfigurationError
-from common.link_model import (
-    QUEUE_LIMIT,
-    DelayLine,
-    Direction,
-    LinkModel,
-    LinkProfile,
-    LinkSpec,
-    Stream,
-    unused_clauses,
-)
 
 repeatable = settings(derandomize=True, deadline=None)
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.delay_distribution import DelayTable
+from common.emulation.distribution import DelayTable
+from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
+from common.emulation.profile import Chance, LinkProfile, Outage, Rate
+from common.emulation.slots import Slot, SlotShape
+from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError
-from common.link_loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.link_model import LinkProfile, LinkSpec
-from common.link_profile import Chance, Outage, Rate
-from common.link_slots import Slot, SlotShape
 
 repeatable = settings(derandomize=True, deadline=None)
 
@@ -146,7 +146,7 @@ WORDS = (
         ("delay 50ms 10ms distribution", "''", "uniform, normal"),
         ("delay 50ms 10ms distribution loss 1%", "'loss'", "uniform, normal"),
         ("delay 50ms 10ms distribution gauss", "'gauss'", "uniform, normal"),
-        ("delay 50ms 10ms distribution /dev", "/dev", "1 to 16384"),
+        ("delay 50ms 10ms distribution /dev", "/dev", "a table's file"),
         ("delay 50ms 10ms distribution /dev/zero", "/dev/zero", "1 to 16384"),
         ("loss", "'loss' without probability", "loss [random]"),
         ("loss 1", "'1'", "0% to 100%"),

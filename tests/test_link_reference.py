@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.emulation.profile import LinkProfile
 from common.errors import ConfigurationError
-from common.link_model import LinkProfile
 from feelahead.benchmarks.link_reference import compare, independent_delays, judge, measure_band, table
 from feelahead.benchmarks.link_samples import LinkSample, distance, play, read_link_sample
 

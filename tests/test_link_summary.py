@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
+from common.emulation.delay_line import DelayLine
+from common.emulation.expectation import expected
+from common.emulation.figures import report_lines
+from common.emulation.profile import LinkModel, LinkProfile
 from common.errors import ConfigurationError
-from common.link_expectation import expected
-from common.link_figures import report_lines
-from common.link_model import DelayLine, LinkModel, LinkProfile
 from feelahead.benchmarks.link_samples import play
 from feelahead.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings

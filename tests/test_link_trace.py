@@ -3,9 +3,10 @@ from pathlib import Path
 
 import pytest
 
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.trace import Trace, read_samples
 from common.errors import ConfigurationError
-from common.link_model import DelayLine, LinkModel, LinkProfile
-from common.link_trace import Trace, read_samples
 
 
 def written(folder: Path, content: str, name: str = "trace.csv") -> Path:

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.difference_blocks import Block, BlockTrack
-from common.offset_fits import TYPICAL_SKEW, Average, fit_envelope, fit_mean, typical_skewness
-from common.offset_interval import OffsetInterval
+from common.timing.difference_blocks import Block, BlockTrack
+from common.timing.offset_fits import TYPICAL_SKEW, Average, fit_envelope, fit_mean, typical_skewness
+from common.timing.offset_interval import OffsetInterval
 
 repeatable = settings(derandomize=True, deadline=None)
 MAX_SKEW = 600e-6

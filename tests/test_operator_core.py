@@ -2,10 +2,10 @@ from collections.abc import Callable
 
 import pytest
 
-from common.codec import PROTOCOL_VERSION, decode, encode
-from common.link_end import LinkEnd
-from common.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
-from common.session import SessionState
+from common.protocol.codec import PROTOCOL_VERSION, decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.session import SessionState
 from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
 from operator_side.dualsense.controller_state import Button
 from operator_side.dualsense.effects import Off

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from common.command_line import load_toml, parse_settings
+from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import PersonSettings

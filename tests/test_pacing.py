@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.clock import VirtualClock
-from common.pacing import Pacer, wait_for_turn
+from common.realtime.pacing import Pacer, wait_for_turn
 
 PERIOD_S = 1e-3
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common import priority
+from common.realtime import priority
 
 
 def run(code: str) -> str:
@@ -15,7 +15,7 @@ def run(code: str) -> str:
 
 def test_it_says_whether_the_priority_was_granted() -> None:
     granted, niceness = run(
-        "from common.priority import raise_priority; import os;"
+        "from common.realtime.priority import raise_priority; import os;"
         "print(raise_priority(), os.getpriority(os.PRIO_PROCESS, 0))"
     ).split()
     assert granted == str(int(niceness) <= -10)
@@ -24,7 +24,7 @@ def test_it_says_whether_the_priority_was_granted() -> None:
 
 def test_every_thread_is_raised_not_only_the_one_that_asks() -> None:
     said = run(
-        "import os, threading, time\nfrom common.priority import raise_priority\n"
+        "import os, threading, time\nfrom common.realtime.priority import raise_priority\n"
         "threading.Thread(target=time.sleep, args=(0.5,)).start()\n"
         "granted = raise_priority()\n"
         "levels = {os.getpriority(os.PRIO_PROCESS, int(thread)) for thread in os.listdir('/proc/self/task')}\n"
@@ -35,7 +35,7 @@ def test_every_thread_is_raised_not_only_the_one_that_asks() -> None:
 
 def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
     said = run(
-        "import os\nfrom common.priority import make_realtime\n"
+        "import os\nfrom common.realtime.priority import make_realtime\n"
         "notes = make_realtime()\nprint(os.sched_getscheduler(0) == os.SCHED_FIFO)\nprint(*notes, sep='\\n')"
     ).splitlines()
     granted, notes = said[0] == "True", said[1:]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from common.messages import Header, Hello
-from common.session import SessionState
+from common.protocol.messages import Header, Hello
+from common.protocol.session import SessionState
 from feelahead.experiments.session_bench import Bench
 from robot_side.settings import EnlargementOptions, RobotSettings
 

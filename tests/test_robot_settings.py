@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from common.command_line import load_toml, parse_settings
+from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from robot_side.assembly import build_robot_side
 from robot_side.perceived_objects import Role

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
+from common.protocol.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
 from feelahead.generated_part import BEGIN, END, with_generated_part
 from feelahead.session_diagram import DOCUMENT, diagram, generated, table
 

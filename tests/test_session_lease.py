@@ -3,9 +3,9 @@
 import msgspec
 import pytest
 
-from common.codec import PROTOCOL_VERSION, decode, encode
-from common.messages import Hello, LeaseNotice, StiffnessUpdate
-from common.session import SessionState
+from common.protocol.codec import PROTOCOL_VERSION, decode, encode
+from common.protocol.messages import Hello, LeaseNotice, StiffnessUpdate
+from common.protocol.session import SessionState
 from feelahead.experiments.session_bench import CRUISE, QUICK, Bench, Operator
 from robot_side.core import OBSERVER_PERIOD_S
 from robot_side.lease import MOST_AWAY, MOST_OBSERVERS

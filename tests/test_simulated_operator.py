@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from common.messages import Vector3
+from common.protocol.messages import Vector3
 from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.trigger_model import (
     NORMAL_FINGER_FORCE_N,

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from common.errors import ConfigurationError
-from common.sockets import OperatorSockets, RobotSockets
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from tests.socket_talk import (
     EPHEMERAL,
     greet,

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 import pytest
 import zmq
 
-from common.sockets import OperatorSockets, RobotSockets, shell
+from common.sockets import shell
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
 from tests.socket_talk import (
     EPHEMERAL,

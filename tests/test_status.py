@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from common.status import Status, StatusMode, Value
+from common.command.status import Status, StatusMode, Value
 
 
 def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from common.stop_signal import StopSignal
+from common.command.stop_signal import StopSignal
 
 BOTH = (signal.SIGINT, signal.SIGTERM)
 
@@ -66,7 +66,7 @@ def test_the_inner_one_of_two_takes_the_signal() -> None:
 
 LOOP = """
 import time
-from common.stop_signal import StopSignal
+from common.command.stop_signal import StopSignal
 with StopSignal() as stop:
     print("ready", flush=True)
     while not stop.is_set:
@@ -90,7 +90,7 @@ def test_a_process_ends_its_loop_the_clean_way(number: signal.Signals) -> None:
 # Reads one line so that it knows that its reader has gone, and writes until the pipe breaks.
 WRITER = """
 import sys
-from common.stop_signal import ignore_broken_output
+from common.command.stop_signal import ignore_broken_output
 sys.stdin.readline()
 try:
     while True:
@@ -131,7 +131,7 @@ def test_a_reader_that_went_away_leaves_no_complaint(handling: str, quiet: bool)
 def test_until_then_a_signal_ends_the_process_even_in_a_callback(number: signal.Signals) -> None:
     program = (
         "import ctypes, signal\n"
-        "from common.stop_signal import leave_at_once_on_signals\n"
+        "from common.command.stop_signal import leave_at_once_on_signals\n"
         "leave_at_once_on_signals()\n"
         f"call = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal({int(number)}))\n"
         "call()\n"

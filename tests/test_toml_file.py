@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.toml_file import read_toml
+from common.files.toml_file import read_toml
 
 
 @pytest.fixture

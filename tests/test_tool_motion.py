@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from common.messages import Header, MotionCommand
+from common.protocol.messages import Header, MotionCommand
 from robot_side.tool_motion import ToolMotionSettings, tool_twist, trigger_directions
 from tests.perceived_scenes import random_rotation
 

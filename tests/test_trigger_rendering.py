@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.messages import Header, StiffnessUpdate
+from common.protocol.messages import Header, StiffnessUpdate
 from operator_side.bands import Band, BandSettings
 from operator_side.dualsense.effects import MultiPositionFeedback, Off
 from operator_side.dualsense.output_report import RELEASED, Rumble

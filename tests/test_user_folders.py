@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from common.user_folders import configuration_folder
+from common.files.user_folders import configuration_folder
 
 HOME = Path("/home/someone")
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.codec import encode
-from common.link_end import LinkEnd
-from common.messages import StiffnessUpdate
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import StiffnessUpdate
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects import Feedback, Off
 from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble

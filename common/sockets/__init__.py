@@ -4,11 +4,6 @@ Control (ROUTER and DEALER) carries small messages both ways, view (PUB and SUB)
 the operator, apart so that a frame never delays a stiffness. No call but `wait` blocks; a message that cannot
 leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
 
-Only this package knows ZeroMQ: `shell` has what both ends share, `authentication` who may connect, `robot` and
-`operator` the two ends.
+Only `shell`, `authentication`, `robot` and `operator` know ZeroMQ: what both ends share, who may connect, and the
+two ends. `keys`, `endpoints` and `admission` are what they go by.
 """
-
-from common.sockets.operator import OperatorSockets
-from common.sockets.robot import RobotSockets
-
-__all__ = ["OperatorSockets", "RobotSockets"]

@@ -12,7 +12,7 @@ from zmq.utils import z85
 from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
-from common.keys import AllowList, KeyFolder, read_public_key
+from common.sockets.keys import AllowList, KeyFolder, read_public_key
 
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"

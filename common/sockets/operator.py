@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 import zmq
 
-from common.endpoints import following, parse_connect
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
+from common.sockets.endpoints import following, parse_connect
 from common.sockets.shell import CONTROL_LIMIT_BYTES, Reader, SocketShell, connect_socket
 
 _RETRY_S = 0.5

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import zmq
 
-from common.endpoints import Endpoint, following, parse_bind, refuse_open
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
+from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
 from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket
 
 PEER_LIMIT_PER_S = 5000

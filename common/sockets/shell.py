@@ -9,9 +9,9 @@ from typing import Self
 import zmq
 
 from common.clock import MonotonicClock
-from common.endpoints import Endpoint
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator
+from common.sockets.endpoints import Endpoint
 
 CONTROL_HIGH_WATER_MARK = 16
 """Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings, run_command
 from common.errors import ConfigurationError
 from feelahead.benchmarks.delay_runs import GOAL_S, Outcome, measure, quantile_of_sizes, rms
 from feelahead.benchmarks.delay_traffic import Scenario, scenarios

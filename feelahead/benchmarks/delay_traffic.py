@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from common.arrays import FloatArray
-from common.link_end import LinkEnd
-from common.messages import Header, Hello, MotionCommand, StiffnessUpdate
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, Hello, MotionCommand, StiffnessUpdate
 from feelahead.benchmarks.delay_peers import Stamps
 
 ROBOT_PERIOD_S = 1 / 1000

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
 from feelahead.benchmarks.dualsense_conduct import Conduct, Driver
 from feelahead.benchmarks.dualsense_ours import Ours

@@ -22,7 +22,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from feelahead.benchmarks.stiffness_source import StiffnessSource
 from operator_side.dualsense.controller_state import ControllerState

@@ -12,11 +12,13 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
+from common.emulation.figures import report_lines
+from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.randomness import CorrelationModel
+from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
-from common.link_figures import report_lines
-from common.link_model import CorrelationModel, LinkModel, LinkProfile, LinkSpec
-from common.pacing import SPIN_S
+from common.realtime.pacing import SPIN_S
 from feelahead.benchmarks.link_real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link_reference import compare, independent_delays, judge, measure_band, table
 from feelahead.benchmarks.link_samples import LinkSample, play, read_link_sample

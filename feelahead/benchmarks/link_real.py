@@ -19,10 +19,12 @@ from typing import Any, Literal
 import numpy as np
 
 from common.clock import MonotonicClock
-from common.link_model import DelayLine, Direction, LinkSpec
-from common.pacing import SPIN_S, Pacer, wait_for_turn
-from common.priority import raise_priority, schedule_realtime
-from common.sockets import OperatorSockets, RobotSockets
+from common.emulation.delay_line import DelayLine
+from common.emulation.spec import Direction, LinkSpec
+from common.realtime.pacing import SPIN_S, Pacer, wait_for_turn
+from common.realtime.priority import raise_priority, schedule_realtime
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from feelahead.benchmarks.link_peers import BareZeroMQLink, DatagramLink, Link
 from feelahead.benchmarks.link_samples import LinkSample
 

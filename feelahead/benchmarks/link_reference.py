@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.link_model import LinkProfile
+from common.emulation.profile import LinkProfile
 from feelahead.benchmarks.link_samples import LinkSample, distance, play
 from feelahead.benchmarks.overlap_report import Goal, Table
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from common.arrays import FloatArray
-from common.delay_distribution import moments
+from common.emulation.delay_line import DelayLine
+from common.emulation.distribution import moments
+from common.emulation.profile import LinkProfile
+from common.emulation.trace import read_samples
 from common.errors import ConfigurationError
-from common.link_model import DelayLine, LinkProfile
-from common.link_trace import read_samples
 
 STALL_S = 1e-3
 """A delay that exceeds the model's greatest by more than this is the host's doing, not the link's."""

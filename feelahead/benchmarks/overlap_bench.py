@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
 from feelahead.benchmarks.overlap_accuracy import draw_samples, measure_accuracy
 from feelahead.benchmarks.overlap_classes import MAKERS, frozen_classes

@@ -3,13 +3,13 @@
 from types import TracebackType
 
 from common.clock import MonotonicClock, clock_domain
-from common.codec import decode, encode
 from common.errors import RemoteProtocolError
-from common.link_end import LinkEnd
-from common.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
-from common.pacing import Pacer, wait_for_turn
-from common.session import SessionState
-from common.sockets import RobotSockets
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
+from common.protocol.session import SessionState
+from common.realtime.pacing import Pacer, wait_for_turn
+from common.sockets.robot import RobotSockets
 
 TICK_PERIOD_S = 1e-3
 """As the robot side's."""

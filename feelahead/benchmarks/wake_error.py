@@ -21,10 +21,10 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings, run_command
-from common.pacing import SPIN_S, Pacer, wait_for_turn
-from common.priority import make_realtime, raise_priority
-from common.sockets import RobotSockets
+from common.command.command_line import parse_settings, run_command
+from common.realtime.pacing import SPIN_S, Pacer, wait_for_turn
+from common.realtime.priority import make_realtime, raise_priority
+from common.sockets.robot import RobotSockets
 
 _PROGRAM = "python -m feelahead.benchmarks.wake_error"
 _PERIOD_S = 1e-3

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from common.command_line import parse_settings
+from common.command.command_line import parse_settings
 from feelahead.doctor import facts
 from feelahead.doctor.controller_checks import (
     ControllerSeen,

@@ -32,7 +32,7 @@ for name in sys.argv[1:]:
         failures[name] = str(error).splitlines()[0] if str(error) else type(error).__name__
 print(json.dumps(failures))
 """
-_REALTIME: Final = "import json; from common.priority import make_realtime; print(json.dumps(make_realtime()))"
+_REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"
 
 
 def failed_imports() -> dict[str, dict[str, str]]:

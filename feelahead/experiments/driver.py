@@ -17,12 +17,12 @@ from typing import Annotated
 import tyro
 
 from common.clock import MonotonicClock, clock_domain
-from common.command_line import parse_settings, run_command
-from common.priority import raise_priority
-from common.session import OWNING
-from common.sockets import OperatorSockets
-from common.status import Status, StatusMode
-from common.stop_signal import StopSignal
+from common.command.command_line import parse_settings, run_command
+from common.command.status import Status, StatusMode
+from common.command.stop_signal import StopSignal
+from common.protocol.session import OWNING
+from common.realtime.priority import raise_priority
+from common.sockets.operator import OperatorSockets
 from operator_side.core import OperatorSide
 from operator_side.dualsense.controller_state import Button, ControllerState
 from operator_side.dualsense.input_report import build_input_report

@@ -19,8 +19,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from common.command_line import parse_settings
-from common.launch import launch
+from common.command.command_line import parse_settings
+from common.command.launch import launch
 from feelahead.experiments import real_faults
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.first_side import either_side_first

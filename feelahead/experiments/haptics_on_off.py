@@ -21,8 +21,9 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from common.command_line import parse_settings, run_command
-from common.link_model import LinkModel, LinkSpec
+from common.command.command_line import parse_settings, run_command
+from common.emulation.profile import LinkModel
+from common.emulation.spec import LinkSpec
 from feelahead.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import PersonSettings

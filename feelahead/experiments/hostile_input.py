@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from common.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings, run_command
 from feelahead.demo import read_summary
 from feelahead.experiments.hostile_inputs import Attacker
 from feelahead.experiments.raw_zmtp import port_of

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import msgpack
 
-from common.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, encode
-from common.messages import Header, Hello, MotionCommand
+from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, encode
+from common.protocol.messages import Header, Hello, MotionCommand
 from feelahead.experiments.raw_zmtp import GREETING, RawConnection, frame, message, ready
 
 _STRANGERS = 8

@@ -10,11 +10,11 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from common.clock import clock_domain
-from common.codec import decode, encode
-from common.link_end import LinkEnd
-from common.messages import Header, LeaseNotice, MotionCommand
-from common.session import OWNING
-from common.sockets import OperatorSockets
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, LeaseNotice, MotionCommand
+from common.protocol.session import OWNING
+from common.sockets.operator import OperatorSockets
 from feelahead.experiments.cable import Cable
 from feelahead.experiments.fault import Outcome
 from feelahead.experiments.rig import Rig

@@ -22,13 +22,14 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings, run_command
 from common.errors import FeelaheadError
-from common.keys import AllowList, KeyFolder
-from common.pacing import Pacer, wait_for_turn
-from common.priority import raise_priority
-from common.sockets import OperatorSockets, RobotSockets
+from common.realtime.pacing import Pacer, wait_for_turn
+from common.realtime.priority import raise_priority
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair
+from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
 from robot_side.main import KEYS_PERIOD_S
 
 _PROGRAM = "python -m feelahead.experiments.revocation"

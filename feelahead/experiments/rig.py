@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from common.clock import MonotonicClock
 from common.errors import FeelaheadError
-from common.session import OWNING
+from common.protocol.session import OWNING
 from feelahead.processes import SideProcess
 
 HEALTHY_S = 0.2

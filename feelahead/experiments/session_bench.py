@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from common.codec import decode, encode
-from common.link_end import LinkEnd
-from common.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
-from common.session import SessionState
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.session import SessionState
 from feelahead.experiments.watched_arm import WatchedArm
 from robot_side.arm_port import Arm
 from robot_side.assembly import build_robot_side

@@ -26,8 +26,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command_line import parse_settings, run_command
-from common.link_model import LinkSpec
+from common.command.command_line import parse_settings, run_command
+from common.emulation.spec import LinkSpec
 from feelahead.loopback import Loopback, LoopbackSettings
 from feelahead.processes import SideProcess
 from feelahead.summary import merge_summaries

@@ -10,9 +10,9 @@ import msgpack
 import msgspec
 import numpy as np
 
-from common.codec import decode, encode
-from common.messages import Header
-from common.session import SessionState
+from common.protocol.codec import decode, encode
+from common.protocol.messages import Header
+from common.protocol.session import SessionState
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
 from robot_side.lease import MOST_AWAY, MOST_OBSERVERS

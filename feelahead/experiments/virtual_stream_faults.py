@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from common.codec import encode
+from common.protocol.codec import encode
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
 

@@ -14,12 +14,12 @@ from typing import Any, TextIO
 import numpy as np
 
 import robot_side.main
-from common.admission import Admission
 from common.clock import MonotonicClock
-from common.command_line import run_command
+from common.command.command_line import run_command
 from common.errors import ConfigurationError
-from common.link_end import Arrival
-from common.messages import MotionCommand
+from common.protocol.link_end import Arrival
+from common.protocol.messages import MotionCommand
+from common.sockets.admission import Admission
 from feelahead.experiments.watched_arm import WatchedArm
 from robot_side.arm_port import Arm, ArmState
 from robot_side.assembly import build_robot_side

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 from enum import Enum
 from typing import Final
 
-from operator_side.dualsense.field_checks import check_integer, check_kind, check_number
+from common.checks import check_integer, check_kind, check_number
 
 TOUCHPAD_SIZE: Final = (1920, 1080)
 """The pad's width and height in its own units, from the top left."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from common.checks import check_integer, check_kind, check_number, check_numbers
 from operator_side.dualsense.attachments import CHARGED, ON_USB, Battery, Connections, TouchPoint
-from operator_side.dualsense.field_checks import check_integer, check_kind, check_number, check_numbers
 
 Stick = tuple[float, float]
 Vector3 = tuple[float, float, float]

@@ -7,10 +7,10 @@ import struct
 from dataclasses import dataclass
 from typing import Final, Self
 
+from common.checks import check_integer, check_integers
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.address import checked_address
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.field_checks import check_integer, check_integers
 from operator_side.dualsense.transport import Transport, described
 
 CALIBRATION_ID: Final = 0x05

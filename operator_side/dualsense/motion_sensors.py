@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 from typing import Final, Self
 
+from common.checks import check_numbers
 from operator_side.dualsense.controller_state import STANDARD_GRAVITY_M_S2, Vector3
 from operator_side.dualsense.feature_report import CalibrationReport
-from operator_side.dualsense.field_checks import check_numbers
 from operator_side.dualsense.transport import Transport
 
 NOMINAL_GYRO_RAD_S: Final = math.radians(1.0 / 16.0)

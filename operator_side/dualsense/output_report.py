@@ -9,10 +9,10 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Final
 
+from common.checks import check_integer, check_integers, check_kind, check_number
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.effects import DEBUG_CODES, EFFECT_LENGTH, AnyEffect, Off, decode_effect
-from operator_side.dualsense.field_checks import check_integer, check_integers, check_kind, check_number
 from operator_side.dualsense.transport import OUTPUT_FRAMING, Transport, described
 from operator_side.dualsense.unofficial_effects import UnofficialEffect
 

@@ -7,6 +7,7 @@ A trigger's mechanical travel is divided into ten zones, 0 where the finger star
 from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
+from common.checks import check_integer, check_integers
 from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
@@ -17,7 +18,6 @@ from operator_side.dualsense.effect_packing import (
     packed,
     stepped,
 )
-from operator_side.dualsense.field_checks import check_integer, check_integers
 
 OFF_CODE: Final = 0x05
 FEEDBACK_CODE: Final = 0x21

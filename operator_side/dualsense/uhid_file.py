@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 from common.clock import Clock
 from common.errors import ConfigurationError, DeviceError
-from common.pacing import Pacer, wait_for_turn
+from common.realtime.pacing import Pacer, wait_for_turn
 from operator_side.dualsense.uhid import EVENT_LENGTH
 from operator_side.dualsense.uhid_controller import UhidController
 

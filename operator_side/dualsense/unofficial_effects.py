@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
+from common.checks import check_integer
 from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
@@ -16,7 +17,6 @@ from operator_side.dualsense.effect_packing import (
     packed,
     unpack_ends,
 )
-from operator_side.dualsense.field_checks import check_integer
 
 _BOW_CODE, _GALLOPING_CODE, _MACHINE_CODE = 0x22, 0x23, 0x27
 _SIMPLE_FEEDBACK_CODE, _SIMPLE_WEAPON_CODE, _SIMPLE_VIBRATION_CODE = 0x01, 0x02, 0x06

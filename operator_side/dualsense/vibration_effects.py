@@ -6,6 +6,7 @@ They hold nothing against the finger: their `zone_strengths` are 0. Source: Niel
 from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
+from common.checks import check_integer, check_integers
 from operator_side.dualsense.effect_packing import (
     MAX_STRENGTH,
     NO_ZONES,
@@ -13,7 +14,6 @@ from operator_side.dualsense.effect_packing import (
     pack_zones,
     stepped,
 )
-from operator_side.dualsense.field_checks import check_integer, check_integers
 from operator_side.dualsense.resisting_effects import Off
 
 VIBRATION_CODE: Final = 0x26

@@ -5,10 +5,10 @@ import threading
 from types import TracebackType
 
 from common.clock import MonotonicClock, clock_domain
-from common.codec import encode
-from common.link_end import LinkEnd
-from common.messages import StiffnessUpdate
-from common.sockets import RobotSockets
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import StiffnessUpdate
+from common.sockets.robot import RobotSockets
 from robot_side.operator_session import OperatorSession
 from robot_side.safety import Safety, SafetySettings
 

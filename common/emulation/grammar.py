@@ -5,13 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_args
 
-from common.delay_distribution import DelayTable, Distribution
+from common.emulation.distribution import DelayTable, Distribution
+from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
+from common.emulation.profile import Chance, LinkModel, LinkProfile, Outage, Rate
+from common.emulation.randomness import CorrelationModel
+from common.emulation.slots import Slot, SlotShape
+from common.emulation.trace import Trace
 from common.errors import ConfigurationError
-from common.link_loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.link_profile import Chance, LinkModel, LinkProfile, Outage, Rate
-from common.link_randomness import CorrelationModel
-from common.link_slots import Slot, SlotShape
-from common.link_trace import Trace
 from common.units import parse_duration, parse_rate, parse_share
 
 GRAMMAR = {

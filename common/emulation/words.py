@@ -2,9 +2,9 @@
 
 import shlex
 
-from common.delay_distribution import DelayTable, Distribution
-from common.link_profile import QUEUE_LIMIT, Chance, LinkProfile
-from common.link_slots import Slot
+from common.emulation.distribution import DelayTable, Distribution
+from common.emulation.profile import QUEUE_LIMIT, Chance, LinkProfile
+from common.emulation.slots import Slot
 from common.units import format_duration, format_rate, format_share
 
 

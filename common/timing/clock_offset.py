@@ -3,8 +3,8 @@
 import math
 from typing import Literal
 
-from common.offset_interval import OffsetInterval
-from common.offset_tracking import OffsetTracking
+from common.timing.offset_interval import OffsetInterval
+from common.timing.offset_tracking import OffsetTracking
 
 Estimator = Literal["shared clock", "interval", "lower envelope", "mean"]
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from common.arrays import FloatArray
-from common.link_randomness import DRAWN_AT_ONCE, CorrelationModel, decisions
+from common.emulation.randomness import DRAWN_AT_ONCE, CorrelationModel, decisions
 from common.units import format_share
 
 

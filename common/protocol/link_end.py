@@ -4,10 +4,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from common.clock_offset import ClockOffset
-from common.delay import QueueingAge
-from common.messages import AnyMessage, Header, Hello
+from common.protocol.messages import AnyMessage, Header, Hello
 from common.statistics import RunningStatistics
+from common.timing.ages import QueueingAge
+from common.timing.clock_offset import ClockOffset
 
 _REMEMBERED_EPOCHS = 64
 """Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from common.difference_blocks import Block
+from common.timing.difference_blocks import Block
 
 TYPICAL_SKEW = 50e-6
 """Standard deviation of the skew before anything is known: quartz crystals are specified to 20 to 100 ppm."""

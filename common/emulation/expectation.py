@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from common.delay_distribution import delays_at, table
-from common.link_loss import RandomLoss
-from common.link_profile import LinkProfile
+from common.emulation.distribution import delays_at, table
+from common.emulation.loss import RandomLoss
+from common.emulation.profile import LinkProfile
 
 _POINTS = 8192
 

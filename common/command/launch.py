@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
-from common.stop_signal import STOP_SIGNALS, leave_at_once_on_signals
+from common.command.stop_signal import STOP_SIGNALS, leave_at_once_on_signals
 
 Command = Callable[[Sequence[str]], int]
 
@@ -33,7 +33,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
         sys.exit(0)
     try:
         command = load()
-        from common.command_line import run_command  # noqa: PLC0415  # large, hence not before the handlers
+        from common.command.command_line import run_command  # noqa: PLC0415  # large, hence not before the handlers
     except ModuleNotFoundError as error:
         missing = (error.name or "").partition(".")[0]
         if missing in _OURS:

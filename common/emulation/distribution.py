@@ -13,7 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from common.regular_file import read_regular_file
+from common.files.regular_file import read_regular_file
 
 Distribution = Literal["uniform", "normal", "pareto", "paretonormal", "exponential"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.delay_distribution import DelayTable, Distribution, delays_at
+from common.emulation.distribution import DelayTable, Distribution, delays_at
 
 SHORTEST_SLOT_S = 1e-4
 _MOST_SLOTS = 20_000

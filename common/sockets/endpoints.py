@@ -6,7 +6,7 @@ import socket
 from dataclasses import dataclass
 
 from common.errors import ConfigurationError
-from common.keys import default_folder
+from common.sockets.keys import default_folder
 
 _ADDRESS = re.compile(r"tcp://(?:\[(?P<v6>[^\[\]]+)\]|(?P<host>[^\s:/\[\];]+)):(?P<port>[^\s:/]+)")
 _EPHEMERAL = 0

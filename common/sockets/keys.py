@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Literal
 
 from common.errors import ConfigurationError
-from common.regular_file import read_regular_file
-from common.user_folders import configuration_folder
+from common.files.regular_file import read_regular_file
+from common.files.user_folders import configuration_folder
 
 Side = Literal["robot", "operator"]
 

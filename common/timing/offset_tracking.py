@@ -2,8 +2,8 @@
 
 from typing import Literal
 
-from common.difference_blocks import MOST_BLOCKS, Block, BlockTrack
-from common.offset_fits import Average, Envelope, OffsetLine, fit_envelope, fit_mean, typical_skewness
+from common.timing.difference_blocks import MOST_BLOCKS, Block, BlockTrack
+from common.timing.offset_fits import Average, Envelope, OffsetLine, fit_envelope, fit_mean, typical_skewness
 
 _FIRST_BLOCK_S = 0.1
 _LAST_BLOCK_S = 0.8

@@ -7,10 +7,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from common.emulation.grammar import parse_profile
+from common.emulation.profile import LinkModel, LinkProfile, check_seed_and_models, choices
+from common.emulation.randomness import CorrelationModel
 from common.errors import ConfigurationError
-from common.link_grammar import parse_profile
-from common.link_profile import LinkModel, LinkProfile, check_seed_and_models, choices
-from common.link_randomness import CorrelationModel
 
 Direction = Literal["to_robot", "to_operator"]
 Stream = Literal["haptics", "telemetry", "video"]

@@ -1,4 +1,4 @@
-"""Messages to bytes and back: MessagePack, then conversion into the frozen types of common.messages.
+"""Messages to bytes and back: MessagePack, then conversion into the frozen types of common.protocol.messages.
 
 A payload is `[version, message]`. The version is read first, so that a peer of another version is told apart
 from garbage.
@@ -10,7 +10,7 @@ import msgpack
 import msgspec
 
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.messages import AnyMessage, Message
+from common.protocol.messages import AnyMessage, Message
 
 PROTOCOL_VERSION = 3
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness."""

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, Final
 
-from common.regular_file import read_regular_file
+from common.files.regular_file import read_regular_file
 
 _LARGEST_INTEGER: Final = 2**63
 """TOML's own range; larger ones are no numbers to whatever comes after."""

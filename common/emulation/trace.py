@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import ConfigurationError
-from common.regular_file import read_regular_file
+from common.files.regular_file import read_regular_file
 
 _MOST_ROWS = 1_000_000
 _LARGEST_BYTES = 100 * _MOST_ROWS

@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from common.delay_distribution import DelayTable, Distribution, moments
+from common.emulation.distribution import DelayTable, Distribution, moments
+from common.emulation.loss import LossModel
+from common.emulation.randomness import CorrelationModel
+from common.emulation.slots import Slot
+from common.emulation.trace import Trace
 from common.errors import ConfigurationError
-from common.link_loss import LossModel
-from common.link_randomness import CorrelationModel
-from common.link_slots import Slot
-from common.link_trace import Trace
 
 LinkModel = Literal["datagram", "stream"]
 
@@ -161,14 +161,14 @@ class LinkProfile:
         ConfigurationError, in one line, for whatever is unknown, malformed, out of range or contradictory.
         """
         # The grammar builds profiles, so that it cannot be imported before there are any.
-        from common.link_grammar import parse_profile  # noqa: PLC0415
+        from common.emulation.grammar import parse_profile  # noqa: PLC0415
 
         check_seed_and_models(seed, model, correlation_model)
         return parse_profile(spec, spec, seed, model, correlation_model)
 
     def words(self) -> str:
         """The profile in the words that `parse` reads; empty where nothing is asked for."""
-        from common.link_words import format_profile  # noqa: PLC0415
+        from common.emulation.words import format_profile  # noqa: PLC0415
 
         return format_profile(self)
 

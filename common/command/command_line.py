@@ -13,9 +13,9 @@ from typing import Any, TypeVar, get_type_hints
 import msgspec
 import tyro
 
+from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output
 from common.errors import ConfigurationError, FeelaheadError
-from common.stop_signal import STOP_SIGNALS, ignore_broken_output
-from common.toml_file import read_toml
+from common.files.toml_file import read_toml
 
 Settings = TypeVar("Settings")
 

@@ -12,7 +12,7 @@ from typing import Literal
 
 import msgspec
 
-from common.session import SessionState
+from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]

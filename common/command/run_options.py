@@ -6,8 +6,10 @@ from typing import Annotated
 
 import tyro
 
-from common.link_model import CorrelationModel, LinkModel, LinkSpec
-from common.status import StatusMode
+from common.command.status import StatusMode
+from common.emulation.profile import LinkModel
+from common.emulation.randomness import CorrelationModel
+from common.emulation.spec import LinkSpec
 from common.units import parse_duration
 
 _LARGEST_ASYMMETRY_S = 10.0

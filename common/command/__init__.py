@@ -1,0 +1,1 @@
+"""What every command line needs: settings, status, stop signals, orderly ends."""

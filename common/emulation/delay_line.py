@@ -1,0 +1,262 @@
+"""The delay line: does to messages what a profile says."""
+
+import heapq
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Generic, TypeVar, cast
+
+import numpy as np
+
+from common.emulation.distribution import cells, delays_at
+from common.emulation.expectation import expected
+from common.emulation.figures import LinkFigures
+from common.emulation.profile import Chance, LinkProfile
+from common.emulation.randomness import decisions, uniform_blocks
+from common.emulation.slots import SlotTimes
+from common.emulation.spec import Direction, Stream
+
+Item = TypeVar("Item")
+BitFlip = Callable[[bytes], bytes]
+Corrupt = Callable[[Item, BitFlip], Item]
+
+_MOST_RETRANSMISSIONS = 1000
+
+_MOST_OUTAGES_ON_END = 1000
+
+
+class DelayLine(Generic[Item]):
+    """Takes messages in, and gives them out when they are due: fewer, more, altered or in another order.
+
+    The order of events is netem's: duplicate, lose, corrupt, drop what exceeds the limit, delay. A copy goes
+    first, and through all of it by itself. It never runs by itself: ask `next_due` when to call `pop`. The same
+    profile, pushes and times give the same deliveries.
+    """
+
+    def __init__(
+        self, profile: LinkProfile, start_s: float | None = None, corrupt: Corrupt[Item] | None = None
+    ) -> None:
+        """Outages count from `start_s`, by default from the first push.
+
+        `corrupt` turns over one bit of an item by means of the function that it is given; it is needed where
+        the profile corrupts and the items are not bytes.
+        """
+        self.profile = profile
+        self.figures = LinkFigures(profile.seed)
+        """Everything that has happened so far."""
+        self._start_s = start_s
+        self._corrupt = corrupt
+        self._queue: list[tuple[float, float, int, Item, float, int, int, bool]] = []
+        """By time of leaving, due time (earlier than that with slots) and order of arrival."""
+        self._entered = 0
+        self._last_due_s = -math.inf
+        self._since_reordered = 0
+        self._in_order = profile.model == "stream"
+        self._outages = profile.outages
+        self._rate = profile.rate
+        self._trace = None if profile.trace is None else profile.trace.delays_s
+        self._recovery_s = profile.recovery_s() if self._in_order else 0.0
+
+        def generator(number: int) -> np.random.Generator:
+            # One for each mechanism: to add loss changes no delay.
+            return np.random.default_rng(np.random.SeedSequence(profile.seed, spawn_key=(number,)))
+
+        def chances(chance: Chance | None, number: int) -> Iterator[bool] | None:
+            if chance is None or chance.share == 0.0:
+                return None
+            return decisions(generator(number), chance.share, chance.correlation, profile.correlation_model)
+
+        self._delays_s = _endless_delays(profile, generator(0))
+        self._losses = None if profile.loss is None else profile.loss.losses(generator(1), profile.correlation_model)
+        self._duplicates = None if self._in_order else chances(profile.duplicate, 2)
+        self._corruptions = chances(profile.corrupt, 3)
+        self._reorders = chances(profile.reorder, 4)
+        self._slots = None if profile.slot is None else SlotTimes(profile.slot, generator(5))
+        self._bits = generator(6)
+        self._lost_again = decisions(generator(7), profile.retransmitted_share(), 0.0, "proper")
+
+    def push(self, now_s: float, item: Item, size_bytes: int | None = None) -> None:
+        """Take `item` in at `now_s`; its size, which `rate` needs, is that of its bytes unless it is given.
+
+        ValueError for a time that is not finite, a negative size, an unknown size where a rate needs it, and
+        an item that is to be corrupted but is not bytes.
+        """
+        if not math.isfinite(now_s):
+            raise ValueError(f"now_s = {now_s}; valid: finite seconds")
+        if size_bytes is None:
+            if isinstance(item, (bytes, bytearray)):
+                size_bytes = len(item)
+            elif self._rate is not None:
+                raise ValueError("size_bytes is missing; valid: the bytes of an item that is not bytes itself")
+            else:
+                size_bytes = 0
+        elif size_bytes < 0:
+            raise ValueError(f"size_bytes = {size_bytes}; valid: 0 or more")
+        if self._corruptions is not None and self._corrupt is None and not isinstance(item, (bytes, bytearray)):
+            raise ValueError("item is not bytes, which the profile corrupts; valid: bytes, or a line with `corrupt`")
+        if self._start_s is None:
+            self._start_s = now_s
+        number = self.figures.sent
+        self.figures.sent += 1
+        if self._in_order:
+            self._push_stream(now_s, item, number, size_bytes)
+        else:
+            self._push_datagram(now_s, item, number, size_bytes)
+
+    def pop(self, now_s: float) -> list[Item]:
+        """Everything due by `now_s`, in order of due time; at the same due time, in order of `push`.
+
+        ValueError for a time that is not finite.
+        """
+        if not math.isfinite(now_s):
+            raise ValueError(f"now_s = {now_s}; valid: finite seconds")
+        due: list[Item] = []
+        queue = self._queue
+        while queue and queue[0][0] <= now_s:
+            leaves_s, _, _, item, sent_s, number, size_bytes, copy = heapq.heappop(queue)
+            self.figures.add_delivered(now_s, sent_s, leaves_s, number, size_bytes, copy=copy)
+            due.append(item)
+        return due
+
+    def next_due(self) -> float | None:
+        """When the next message is due, in seconds on the clock of `push`; None while nothing waits."""
+        return self._queue[0][0] if self._queue else None
+
+    @property
+    def waiting(self) -> int:
+        """Messages that are not due yet."""
+        return len(self._queue)
+
+    def summary(self) -> dict[str, Any]:
+        """`asked`, in the grammar's words, with model, correlation and seed, what is `expected` and was `achieved`."""
+        return {
+            "asked": self.profile.words(),
+            "model": self.profile.model,
+            "correlation": self.profile.correlation_model,
+            "seed": self.profile.seed,
+            "expected": expected(self.profile),
+            "achieved": self.figures.achieved() | {"waiting": self.waiting},
+        }
+
+    def _push_datagram(self, now_s: float, item: Item, number: int, size_bytes: int) -> None:
+        if self._outage_end_s(now_s) is not None:
+            self.figures.outage += 1
+            return
+        traced_s: float | None = None
+        if self._trace is not None:
+            traced_s = self._trace[number % len(self._trace)]
+            if traced_s is None:
+                self.figures.lost += 1
+                return
+        doubled = self._duplicates is not None and next(self._duplicates)
+        lost = self._losses is not None and next(self._losses)
+        if lost and not doubled:
+            self.figures.lost += 1
+            return
+        # Doubled and lost at once leaves the one message that there was.
+        if doubled and not lost and not (self._losses is not None and next(self._losses)):
+            self.figures.duplicated += 1
+            self._admit(now_s, item, number, size_bytes, traced_s, copy=True)
+        self._admit(now_s, item, number, size_bytes, traced_s, copy=False)
+
+    def _admit(
+        self, now_s: float, item: Item, number: int, size_bytes: int, traced_s: float | None, *, copy: bool
+    ) -> None:
+        if self._corruptions is not None and next(self._corruptions):
+            self.figures.corrupted += 1
+            item = self._corrupted(item)
+        if len(self._queue) >= self.profile.limit:
+            self.figures.dropped += 1
+            return
+        self._enqueue(now_s, self._due_s(now_s, size_bytes, traced_s), item, number, size_bytes, copy=copy)
+
+    def _push_stream(self, now_s: float, item: Item, number: int, size_bytes: int) -> None:
+        if len(self._queue) >= self.profile.limit:
+            self.figures.dropped += 1
+            return
+        sent_s = self._after_outage_s(now_s)
+        self.figures.held += sent_s > now_s
+        traced_s = None if self._trace is None else self._trace[number % len(self._trace)]
+        corrupted = self._corruptions is not None and next(self._corruptions)
+        self.figures.corrupted += corrupted
+        missing = corrupted or (self._losses is not None and next(self._losses))
+        if self._trace is not None and traced_s is None:
+            missing = True
+            traced_s = self._next_traced_s(number)
+        tries = 0
+        while missing and tries < _MOST_RETRANSMISSIONS:
+            tries += 1
+            sent_s = self._after_outage_s(sent_s + self._recovery_s)
+            # A round trip later a burst of loss is over: the long-run share counts.
+            missing = next(self._lost_again)
+        self.figures.retransmitted += tries
+        due_s = max(self._due_s(sent_s, size_bytes, traced_s), self._last_due_s)
+        self._last_due_s = due_s
+        self._enqueue(now_s, due_s, item, number, size_bytes, copy=False)
+
+    def _due_s(self, now_s: float, size_bytes: int, traced_s: float | None) -> float:
+        if self._reorders is not None:
+            if self._since_reordered >= self.profile.gap - 1 and next(self._reorders):
+                self._since_reordered = 0
+                return now_s
+            self._since_reordered += 1
+        due_s = now_s + (next(self._delays_s) if traced_s is None else traced_s)
+        if self._rate is not None:
+            due_s = max(due_s, self._last_due_s) + self._rate.transmission_s(size_bytes)
+            self._last_due_s = due_s
+        return due_s
+
+    def _enqueue(self, now_s: float, due_s: float, item: Item, number: int, size_bytes: int, *, copy: bool) -> None:
+        leaves_s = due_s if self._slots is None else self._slots.take(due_s, now_s, size_bytes)
+        heapq.heappush(self._queue, (leaves_s, due_s, self._entered, item, now_s, number, size_bytes, copy))
+        self._entered += 1
+
+    def _corrupted(self, item: Item) -> Item:
+        if self._corrupt is not None:
+            return self._corrupt(item, self._flip_one_bit)
+        return cast(Item, self._flip_one_bit(cast(bytes, item)))
+
+    def _flip_one_bit(self, payload: bytes) -> bytes:
+        if not payload:
+            return payload
+        altered = bytearray(payload)
+        byte, bit = divmod(int(self._bits.integers(8 * len(altered))), 8)
+        altered[byte] ^= 1 << bit
+        return bytes(altered)
+
+    def _next_traced_s(self, number: int) -> float:
+        trace = self._trace or ()
+        return next(
+            delay_s for step in range(1, len(trace) + 1) if (delay_s := trace[(number + step) % len(trace)]) is not None
+        )
+
+    def _outage_end_s(self, now_s: float) -> float | None:
+        """When the outages end in which `now_s` lies; None outside of any."""
+        start_s = self._start_s
+        if not self._outages or start_s is None:
+            return None
+        ends_s = [end_s for outage in self._outages if (end_s := outage.end_s(now_s - start_s)) is not None]
+        return start_s + max(ends_s) if ends_s else None
+
+    def _after_outage_s(self, now_s: float) -> float:
+        # One outage may end within another, and that within the next time of the first.
+        for _ in range(_MOST_OUTAGES_ON_END):
+            if (end_s := self._outage_end_s(now_s)) is None or end_s <= now_s:
+                break
+            now_s = end_s
+        return now_s
+
+
+def _endless_delays(profile: LinkProfile, generator: np.random.Generator) -> Iterator[float]:
+    if profile.jitter_s == 0.0:
+        while True:
+            yield profile.delay_s
+    number = cells(profile.distribution, profile.jitter_s)
+    for block in uniform_blocks(generator, profile.delay_correlation, profile.correlation_model, number):
+        yield from delays_at(block, profile.delay_s, profile.jitter_s, profile.distribution).tolist()
+
+
+def link_summary(direction: Direction, lines: Mapping[Stream, DelayLine[Any]]) -> dict[str, Any]:
+    """The `link` of a summary: what was asked and achieved, under `to_robot` for haptics, else `to_robot.video`."""
+    return {
+        direction if stream == "haptics" else f"{direction}.{stream}": line.summary() for stream, line in lines.items()
+    }

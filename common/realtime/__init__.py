@@ -1,0 +1,1 @@
+"""Being on time: deadlines, priority, garbage collection."""

@@ -1,0 +1,1 @@
+"""How old a message is, and how far apart two clocks are."""
