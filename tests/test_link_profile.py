@@ -147,7 +147,7 @@ WORDS = (
         ("delay 50ms 10ms distribution loss 1%", "'loss'", "uniform, normal"),
         ("delay 50ms 10ms distribution gauss", "'gauss'", "uniform, normal"),
         ("delay 50ms 10ms distribution /dev", "/dev", "a table's file"),
-        ("delay 50ms 10ms distribution /dev/zero", "/dev/zero", "1 to 16384"),
+        ("delay 50ms 10ms distribution /dev/zero", "/dev/zero", "a table's file"),
         ("loss", "'loss' without probability", "loss [random]"),
         ("loss 1", "'1'", "0% to 100%"),
         ("loss nan%", "'nan%'", "0% to 100%"),

@@ -48,7 +48,8 @@ class DelayTable:
         try:
             text = read_regular_file(path, _LARGEST_BYTES).decode("utf-8")
         except (OSError, UnicodeDecodeError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "is no text"
+            reason = error.strerror if isinstance(error, OSError) else str(error).partition(";")[0]
+            reason = "is no text" if isinstance(error, UnicodeDecodeError) else reason
             raise ConfigurationError(
                 f"{field}: {str(path)!r} is no distribution and cannot be read as a table ({reason}); "
                 f"valid: {', '.join(get_args(Distribution))}, or a table's file"
