@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 
+from common.emulation.clauses import LinkModel
 from common.emulation.delay_line import DelayLine
-from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.profile import LinkProfile
 
 PERIOD_S = 1e-3
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.emulation.clauses import LinkModel, Outage
 from common.emulation.delay_line import DelayLine
-from common.emulation.profile import LinkModel, LinkProfile, Outage
+from common.emulation.profile import LinkProfile
 from tests.link_runs import PERIOD_S, Run
 
 repeatable = settings(derandomize=True, deadline=None)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.emulation.clauses import QUEUE_LIMIT, LinkModel
 from common.emulation.delay_line import DelayLine
-from common.emulation.profile import QUEUE_LIMIT, LinkModel, LinkProfile
+from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec, Stream, unused_clauses
 from common.errors import ConfigurationError
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.emulation.clauses import Chance, Outage, Rate
 from common.emulation.distribution import DelayTable
 from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.emulation.profile import Chance, LinkProfile, Outage, Rate
+from common.emulation.profile import LinkProfile
 from common.emulation.slots import Slot, SlotShape
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError

@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
+from common.emulation.clauses import LinkModel
 from common.emulation.delay_line import DelayLine
 from common.emulation.expectation import expected
 from common.emulation.figures import report_lines
-from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.profile import LinkProfile
 from common.errors import ConfigurationError
 from feelahead.benchmarks.link_samples import play
 from feelahead.loopback import Loopback, LoopbackSettings

@@ -3,8 +3,9 @@ from pathlib import Path
 
 import pytest
 
+from common.emulation.clauses import LinkModel
 from common.emulation.delay_line import DelayLine
-from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.profile import LinkProfile
 from common.emulation.trace import Trace, read_samples
 from common.errors import ConfigurationError
 

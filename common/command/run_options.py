@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from common.command.status import StatusMode
-from common.emulation.profile import LinkModel
+from common.emulation.clauses import LinkModel
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.units import parse_duration

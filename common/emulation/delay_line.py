@@ -7,10 +7,11 @@ from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
+from common.emulation.clauses import Chance
 from common.emulation.distribution import cells, delays_at
 from common.emulation.expectation import expected
 from common.emulation.figures import LinkFigures
-from common.emulation.profile import Chance, LinkProfile
+from common.emulation.profile import LinkProfile
 from common.emulation.randomness import decisions, uniform_blocks
 from common.emulation.slots import SlotTimes
 from common.emulation.spec import Direction, Stream

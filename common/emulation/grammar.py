@@ -5,10 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_args
 
+from common.emulation.clauses import Chance, LinkModel, Outage, Rate
 from common.emulation.distribution import DelayTable, Distribution
 from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.emulation.profile import Chance, LinkModel, LinkProfile, Outage, Rate
-from common.emulation.randomness import CorrelationModel
 from common.emulation.slots import Slot, SlotShape
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
@@ -81,10 +80,11 @@ class _Words:
         return ConfigurationError(f"link {self.spec!r}: {what}; valid: {valid}")
 
 
-def parse_profile(
-    profile: str, spec: str, seed: int, model: LinkModel, correlation_model: CorrelationModel
-) -> LinkProfile:
-    """Read `profile`, which is `spec` or a clause of it; ConfigurationError in one line that quotes `spec`."""
+def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
+    """Read the fields of `LinkProfile` from `profile`, which is `spec` or a clause of it.
+
+    ConfigurationError, in one line that quotes `spec`, for what no profile can be.
+    """
     words = _Words(profile, spec)
     settings: dict[str, Any] = {}
     seen: set[str] = set()
@@ -106,10 +106,7 @@ def parse_profile(
         raise words.error("'reorder' without a delay to overtake", "delay")
     if "retransmit" in seen and model != "stream":
         raise words.error("'retransmit' in the datagram model, which never sends again", "retransmit")
-    try:
-        return LinkProfile(**settings, seed=seed, model=model, correlation_model=correlation_model)
-    except ValueError as error:
-        raise ConfigurationError(f"link {spec!r}: {error}") from error
+    return settings
 
 
 def _read_delay(words: _Words, settings: dict[str, Any]) -> None:

@@ -1,95 +1,26 @@
 """What one direction of one stream does to messages: a frozen, validated profile."""
 
 import math
+import shlex
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
+from common.emulation.clauses import QUEUE_LIMIT, Chance, LinkModel, Outage, Rate
 from common.emulation.distribution import DelayTable, Distribution, moments
+from common.emulation.grammar import read_fields
 from common.emulation.loss import LossModel
 from common.emulation.randomness import CorrelationModel
 from common.emulation.slots import Slot
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
+from common.units import format_duration, format_rate, format_share
 
-LinkModel = Literal["datagram", "stream"]
-
-QUEUE_LIMIT = 1000
-"""netem's own limit, in messages: what comes on top is dropped."""
 _SHORTEST_RECOVERY_S = 1e-3
 _RECOVERY_ROUND_TRIPS = 1.25
 _MOST_RETRANSMITTED = 0.99
 
 LONGEST_S = 1e6
 """No delay or jitter is longer: eleven days."""
-
-
-@dataclass(frozen=True)
-class Chance:
-    """Something that happens to a share of the messages."""
-
-    share: float
-    correlation: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("share", "correlation"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to 1")
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A bottleneck that takes one message after the other."""
-
-    bits_per_second: float
-    overhead_bytes: int = 0
-    """On each message, such as headers; negative takes away."""
-    cell_bytes: int = 0
-    """Messages travel in whole cells of this payload, as on ATM; 0: they do not."""
-    cell_overhead_bytes: int = 0
-
-    def __post_init__(self) -> None:
-        if not 1.0 <= self.bits_per_second < math.inf:
-            raise ValueError(f"bits_per_second = {self.bits_per_second}; valid: 1 or more")
-        if self.cell_bytes < 0 or self.cell_bytes + self.cell_overhead_bytes < 0:
-            raise ValueError(f"cell_bytes = {self.cell_bytes}, cell_overhead_bytes = {self.cell_overhead_bytes}")
-
-    def transmission_s(self, size_bytes: int) -> float:
-        """How long a message of `size_bytes` takes."""
-        size_bytes = max(0, size_bytes + self.overhead_bytes)
-        if self.cell_bytes:
-            cells = -(-size_bytes // self.cell_bytes)
-            size_bytes = cells * (self.cell_bytes + self.cell_overhead_bytes)
-        return 8.0 * size_bytes / self.bits_per_second
-
-
-@dataclass(frozen=True)
-class Outage:
-    """A time without a link, counted from the line's start."""
-
-    duration_s: float
-    at_s: float
-    every_s: float | None = None
-    """It comes again after so long; None: once."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.duration_s < math.inf:
-            raise ValueError(f"of {self.duration_s} s; valid: above 0")
-        if not 0.0 <= self.at_s < math.inf:
-            raise ValueError(f"at {self.at_s} s; valid: 0 or more")
-        if self.every_s is not None and not self.duration_s < self.every_s < math.inf:
-            raise ValueError(f"every {self.every_s} s; valid: longer than the {self.duration_s:g} s that it lasts")
-
-    def end_s(self, elapsed_s: float) -> float | None:
-        """When the outage ends in which `elapsed_s` lies, both since the line's start; None outside of any."""
-        since_s = elapsed_s - self.at_s
-        if since_s < 0.0:
-            return None
-        begun_s = self.at_s
-        if self.every_s is not None:
-            times = math.floor(since_s / self.every_s)
-            begun_s += times * self.every_s
-        end_s = begun_s + self.duration_s
-        return end_s if elapsed_s < end_s else None
 
 
 @dataclass(frozen=True)
@@ -160,17 +91,47 @@ class LinkProfile:
 
         ConfigurationError, in one line, for whatever is unknown, malformed, out of range or contradictory.
         """
-        # The grammar builds profiles, so that it cannot be imported before there are any.
-        from common.emulation.grammar import parse_profile  # noqa: PLC0415
+        return cls.parse_within(spec, spec, seed, model, correlation_model)
 
+    @classmethod
+    def parse_within(
+        cls, profile: str, spec: str, seed: int, model: LinkModel, correlation_model: CorrelationModel
+    ) -> "LinkProfile":
+        """Read `profile`, which is `spec` or a clause of it; ConfigurationError in one line that quotes `spec`."""
         check_seed_and_models(seed, model, correlation_model)
-        return parse_profile(spec, spec, seed, model, correlation_model)
+        fields = read_fields(profile, spec, model)
+        try:
+            return cls(**fields, seed=seed, model=model, correlation_model=correlation_model)
+        except ValueError as error:
+            raise ConfigurationError(f"link {spec!r}: {error}") from error
 
     def words(self) -> str:
         """The profile in the words that `parse` reads; empty where nothing is asked for."""
-        from common.emulation.words import format_profile  # noqa: PLC0415
-
-        return format_profile(self)
+        clauses = [_format_delay(self)]
+        if self.loss is not None:
+            clauses.append(self.loss.words())
+        clauses += [f"{name} {_format_chance(getattr(self, name))}" for name in ("duplicate", "corrupt", "reorder")]
+        clauses = [clause for clause in clauses if not clause.endswith(" ")]
+        if self.reorder is not None and self.gap > 1:
+            clauses.append(f"gap {self.gap}")
+        if self.rate is not None:
+            rate = self.rate
+            numbers = [rate.overhead_bytes, rate.cell_bytes, rate.cell_overhead_bytes]
+            while numbers and numbers[-1] == 0:
+                numbers.pop()
+            clauses.append(" ".join(["rate", format_rate(rate.bits_per_second), *map(str, numbers)]))
+        if self.limit != QUEUE_LIMIT:
+            clauses.append(f"limit {self.limit}")
+        if self.slot is not None:
+            clauses.append(_format_slot(self.slot))
+        if self.trace is not None:
+            clauses.append(f"trace {shlex.quote(self.trace.name)}")
+        for outage in self.outages:
+            every = "" if outage.every_s is None else f" every {format_duration(outage.every_s)}"
+            clauses.append(f"outage {format_duration(outage.duration_s)} at {format_duration(outage.at_s)}{every}")
+        if self.retransmit_s is not None:
+            clauses.append(f"retransmit {format_duration(self.retransmit_s)}")
+        return " ".join(filter(None, clauses))
 
     def mean_delay_s(self) -> float:
         """Of the delay asked for, without what rate, slots and retransmission add."""
@@ -220,3 +181,40 @@ def check_seed_and_models(seed: int, model: LinkModel, correlation_model: Correl
 def choices(literal: object) -> str:
     """The values of a Literal, for messages."""
     return ", ".join(get_args(literal))
+
+
+def _format_delay(profile: LinkProfile) -> str:
+    if profile.delay_s == 0.0 and profile.jitter_s == 0.0:
+        return ""
+    words = ["delay", format_duration(profile.delay_s)]
+    shape = profile.distribution
+    if profile.jitter_s or profile.delay_correlation or shape != "uniform":
+        words.append(format_duration(profile.jitter_s))
+        if profile.delay_correlation:
+            words.append(format_share(profile.delay_correlation))
+        if shape != "uniform":
+            words += ["distribution", _format_shape(shape)]
+    return " ".join(words)
+
+
+def _format_shape(shape: Distribution | DelayTable) -> str:
+    return shlex.quote(shape.name) if isinstance(shape, DelayTable) else shape
+
+
+def _format_slot(slot: Slot) -> str:
+    if slot.shape is None:
+        words = ["slot", format_duration(slot.least_s), format_duration(slot.most_s)]
+    else:
+        times = (format_duration(slot.shape.mean_s), format_duration(slot.shape.jitter_s))
+        words = ["slot distribution", _format_shape(slot.shape.distribution), *times]
+    for name, budget in (("packets", slot.packets), ("bytes", slot.size_bytes)):
+        if budget is not None:
+            words += [name, str(budget)]
+    return " ".join(words)
+
+
+def _format_chance(chance: Chance | None) -> str:
+    if chance is None:
+        return ""
+    correlation = f" {format_share(chance.correlation)}" if chance.correlation else ""
+    return format_share(chance.share) + correlation

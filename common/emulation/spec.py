@@ -7,8 +7,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from common.emulation.grammar import parse_profile
-from common.emulation.profile import LinkModel, LinkProfile, check_seed_and_models, choices
+from common.emulation.clauses import LinkModel
+from common.emulation.profile import LinkProfile, check_seed_and_models, choices
 from common.emulation.randomness import CorrelationModel
 from common.errors import ConfigurationError
 
@@ -57,7 +57,7 @@ class LinkSpec:
                     f"link {spec!r}: {what} stands there twice; "
                     f"valid: one profile without a name and one for each of {_valid_names()}"
                 )
-            clauses[name] = parse_profile(profile, spec, seed, model, correlation_model)
+            clauses[name] = LinkProfile.parse_within(profile, spec, seed, model, correlation_model)
         return cls(clauses, seed, model, correlation_model)
 
     def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:

@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.command.command_line import parse_settings
+from common.emulation.clauses import LinkModel
 from common.emulation.figures import report_lines
-from common.emulation.profile import LinkModel, LinkProfile
+from common.emulation.profile import LinkProfile
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError

@@ -22,7 +22,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.command.command_line import parse_settings, run_command
-from common.emulation.profile import LinkModel
+from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from feelahead.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
