@@ -23,9 +23,9 @@ from operator_side.settings import OperatorSettings
 from operator_side.simulated_operator import SimulatedOperator
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
+from robot_side.figures import tick_microseconds
 from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
 from robot_side.overlap.kernels import warm_up
-from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
 
 _PEER = b"loopback"

@@ -10,22 +10,22 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
-from robot_side.arm import MujocoArm, MujocoKinematics
-from robot_side.arm_port import Arm, ArmState
-from robot_side.contact import ContactPredictor
+from robot_side.arm.port import Arm, ArmState
 from robot_side.core import RobotSide
-from robot_side.enlargement import Enlargement
-from robot_side.kinematic_error import position_covariance
-from robot_side.operator_session import OperatorSession
-from robot_side.run_figures import RunFigures
-from robot_side.safety import Safety
-from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.enlargement.distance import Enlargement
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.figures import RunFigures
+from robot_side.operators.operator_session import OperatorSession
+from robot_side.operators.safety import Safety
 from robot_side.sensing import AheadSensing
 from robot_side.settings import RobotSettings
+from robot_side.simulation.arm import MujocoArm, MujocoKinematics
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.stiffness import StiffnessMap
+from robot_side.simulation.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.stiffness.map import StiffnessMap
+from robot_side.stiffness.predicted_contact import ContactPredictor
 
 _SAMPLED_CONFIGURATIONS = 256
 _NAMED_APPROXIMATIONS = 8

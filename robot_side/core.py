@@ -14,18 +14,18 @@ from common.arrays import FloatArray
 from common.protocol.codec import encode
 from common.protocol.messages import MotionState, StiffnessUpdate, Telemetry
 from common.timing.ages import LoopAge
-from robot_side.arm_port import Arm, ArmState, GripperKinematics, GripperPose
-from robot_side.contact import Contact, ContactPredictor
-from robot_side.held_object import HeldObject, grip, gripped_object, with_held
-from robot_side.operator_session import OperatorSession, Receiver
-from robot_side.perceived_objects import ObjectSource, PerceivedObjects, Role
-from robot_side.resolved_rate import joint_velocities
-from robot_side.run_figures import RunFigures
-from robot_side.safety import Permission
+from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
+from robot_side.arm.resolved_rate import joint_velocities
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
+from robot_side.figures import RunFigures
+from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
+from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.objects.target import next_target, object_centers, target_index
+from robot_side.operators.operator_session import OperatorSession, Receiver
+from robot_side.operators.safety import Permission
 from robot_side.sensing import AheadSensing, Sensed
-from robot_side.stiffness import Stiffness
-from robot_side.target_selection import next_target, object_centers, target_index
-from robot_side.tool_motion import ToolMotionSettings, tool_twist
+from robot_side.stiffness.map import Stiffness
+from robot_side.stiffness.predicted_contact import Contact, ContactPredictor
 
 OutgoingStream = Literal["haptics", "telemetry"]
 

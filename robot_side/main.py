@@ -25,8 +25,8 @@ from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from robot_side.assembly import build_robot_side
 from robot_side.core import Outgoing, RobotSide
+from robot_side.figures import tick_microseconds
 from robot_side.overlap.kernels import warm_up
-from robot_side.run_figures import tick_microseconds
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3

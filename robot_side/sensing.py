@@ -8,23 +8,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.arm_port import GripperPose
-from robot_side.between_fingers import outside_share
-from robot_side.enlargement import Enlargement
-from robot_side.kinematic_error import position_covariance
-from robot_side.overlapping import (
+from robot_side.arm.port import GripperPose
+from robot_side.arm.tool_motion import trigger_directions
+from robot_side.enlargement.distance import Enlargement
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.gripper.between_fingers import outside_share
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.pairs.candidates import CandidatePairs, candidate_pairs
+from robot_side.pairs.overlaps import (
     NearestSurfaces,
     Overlaps,
     evaluate,
     nearest_surfaces,
     radii_for_role,
 )
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import CandidatePairs, candidate_pairs
-from robot_side.reference_volume import plane_overlaps
-from robot_side.stiffness import Stiffness, StiffnessMap
-from robot_side.tool_motion import trigger_directions
-from robot_side.touching import touching_pairs
+from robot_side.pairs.touching import touching_pairs
+from robot_side.stiffness.map import Stiffness, StiffnessMap
+from robot_side.stiffness.reference_volume import plane_overlaps
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 import tyro
 
 from common.command.run_options import RunOptions
-from robot_side.contact import ContactSettings
-from robot_side.enlargement import EnlargementSettings
-from robot_side.kinematic_error import VarianceMeasure
-from robot_side.perceived_objects import Role
-from robot_side.safety import SafetySettings
-from robot_side.stiffness import StiffnessSettings
-from robot_side.tool_motion import ToolMotionSettings
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.distance import EnlargementSettings
+from robot_side.enlargement.kinematic_error import VarianceMeasure
+from robot_side.objects.perceived import Role
+from robot_side.operators.safety import SafetySettings
+from robot_side.stiffness.map import StiffnessSettings
+from robot_side.stiffness.predicted_contact import ContactSettings
 
 
 def _require(name: str, value: float, low: float, high: float) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
-from robot_side.arm_port import GripperPose
-from robot_side.gripper_spheres import SphereCover, cover_boxes
+from robot_side.arm.port import GripperPose
+from robot_side.gripper.spheres import SphereCover, cover_boxes
 
 # The built-in arm's gripper, open by 85 mm, in the tool frame: its fingers close along x. The palm, then each
 # finger and its tip, which reach 15 mm beyond the point between the fingertips.

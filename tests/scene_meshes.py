@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.scene import Scene, load_scene
+from robot_side.simulation.scene import Scene, load_scene
 from tests.arm_models import planar_arm
 from tests.overlap_meshes import grid_tetrahedra, surface_of
 

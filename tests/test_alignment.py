@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.alignment import alignments, trust
-from robot_side.overlapping import Overlaps, by_object, evaluate
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import candidate_pairs
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import Overlaps, by_object, evaluate
+from robot_side.stiffness.alignment import alignments, trust
 from tests.perceived_scenes import Scene, random_rotation, random_scene
 
 _RADIUS_M = 0.05

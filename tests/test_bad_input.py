@@ -79,7 +79,7 @@ def test_one_line_names_the_value_and_what_is_valid(
 
 
 def test_an_unknown_site_lists_the_sites() -> None:
-    model = Path(robot_side.main.__file__).parent / "assets" / "arm.xml"
+    model = Path(robot_side.main.__file__).parent / "simulation" / "assets" / "arm.xml"
     text = complaint(ROBOT, "--bind", "tcp://127.0.0.1:0", "--model", str(model), "--site", "hand")
     assert "'hand'" in text
     assert "tool" in text

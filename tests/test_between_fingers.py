@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.arm_port import GripperPose
-from robot_side.between_fingers import outside_share
-from robot_side.overlapping import nearest_surfaces
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.proximity import CandidatePairs, candidate_pairs
+from robot_side.arm.port import GripperPose
+from robot_side.gripper.between_fingers import outside_share
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.pairs.candidates import CandidatePairs, candidate_pairs
+from robot_side.pairs.overlaps import nearest_surfaces
 from tests.gripper_poses import free_pose, gripper_pose
 from tests.perceived_scenes import Scene, random_rotation
 

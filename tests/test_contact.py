@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side import contact, overlapping
-from robot_side.arm_port import GripperPose
-from robot_side.contact import CONTACT_PERIOD_S, KEPT_S, ContactPredictor, ContactSettings
-from robot_side.nearest_object import distance_to_object
+from robot_side.arm.port import GripperPose
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh
 from robot_side.overlap.mesh_shapes import ellipsoid_mesh
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.pairs import overlaps as overlapping
+from robot_side.pairs.nearest_object import distance_to_object
+from robot_side.stiffness import predicted_contact as contact
+from robot_side.stiffness.predicted_contact import CONTACT_PERIOD_S, KEPT_S, ContactPredictor, ContactSettings
 from tests.gripper_poses import OPENING_M, cover_gripper, free_pose
 from tests.perceived_scenes import Scene, random_rotation
 

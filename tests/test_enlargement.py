@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.enlargement import (
+from robot_side.enlargement.delay_displacement import delay_displacement
+from robot_side.enlargement.distance import (
     Enlargement,
     EnlargementSettings,
     combined_mean,
     combined_variance,
-    delay_displacement,
     enlargement_distance,
 )
-from robot_side.kinematic_error import position_covariance
+from robot_side.enlargement.kinematic_error import position_covariance
 
 probabilities = st.floats(1e-6, 1.0 - 1e-6)
 lengths = st.floats(0.0, 1.0)

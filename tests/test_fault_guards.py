@@ -17,9 +17,9 @@ from common.protocol.session import SessionEvent, SessionState
 from feelahead.experiments import virtual_session_faults as session_faults
 from feelahead.experiments import virtual_stream_faults as stream_faults
 from feelahead.experiments.fault import Outcome
-from robot_side.lease import Lease
-from robot_side.operator_session import OperatorSession
-from robot_side.safety import Permission, Safety
+from robot_side.operators.lease import Lease
+from robot_side.operators.operator_session import OperatorSession
+from robot_side.operators.safety import Permission, Safety
 from robot_side.simulation.joint_reference import JointReference
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -136,13 +136,17 @@ GUARDS = (
     Guard("an epoch ends with the next", put(Lease, "end_epoch_of", nothing), session_faults.operator_restarts),
     Guard("an ended epoch stays so", put(Lease, "has_ended", lambda *_: False), session_faults.operator_restarts),
     Guard("the healthy second", put(Safety, "_healthy_for_long", lambda *_: True), session_faults.wrong_arming),
-    Guard("released triggers", put("robot_side.safety", "RELEASED_TRAVEL", 2.0), session_faults.wrong_arming),
+    Guard("released triggers", put("robot_side.operators.safety", "RELEASED_TRAVEL", 2.0), session_faults.wrong_arming),
     Guard("a known loop age", put(Safety, "_loop_is_young", lambda *_: True), session_faults.wrong_arming),
     Guard("the emergency stop", put(Safety, "emergency_stop", nothing), session_faults.emergency_stop),
     Guard("the latch of the stop", forget_the_stop, session_faults.emergency_stop),
     Guard("ranges of fields", put("common.protocol.messages", "_in_range", nothing), session_faults.bad_messages),
     Guard("no clock but now", gap_by_the_wall_clock, session_faults.wall_clock_jumps),
-    Guard("room for observers", put("robot_side.lease", "MOST_OBSERVERS", 10_000), session_faults.reconnect_storm),
+    Guard(
+        "room for observers",
+        put("robot_side.operators.lease", "MOST_OBSERVERS", 10_000),
+        session_faults.reconnect_storm,
+    ),
 )
 
 

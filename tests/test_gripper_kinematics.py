@@ -6,9 +6,9 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.arm import MujocoKinematics
-from robot_side.scene import Scene, load_scene
+from robot_side.simulation.arm import MujocoKinematics
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.scene import Scene, load_scene
 from tests.tool_driver import PERIOD_S, ToolDriver
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.gripper_spheres import cover_boxes
+from robot_side.gripper.spheres import cover_boxes
 
 
 def random_boxes(count: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:

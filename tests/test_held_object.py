@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from robot_side.arm_port import GripperPose
-from robot_side.held_object import grip, gripped_object, with_held
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.arm.port import GripperPose
+from robot_side.gripper.held_object import grip, gripped_object, with_held
+from robot_side.objects.perceived import PerceivedObjects, Role
 from tests.gripper_poses import free_pose, gripper_pose
 from tests.perceived_scenes import Scene, random_rotation
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.kinematic_error import (
+from robot_side.enlargement.kinematic_error import (
     directional_variance,
     encoder_sigma,
     position_covariance,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.kinematic_error import scalar_variance
+from robot_side.enlargement.kinematic_error import scalar_variance
 
 
 def _rotations(count: int) -> FloatArray:

@@ -22,9 +22,8 @@ IO_ROOMS = {
     "hid": {"operator_side/dualsense/device.py"},
     "hidraw": {"operator_side/dualsense/device.py"},
     "mujoco": {
-        "robot_side/arm.py",
-        "robot_side/scene.py",
-        "robot_side/cameras.py",
+        "robot_side/simulation/arm.py",
+        "robot_side/simulation/scene.py",
         "feelahead/benchmarks/overlap_distances.py",  # times MuJoCo's distances beside our overlaps
     },
     "viser": {"operator_side/console.py"},
@@ -74,7 +73,12 @@ def test_imports_stay_in_their_rooms(path: Path) -> None:
 
 def test_the_rooms_exist() -> None:
     # Without this, a renamed file would leave a rule that guards nothing.
-    for rooms in (IO_ROOMS["zmq"], IO_ROOMS["hidraw"], {"robot_side/arm.py", "robot_side/scene.py"}, CLOCK_READERS):
+    for rooms in (
+        IO_ROOMS["zmq"],
+        IO_ROOMS["hidraw"],
+        IO_ROOMS["mujoco"],
+        CLOCK_READERS,
+    ):
         for room in rooms:
             assert (ROOT / room).is_file(), room
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side.nearest_object import distance_to_object
-from robot_side.perceived_objects import Role
+from robot_side.objects.perceived import Role
+from robot_side.pairs.nearest_object import distance_to_object
 from tests.perceived_scenes import Scene, random_rotation, random_scene
 
 ORIGIN = np.zeros(3)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.mesh_bounds import mesh_bounds
-from robot_side.nearest_on_meshes import nearest_on_meshes
-from robot_side.nearest_point import box_deepening
+from robot_side.objects.mesh_bounds import mesh_bounds
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.mesh_shapes import ellipsoid_mesh
+from robot_side.pairs.nearest_on_meshes import nearest_on_meshes
+from robot_side.pairs.nearest_point import box_deepening
 from tests.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.perceived_scenes import random_rotation
 from tests.scene_meshes import CELL_M, cup

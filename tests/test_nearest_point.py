@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from robot_side.nearest_point import (
+from robot_side.pairs.nearest_point import (
     box_deepening,
     nearest_on_box,
     nearest_on_half_space,

@@ -2,9 +2,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side.object_shares import object_shares
-from robot_side.overlapping import by_object, evaluate, select
-from robot_side.proximity import candidate_pairs
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import by_object, evaluate, select
+from robot_side.stiffness.object_shares import object_shares
 from tests.perceived_scenes import random_scene
 
 

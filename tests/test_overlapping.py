@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robot_side.objects.perceived import Role
 from robot_side.overlap import kernels
-from robot_side.overlapping import by_object, evaluate, nearest_surfaces, radii_for_role, select
-from robot_side.perceived_objects import Role
-from robot_side.proximity import candidate_pairs
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces, radii_for_role, select
 from tests.perceived_scenes import Scene, random_rotation, random_scene
 
 seeds = st.integers(0, 2**32 - 1)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.arm import measure_gripper
-from robot_side.perceived_objects import Role
-from robot_side.scene import GroundTruth, MujocoCamera
+from robot_side.objects.perceived import Role
+from robot_side.simulation.arm import measure_gripper
+from robot_side.simulation.scene import GroundTruth, MujocoCamera
 from tests.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 

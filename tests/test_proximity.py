@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side import proximity
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.objects.validity import require_valid
 from robot_side.overlap import kernels
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import CandidatePairs, candidate_pairs
-from robot_side.valid_objects import require_valid
+from robot_side.pairs import candidates as proximity
+from robot_side.pairs.candidates import CandidatePairs, candidate_pairs
 from tests.perceived_scenes import Scene, random_scene
 
 seeds = st.integers(0, 2**32 - 1)
@@ -97,7 +97,7 @@ def test_bounds_are_worked_out_once_for_each_frame(monkeypatch: pytest.MonkeyPat
         seen.append(objects)
         require_valid(objects)
 
-    monkeypatch.setattr("robot_side.proximity.require_valid", counting)
+    monkeypatch.setattr("robot_side.pairs.candidates.require_valid", counting)
     first, second = (random_scene(np.random.default_rng(count), count) for count in (2, 8))
     centers, radii = np.zeros((2, 3)), np.full(2, 0.3)
     answers = [candidate_pairs(centers, radii, objects) for objects in (first, first, second, first, second)]

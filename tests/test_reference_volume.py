@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.arm import MujocoArm, MujocoKinematics
+from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import sphere_half_space
-from robot_side.overlapping import evaluate
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import candidate_pairs
-from robot_side.reference_volume import plane_overlaps
-from robot_side.scene import load_scene
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import evaluate
+from robot_side.simulation.arm import MujocoArm, MujocoKinematics
 from robot_side.simulation.encoders import Encoder
-from robot_side.stiffness import StiffnessMap, StiffnessSettings
+from robot_side.simulation.scene import load_scene
+from robot_side.stiffness.map import StiffnessMap, StiffnessSettings
+from robot_side.stiffness.reference_volume import plane_overlaps
 from tests.gripper_poses import BOX_CENTERS_M, BOX_HALF_SIZES_M, cover_gripper
 from tests.perceived_scenes import Scene
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from common.arrays import FloatArray
-from robot_side.resolved_rate import joint_velocities
+from robot_side.arm.resolved_rate import joint_velocities
 
 FREE = np.full(6, np.inf)
 

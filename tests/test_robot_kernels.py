@@ -6,7 +6,7 @@ import pytest
 from robot_side.assembly import build_robot_side
 from robot_side.overlap.compile import Compiled, imported_kernels
 from robot_side.overlap.kernels import warm_up
-from robot_side.proximity import candidate_pairs
+from robot_side.pairs.candidates import candidate_pairs
 from robot_side.settings import EnlargementOptions, RobotSettings
 from tests.perceived_scenes import random_scene
 
@@ -16,20 +16,20 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     assert all(kernel.ready for kernel in imported_kernels())
     modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
     assert {
-        "robot_side.alignment",
-        "robot_side.between_fingers",
-        "robot_side.contact",
-        "robot_side.enlargement",
-        "robot_side.kinematic_error",
-        "robot_side.nearest_kernels",
-        "robot_side.object_shares",
+        "robot_side.stiffness.alignment",
+        "robot_side.gripper.between_fingers",
+        "robot_side.stiffness.predicted_contact",
+        "robot_side.enlargement.distance",
+        "robot_side.enlargement.kinematic_error",
+        "robot_side.pairs.nearest_kernels",
+        "robot_side.stiffness.object_shares",
         "robot_side.overlap.kernels",
-        "robot_side.proximity",
-        "robot_side.reference_volume",
-        "robot_side.resolved_rate",
-        "robot_side.stiffness",
-        "robot_side.touching",
-        "robot_side.valid_objects",
+        "robot_side.pairs.candidates",
+        "robot_side.stiffness.reference_volume",
+        "robot_side.arm.resolved_rate",
+        "robot_side.stiffness.map",
+        "robot_side.pairs.touching",
+        "robot_side.objects.validity",
     } <= modules
 
 

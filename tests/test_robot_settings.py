@@ -8,7 +8,7 @@ import pytest
 from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from robot_side.assembly import build_robot_side
-from robot_side.perceived_objects import Role
+from robot_side.objects.perceived import Role
 from robot_side.settings import CameraSettings, EncoderSettings, EnlargementOptions, RobotSettings
 
 NAN, INFINITY = math.nan, math.inf

@@ -5,7 +5,7 @@ import pytest
 from common.protocol.link_end import Arrival
 from common.protocol.messages import Header, MotionCommand
 from common.protocol.session import Session, SessionEvent
-from robot_side.safety import Safety, SafetySettings
+from robot_side.operators.safety import Safety, SafetySettings
 
 FRESH = Arrival(fresh=True, queueing_age_s=0.0, one_way_s=0.01, loop_age_s=0.02)
 STEP_S = 0.004

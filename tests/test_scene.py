@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation import model_enums
+from robot_side.simulation.scene import GroundTruth, MujocoCamera, Scene, load_scene
 from tests.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
 
 

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side import nearest_on_meshes
 from robot_side.assembly import build_robot_side
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh, mesh_library, sphere_sphere, warm_up
 from robot_side.overlap.compile import Compiled
 from robot_side.overlap.mesh_shapes import capsule_mesh
-from robot_side.overlapping import by_object, evaluate, nearest_surfaces
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.proximity import candidate_pairs
-from robot_side.scene import MujocoCamera, Scene
+from robot_side.pairs import nearest_on_meshes
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces
 from robot_side.settings import RobotSettings
+from robot_side.simulation.scene import MujocoCamera, Scene
 from tests.arm_models import planar_arm
 from tests.gripper_poses import gripper_pose
 from tests.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES

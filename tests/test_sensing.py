@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side import nearest_point
-from robot_side.arm_port import GripperPose
-from robot_side.enlargement import Enlargement, EnlargementSettings
-from robot_side.held_object import grip, with_held
-from robot_side.kinematic_error import position_covariance
+from robot_side.arm.port import GripperPose
+from robot_side.enlargement.distance import Enlargement, EnlargementSettings
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.gripper.held_object import grip, with_held
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import kernels
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.pairs import nearest_point
 from robot_side.sensing import AheadSensing, Sensed
-from robot_side.stiffness import StiffnessMap, StiffnessSettings
+from robot_side.stiffness.map import StiffnessMap, StiffnessSettings
 from tests.gripper_poses import OPENING_M, free_pose, gripper_pose
 from tests.perceived_scenes import Scene, random_rotation, random_scene
 

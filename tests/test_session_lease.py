@@ -8,7 +8,7 @@ from common.protocol.messages import Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
 from feelahead.experiments.session_bench import CRUISE, QUICK, Bench, Operator
 from robot_side.core import OBSERVER_PERIOD_S
-from robot_side.lease import MOST_AWAY, MOST_OBSERVERS
+from robot_side.operators.lease import MOST_AWAY, MOST_OBSERVERS
 
 
 @pytest.fixture

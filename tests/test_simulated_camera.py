@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.scene import MujocoCamera, Scene, load_scene
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.scene import MujocoCamera, Scene, load_scene
 from tests.arm_models import SHAPES, STONE, planar_arm
 
 

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.overlapping import Overlaps, evaluate
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.proximity import candidate_pairs
-from robot_side.stiffness import Stiffness, StiffnessMap, StiffnessSettings
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import Overlaps, evaluate
+from robot_side.stiffness.map import Stiffness, StiffnessMap, StiffnessSettings
 from tests.perceived_scenes import Scene, random_scene
 
 _AHEAD = np.array([0.0, 0.0, 1.0])

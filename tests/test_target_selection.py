@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.target_selection import next_target, object_centers, target_index
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.target import next_target, object_centers, target_index
 from tests.perceived_scenes import Scene
 
 ORIGIN = np.zeros(3)

@@ -6,7 +6,7 @@ import pytest
 
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
-from robot_side.tool_motion import ToolMotionSettings, tool_twist, trigger_directions
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist, trigger_directions
 from tests.perceived_scenes import random_rotation
 
 SETTINGS = ToolMotionSettings(trigger_speed_m_s=0.25, stick_speed_m_s=0.1, turn_speed_rad_s=0.5)

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side.overlapping import evaluate, nearest_surfaces
-from robot_side.proximity import CandidatePairs, candidate_pairs
-from robot_side.touching import touching_pairs
+from robot_side.pairs.candidates import CandidatePairs, candidate_pairs
+from robot_side.pairs.overlaps import evaluate, nearest_surfaces
+from robot_side.pairs.touching import touching_pairs
 from tests.perceived_scenes import Scene, random_scene
 
 _KINDS = ("spheres", "boxes", "tetrahedra", "half_spaces")

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.valid_objects import require_valid
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.objects.validity import require_valid
 from tests.perceived_scenes import Scene, random_scene
 
 _NUMBERS = [

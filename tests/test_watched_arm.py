@@ -5,7 +5,7 @@ import pytest
 
 from common.arrays import FloatArray
 from feelahead.experiments.watched_arm import WatchedArm
-from robot_side.arm_port import ArmState
+from robot_side.arm.port import ArmState
 from robot_side.simulation.joint_reference import MotionLimits
 
 GAP_S = 0.1

@@ -19,7 +19,7 @@ from feelahead.experiments.cable import Cable
 from feelahead.experiments.fault import Outcome
 from feelahead.experiments.rig import Rig
 from feelahead.processes import SideProcess
-from robot_side.safety import SafetySettings
+from robot_side.operators.safety import SafetySettings
 
 T_S = SafetySettings().gap_s
 _AGE_LIMIT_S = SafetySettings().age_s + SafetySettings().jitter_s

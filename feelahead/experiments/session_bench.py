@@ -11,10 +11,10 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.session import SessionState
 from feelahead.experiments.watched_arm import WatchedArm
-from robot_side.arm_port import Arm
+from robot_side.arm.port import Arm
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
-from robot_side.safety import SafetySettings
+from robot_side.operators.safety import SafetySettings
 from robot_side.settings import RobotSettings
 
 TICK_S = 0.001

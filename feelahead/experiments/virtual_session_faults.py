@@ -15,7 +15,7 @@ from common.protocol.messages import Header
 from common.protocol.session import SessionState
 from feelahead.experiments.fault import Fault, Outcome
 from feelahead.experiments.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
-from robot_side.lease import MOST_AWAY, MOST_OBSERVERS
+from robot_side.operators.lease import MOST_AWAY, MOST_OBSERVERS
 
 _LEASE_S = QUICK.safety.lease_s
 _HOUR_S = 3600.0

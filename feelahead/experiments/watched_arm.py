@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.arm_port import Arm, ArmState
+from robot_side.arm.port import Arm, ArmState
 from robot_side.simulation.joint_reference import MotionLimits
 
 SLOWED = 0.05

@@ -21,7 +21,7 @@ from common.protocol.link_end import Arrival
 from common.protocol.messages import MotionCommand
 from common.sockets.admission import Admission
 from feelahead.experiments.watched_arm import WatchedArm
-from robot_side.arm_port import Arm, ArmState
+from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import build_robot_side
 from robot_side.core import Outgoing, RobotSide
 from robot_side.settings import RobotSettings

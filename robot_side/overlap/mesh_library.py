@@ -52,7 +52,7 @@ def nearest_mesh_pairs(
 ) -> tuple[FloatArray, FloatArray]:
     """(signed distances (p,) in m, negative inside; unit directions (p, 3)) of points and placed meshes.
 
-    The direction is that in which the signed distance falls fastest, as in `robot_side.nearest_point`: towards the
+    The direction is that in which the signed distance falls fastest, as in `robot_side.pairs.nearest_point`: towards the
     nearest point of the surface from outside, away from it from inside. Arguments as for `mesh_pairs`.
     """
     distances, directions = np.empty(len(centers)), np.empty((len(centers), 3))

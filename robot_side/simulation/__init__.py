@@ -1,1 +1,1 @@
-"""What stands behind the simulated arm and camera, in plain NumPy; arm.py and scene.py put it into MuJoCo."""
+"""The simulated world behind the arm's and the camera's ports; only here and in the cameras is MuJoCo known."""

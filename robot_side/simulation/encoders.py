@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.kinematic_error import encoder_sigma
+from robot_side.enlargement.kinematic_error import encoder_sigma
 
 
 class Encoder:

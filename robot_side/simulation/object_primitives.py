@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
 

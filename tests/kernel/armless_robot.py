@@ -9,8 +9,8 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import StiffnessUpdate
 from common.sockets.robot import RobotSockets
-from robot_side.operator_session import OperatorSession
-from robot_side.safety import Safety, SafetySettings
+from robot_side.operators.operator_session import OperatorSession
+from robot_side.operators.safety import Safety, SafetySettings
 
 _TICK_S = 0.02
 SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)

@@ -4,7 +4,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import compiled, input_array, input_indices, output_array
-from robot_side.overlapping import Overlaps
+from robot_side.pairs.overlaps import Overlaps
 
 Shares = list[float]
 """What one object adds to l2, r2 and rumble: plain numbers, because few objects overlap at once."""

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.kinematic_error import require_finite
-from robot_side.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.enlargement.kinematic_error import require_finite
+from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.objects.validity import require_valid
 from robot_side.overlap.compile import (
     COUNT,
     compiled,
@@ -24,8 +26,6 @@ from robot_side.overlap.compile import (
     output_indices,
 )
 from robot_side.overlap.vectors import Vector, add, dot, load, scale, subtract
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.valid_objects import require_valid
 
 _REACH = 1.0 + 1e-9
 """Radii are enlarged by this for the comparison, so that rounding never culls a pair that touches."""

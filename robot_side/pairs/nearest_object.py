@@ -3,8 +3,8 @@
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.nearest_kernels import object_distance
-from robot_side.perceived_objects import PerceivedObjects
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.pairs.nearest_kernels import object_distance
 
 
 def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:

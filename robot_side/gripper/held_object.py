@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.arm_port import GripperPose
-from robot_side.gripper_spheres import cover_boxes
-from robot_side.mesh_bounds import mesh_bounds, placed_middles
-from robot_side.nearest_object import distance_to_object
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.arm.port import GripperPose
+from robot_side.gripper.spheres import cover_boxes
+from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.pairs.nearest_object import distance_to_object
 
 _SPHERES_PER_BOX = 4
 

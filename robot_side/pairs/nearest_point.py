@@ -18,8 +18,8 @@ is `nearest_kernels`.
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.nearest_kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
 from robot_side.overlap.compile import Compiled
+from robot_side.pairs.nearest_kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
 
 
 def nearest_on_sphere(

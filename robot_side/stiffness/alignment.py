@@ -12,7 +12,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.overlap.compile import NUMBER, compiled, inlined, input_array, output_array
 from robot_side.overlap.vectors import Vector, add, dot, load, norm, scale
-from robot_side.overlapping import Overlaps
+from robot_side.pairs.overlaps import Overlaps
 
 
 def trust(overlaps: Overlaps, threshold: float) -> FloatArray:

@@ -11,10 +11,10 @@ from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Header, Hello, MotionCommand
 from common.protocol.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
-from robot_side.announcements import Announcements, Answer
-from robot_side.lease import MOST_OBSERVERS, Lease
-from robot_side.participant import Participant
-from robot_side.safety import Permission, Safety
+from robot_side.operators.announcements import Announcements, Answer
+from robot_side.operators.lease import MOST_OBSERVERS, Lease
+from robot_side.operators.participant import Participant
+from robot_side.operators.safety import Permission, Safety
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.perceived_objects import PerceivedObjects
+from robot_side.objects.perceived import PerceivedObjects
 
 if TYPE_CHECKING:
     from robot_side.overlap.mesh_library import MeshLibrary

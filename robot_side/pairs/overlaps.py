@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side import nearest_kernels
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import kernels
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.proximity import CandidatePairs
+from robot_side.pairs import nearest_kernels
+from robot_side.pairs.candidates import CandidatePairs
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def nearest_surfaces(centers_m: FloatArray, objects: PerceivedObjects, pairs: Ca
     part = pairs.meshes
     if part.start < part.stop and objects.mesh_library is not None:
         # A scene without meshes does not load the kernels for them.
-        from robot_side.nearest_on_meshes import nearest_on_meshes  # noqa: PLC0415
+        from robot_side.pairs.nearest_on_meshes import nearest_on_meshes  # noqa: PLC0415
 
         points = centers_m.take(pairs.sphere_index[part], axis=0)
         distance[part], direction[part], deepening[part] = nearest_on_meshes(

@@ -3,8 +3,8 @@
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.mesh_bounds import placed_middles
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.objects.mesh_bounds import placed_middles
+from robot_side.objects.perceived import PerceivedObjects, Role
 
 _OFF_AXIS_WEIGHT = 3.0
 """A metre off the approach axis puts an object as far back in the order as three along it."""

@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Iterator
 
 from common.protocol.session import SessionEvent, SessionState
-from robot_side.participant import Participant
-from robot_side.safety import Safety
+from robot_side.operators.participant import Participant
+from robot_side.operators.safety import Safety
 
 MOST_OBSERVERS = 8
 MOST_AWAY = 8

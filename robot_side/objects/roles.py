@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from common.errors import ConfigurationError
-from robot_side.perceived_objects import Role
+from robot_side.objects.perceived import Role
 
 _ROLE_OF_PREFIX = {
     "target": Role.TARGET,

@@ -4,8 +4,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.compile import COUNT, compiled, input_array, input_indices, output_indices
-from robot_side.overlapping import NearestSurfaces
-from robot_side.proximity import CandidatePairs
+from robot_side.pairs.candidates import CandidatePairs
+from robot_side.pairs.overlaps import NearestSurfaces
 
 _REACH = 1.0 + 1e-9
 """Radii are enlarged by this for the comparison with distances, so that rounding leaves out no pair that touches."""

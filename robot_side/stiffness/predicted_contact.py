@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.arm_port import GripperPose
+from robot_side.arm.port import GripperPose
+from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap.compile import COUNT, NUMBER, compiled, input_array, output_array
 from robot_side.overlap.vectors import dot, load
-from robot_side.overlapping import NearestSurfaces, nearest_surfaces
-from robot_side.perceived_objects import PerceivedObjects
-from robot_side.proximity import CandidatePairs, bounding_spheres
+from robot_side.pairs.candidates import CandidatePairs, bounding_spheres
+from robot_side.pairs.overlaps import NearestSurfaces, nearest_surfaces
 
 CONTACT_PERIOD_S = 0.01
 """Contact is predicted this often: a controller is written to no more often."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.object_roles import assign_roles
-from robot_side.perceived_objects import PerceivedObjects, Role
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.roles import assign_roles
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject

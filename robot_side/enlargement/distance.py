@@ -10,7 +10,8 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.kinematic_error import (
+from robot_side.enlargement.delay_displacement import require_age
+from robot_side.enlargement.kinematic_error import (
     VarianceMeasure,
     directional_variance,
     require_finite,
@@ -35,12 +36,6 @@ def _non_negative(name: str, value: npt.ArrayLike) -> FloatArray:
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise ValueError(f"{name} = {values} is negative or not finite; valid: finite and at least 0")
     return values
-
-
-def _require_age(loop_age_s: float) -> None:
-    """ValueError when `loop_age_s` is negative or not finite."""
-    if not 0.0 <= loop_age_s < math.inf:
-        raise ValueError(f"loop_age_s = {loop_age_s} is negative or not finite; valid: finite and at least 0")
 
 
 @overload
@@ -77,21 +72,6 @@ def enlargement_distance(
     delay = _non_negative("delay_displacement_m", delay_displacement_m)
     distance = delay + np.maximum(0.0, mean + z * np.sqrt(variance))
     return float(distance) if np.ndim(distance) == 0 else distance
-
-
-def delay_displacement(velocities_m_s: FloatArray, loop_age_s: float) -> FloatArray:
-    """How far each point moves before the operator can react, ΔT_d = |v| t_d (m,) in metres (eq. 8).
-
-    velocities_m_s (m, 3): of the gripper spheres' centres. loop_age_s: a high quantile of the loop age; a
-    caller that does not know it gives the configured worst case, never 0. ValueError for a negative or
-    non-finite argument.
-    """
-    _require_age(loop_age_s)
-    displacement_m: FloatArray = np.sqrt(np.einsum("mi,mi->m", velocities_m_s, velocities_m_s)) * loop_age_s
-    # A velocity that is not finite shows in its displacement.
-    if not np.isfinite(displacement_m).all():
-        require_finite("velocities_m_s", velocities_m_s)
-    return displacement_m
 
 
 def combined_mean(kinematic_mean_m: float, camera_mean_m: float) -> float:
@@ -165,7 +145,7 @@ class Enlargement:
         covariances (m, 3, 3) from `position_covariance`, not looked at in the mode `once`;
         velocities_m_s (m, 3) of the centres. With P >= 0.5 it is an upper bound of `distances_towards`.
         """
-        _require_age(loop_age_s)
+        require_age(loop_age_s)
         if self._variance_once_m2 is None:
             variance_m2 = scalar_variance(covariances, self.settings.measure)
         else:
@@ -199,7 +179,7 @@ class Enlargement:
         is shorter than the perceived one by the sum of both errors' parts along û.
         """
         require_finite("velocities_m_s", velocities_m_s)
-        _require_age(loop_age_s)
+        require_age(loop_age_s)
         variance = (
             directional_variance(covariances, directions)
             if self._variance_once_m2 is None

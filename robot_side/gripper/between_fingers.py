@@ -3,13 +3,13 @@
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.arm_port import GripperPose
-from robot_side.nearest_object import distance_to_object
+from robot_side.arm.port import GripperPose
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap.compile import NUMBER, compiled, input_array, input_indices, output_array
 from robot_side.overlap.vectors import dot, load, negative, scale, subtract, unit
-from robot_side.overlapping import NearestSurfaces
-from robot_side.perceived_objects import PerceivedObjects, Role
-from robot_side.proximity import CandidatePairs
+from robot_side.pairs.candidates import CandidatePairs
+from robot_side.pairs.nearest_object import distance_to_object
+from robot_side.pairs.overlaps import NearestSurfaces
 
 _BESIDE = 0.5
 _BETWEEN = 0.85

@@ -12,7 +12,7 @@ for the other primitives the vector has length 1 near a face, and 0 in the middl
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.mesh_bounds import mesh_bounds
+from robot_side.objects.mesh_bounds import mesh_bounds
 from robot_side.overlap.mesh_library import MeshLibrary, nearest_mesh_pairs
 
 _BALL = 1.0 / 3.0

@@ -9,9 +9,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError, FeelaheadError
-from robot_side.arm_port import ArmState, GripperPose
-from robot_side.gripper_spheres import cover_boxes
-from robot_side.scene import Scene
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.gripper.spheres import cover_boxes
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.gripper_drive import GripperDrive
 from robot_side.simulation.gripper_travel import (
@@ -24,6 +23,7 @@ from robot_side.simulation.gripper_travel import (
     travel_from_samples,
 )
 from robot_side.simulation.joint_reference import JointReference, MotionLimits
+from robot_side.simulation.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
 _LIMIT_MARGIN_RAD = 0.005

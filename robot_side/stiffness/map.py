@@ -14,11 +14,11 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.alignment import alignments, trust
-from robot_side.object_shares import Shares, object_shares
+from robot_side.objects.perceived import Role
 from robot_side.overlap.compile import NUMBER, TRUTH, compiled, input_array
-from robot_side.overlapping import Overlaps, by_object, select
-from robot_side.perceived_objects import Role
+from robot_side.pairs.overlaps import Overlaps, by_object, select
+from robot_side.stiffness.alignment import alignments, trust
+from robot_side.stiffness.object_shares import Shares, object_shares
 
 _TRIGGERS = ("l2", "r2")
 _UNIT_TOLERANCE = 1e-6

@@ -8,11 +8,11 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.statistics import RunningStatistics
-from robot_side.perceived_objects import Role
+from robot_side.objects.perceived import Role
 from robot_side.sensing import Sensed
 
 if TYPE_CHECKING:
-    from robot_side.scene import Truth
+    from robot_side.simulation.scene import Truth
 
 MOVING_M_S = 0.01
 """A tool faster than this counts as moving."""

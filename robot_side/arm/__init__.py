@@ -1,0 +1,1 @@
+"""From a command to joint velocities, and the port of any arm."""

@@ -1,0 +1,1 @@
+"""The gripper's shape, and what it holds."""

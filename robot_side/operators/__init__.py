@@ -1,0 +1,1 @@
+"""Who may command the arm, who observes, and what stops it."""

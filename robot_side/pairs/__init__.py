@@ -1,0 +1,1 @@
+"""Which sphere meets which object, where it is nearest, and how much overlaps."""

@@ -1,0 +1,1 @@
+"""From overlaps to what the fingers are to feel (§4.2)."""
