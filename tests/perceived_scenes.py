@@ -8,7 +8,7 @@ import numpy.typing as npt
 from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.mesh_shapes import ellipsoid_mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 
 # A cube's corners, numbered by their bits (x, y, z), and five tetrahedra that fill it.
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)

@@ -10,7 +10,7 @@ from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh
-from robot_side.overlap.mesh_shapes import ellipsoid_mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.pairs import overlaps as overlapping
 from robot_side.pairs.nearest_object import distance_to_object
 from robot_side.stiffness import predicted_contact as contact

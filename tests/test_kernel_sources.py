@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import robot_side
-from robot_side.overlap import kernel_sources
-from robot_side.overlap.compile import Compiled, imported_kernels
-from robot_side.overlap.kernel_sources import digest, sources
+from robot_side.compiled import sources as kernel_sources
+from robot_side.compiled.kernel import Compiled, imported_kernels
+from robot_side.compiled.sources import digest, sources
 
 ROBOT_SIDE = Path(robot_side.__file__).parent
 _MARKS = {"inlined", "building_block", "compiled", "intrinsic"}
@@ -59,7 +59,7 @@ def test_a_change_in_any_source_changes_the_digest(monkeypatch: pytest.MonkeyPat
 
 
 _BLOCK = """
-from robot_side.overlap.compile import inlined
+from robot_side.compiled.kernel import inlined
 from limits import LIMIT
 
 @inlined
@@ -68,7 +68,7 @@ def clipped(value):
 """
 _KERNEL = """
 import numpy as np
-from robot_side.overlap.compile import compiled, input_array, output_array
+from robot_side.compiled.kernel import compiled, input_array, output_array
 from deeper.blocks import clipped
 
 @compiled(input_array(1), output_array(1))

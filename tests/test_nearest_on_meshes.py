@@ -8,7 +8,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.objects.mesh_bounds import mesh_bounds
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.mesh_shapes import ellipsoid_mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.pairs.nearest_on_meshes import nearest_on_meshes
 from robot_side.pairs.nearest_point import box_deepening
 from tests.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from mpmath import atan, chebyfit, mp, mpf, sqrt
 
 from common.arrays import FloatArray
-from robot_side.overlap.arctangent import COEFFICIENTS, TANGENT_OF_EIGHTH, arctangent
-from robot_side.overlap.compile import compiled, input_array, output_array
+from robot_side.compiled.kernel import compiled, input_array, output_array
+from robot_side.overlap.digits.arctangent import COEFFICIENTS, TANGENT_OF_EIGHTH, arctangent
 
 
 @compiled(input_array(1), input_array(1), output_array(1))

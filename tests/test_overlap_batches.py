@@ -10,8 +10,9 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.overlap import kernels
-from robot_side.overlap.kernels import Overlaps, PairCounts
-from robot_side.overlap.lanes import LANES
+from robot_side.overlap.kernels import PairCounts
+from robot_side.overlap.lanes.lanes import LANES
+from robot_side.overlap.primitives.solid import Overlaps
 
 Arrays = tuple[FloatArray, ...]
 Pairs = Callable[..., Overlaps]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.overlap import compile as compile_module
+from robot_side.compiled import kernel as compile_module
+from robot_side.compiled.kernel import Compiled, compiled, imported_kernels, input_array, output_array
 from robot_side.overlap import warm_up
-from robot_side.overlap.compile import Compiled, compiled, imported_kernels, input_array, output_array
 
 
 def _double(values: FloatArray, doubled: FloatArray) -> None:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import Compiled, compiled, input_array, output_array
-from robot_side.overlap.double_double import (
+from robot_side.compiled.kernel import Compiled, compiled, input_array, output_array
+from robot_side.overlap.digits.double_double import (
     DoubleDouble,
     divided,
     minus,
@@ -20,9 +20,9 @@ from robot_side.overlap.double_double import (
     two_product,
     two_sum,
 )
-from robot_side.overlap.double_double_vectors import load_vector
-from robot_side.overlap.expansion import determinant, exact_power
-from robot_side.overlap.precise_arctangent import NO_TURN, arctangent, turned, whole_angle
+from robot_side.overlap.digits.double_double_vectors import load_vector
+from robot_side.overlap.digits.expansion import determinant, exact_power
+from robot_side.overlap.digits.precise_arctangent import NO_TURN, arctangent, turned, whole_angle
 
 ROUNDING = Fraction(1, 2**103)
 """What `double_double` promises."""

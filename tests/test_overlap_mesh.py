@@ -8,7 +8,7 @@ from mpmath import mpf
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap import Mesh, MeshLibrary, sphere_box, sphere_mesh, sphere_tetrahedron
-from robot_side.overlap.mesh_library import mesh_pairs
+from robot_side.overlap.meshes.mesh_library import mesh_pairs
 from tests.overlap_meshes import (
     CUBE_CORNERS,
     CUBE_TRIANGLES,

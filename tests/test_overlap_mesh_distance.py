@@ -5,7 +5,7 @@ import pytest
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.mesh_library import mesh_pairs, nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
 from robot_side.pairs.nearest_point import nearest_on_box, nearest_on_tetrahedron
 from tests.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, ring, round_mesh, surface_of
 

@@ -8,7 +8,13 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.overlap import Mesh
-from robot_side.overlap.mesh_shapes import ShapeMesh, capsule_mesh, convex_hull_mesh, cylinder_mesh, ellipsoid_mesh
+from robot_side.overlap.meshes.mesh_shapes import (
+    ShapeMesh,
+    capsule_mesh,
+    convex_hull_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+)
 
 AXES = np.array([0.3, 1.0, 2.0])
 

@@ -10,9 +10,9 @@ import pytest
 from mpmath import mp, mpf
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import Compiled
 from robot_side.overlap import sphere_half_space, sphere_sphere
-from robot_side.overlap.compile import Compiled
-from robot_side.overlap.precise_kernels import precise_boxes, precise_tetrahedra
+from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 from tests.overlap_classes import BOXES, TETRAHEDRA
 from tests.overlap_reference import Number, Overlap, Polyhedron
 

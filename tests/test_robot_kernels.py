@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robot_side.assembly import build_robot_side
-from robot_side.overlap.compile import Compiled, imported_kernels
+from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.overlap.kernels import warm_up
 from robot_side.pairs.candidates import candidate_pairs
 from robot_side.settings import EnlargementOptions, RobotSettings

@@ -11,10 +11,11 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.assembly import build_robot_side
+from robot_side.compiled.kernel import Compiled
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.overlap import Mesh, mesh_library, sphere_sphere, warm_up
-from robot_side.overlap.compile import Compiled
-from robot_side.overlap.mesh_shapes import capsule_mesh
+from robot_side.overlap import Mesh, sphere_sphere, warm_up
+from robot_side.overlap.meshes import mesh_library
+from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.pairs import nearest_on_meshes
 from robot_side.pairs.candidates import candidate_pairs
 from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces
@@ -317,7 +318,7 @@ def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     program = (
         "import feelahead.loopback, robot_side.main\n"
         "from robot_side.assembly import build_robot_side\n"
-        "from robot_side.overlap.compile import imported_kernels\n"
+        "from robot_side.compiled.kernel import imported_kernels\n"
         "from robot_side.settings import RobotSettings\n"
         "robot = build_robot_side(RobotSettings(), 1, 'clock')\n"
         "robot.tick(0.0)\n"

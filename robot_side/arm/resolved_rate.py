@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import NUMBER, TRUTH, building_block, compiled, input_array, output_array
+from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, output_array
 
 
 def joint_velocities(

@@ -10,6 +10,7 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.enlargement.delay_displacement import require_age
 from robot_side.enlargement.kinematic_error import (
     VarianceMeasure,
@@ -17,7 +18,6 @@ from robot_side.enlargement.kinematic_error import (
     require_finite,
     scalar_variance,
 )
-from robot_side.overlap.compile import NUMBER, TRUTH, compiled, input_array, output_array
 
 _PER_AXIS_TO_LENGTH = math.sqrt(3.0)
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import TRUTH, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
 
 VarianceMeasure = Literal["isotropic", "trace"]
 """How a covariance becomes one variance: its largest eigenvalue, or the paper's sum over the axes."""

@@ -4,9 +4,9 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.arm.port import GripperPose
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import dot, load, negative, scale, subtract, unit
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.overlap.compile import NUMBER, compiled, input_array, input_indices, output_array
-from robot_side.overlap.vectors import dot, load, negative, scale, subtract, unit
 from robot_side.pairs.candidates import CandidatePairs
 from robot_side.pairs.nearest_object import distance_to_object
 from robot_side.pairs.overlaps import NearestSurfaces

@@ -10,7 +10,7 @@ from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects
 
 if TYPE_CHECKING:
-    from robot_side.overlap.mesh_library import MeshLibrary
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from common.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
-    from robot_side.overlap.mesh_library import MeshLibrary
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 
 class Role(Enum):

@@ -6,9 +6,9 @@ import sys
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array
 from robot_side.enlargement.kinematic_error import require_finite
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap.compile import TRUTH, compiled, inlined, input_array
 
 _UNIT_TOLERANCE = 1e-6
 _LOWEST = -sys.float_info.max

@@ -19,17 +19,14 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.clock import MonotonicClock
-from robot_side.overlap.ball import sphere_overlap
-from robot_side.overlap.box_batch import overlap_boxes
-from robot_side.overlap.compile import Compiled, compiled, imported_kernels, inlined, input_array, output_array
-from robot_side.overlap.half_space import half_space_overlap
-from robot_side.overlap.precise_kernels import precise_boxes, precise_tetrahedra
-from robot_side.overlap.solid import Overlap
-from robot_side.overlap.tetrahedron_batch import overlap_tetrahedra
-from robot_side.overlap.vectors import load
-
-Overlaps = tuple[FloatArray, FloatArray, FloatArray]
-"""(volumes (p,), gradients (p, 3), areas (p,))."""
+from robot_side.compiled.kernel import Compiled, compiled, imported_kernels, inlined, input_array, output_array
+from robot_side.compiled.vectors import load
+from robot_side.overlap.lanes.box_batch import overlap_boxes
+from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
+from robot_side.overlap.primitives.ball import sphere_overlap
+from robot_side.overlap.primitives.half_space import half_space_overlap
+from robot_side.overlap.primitives.solid import Overlap, Overlaps
 
 PAIRS_PER_THREAD = 8192
 """A thread is worth starting for so many boxes or tetrahedra, nearly a millisecond of work."""

@@ -24,14 +24,9 @@ from typing import Literal, overload
 import numpy.typing as npt
 
 from common.arrays import FloatArray
-from robot_side.overlap.arguments import broadcast, directions, lengths, numbers, rotations
-from robot_side.overlap.kernels import (
-    Overlaps,
-    box_pairs,
-    half_space_pairs,
-    sphere_pairs,
-    tetrahedron_pairs,
-)
+from robot_side.overlap.checks.arguments import broadcast, directions, lengths, numbers, rotations
+from robot_side.overlap.kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
+from robot_side.overlap.primitives.solid import Overlaps
 
 Array = npt.ArrayLike
 

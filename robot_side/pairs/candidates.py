@@ -12,11 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.enlargement.kinematic_error import require_finite
-from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
-from robot_side.objects.perceived import PerceivedObjects
-from robot_side.objects.validity import require_valid
-from robot_side.overlap.compile import (
+from robot_side.compiled.kernel import (
     COUNT,
     compiled,
     inlined,
@@ -25,7 +21,11 @@ from robot_side.overlap.compile import (
     output_array,
     output_indices,
 )
-from robot_side.overlap.vectors import Vector, add, dot, load, scale, subtract
+from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
+from robot_side.enlargement.kinematic_error import require_finite
+from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.objects.validity import require_valid
 
 _REACH = 1.0 + 1e-9
 """Radii are enlarged by this for the comparison, so that rounding never culls a pair that touches."""

@@ -8,7 +8,7 @@ direction. Nothing is validated here. Arrays are float64 and int64, C-contiguous
 import math
 
 from common.arrays import FloatArray, IntArray
-from robot_side.overlap.compile import (
+from robot_side.compiled.kernel import (
     COUNT,
     NUMBER,
     building_block,
@@ -18,7 +18,7 @@ from robot_side.overlap.compile import (
     input_indices,
     output_array,
 )
-from robot_side.overlap.vectors import Vector, add, cross, dot, load, negative, norm, scale, subtract, unit
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, negative, norm, scale, subtract, unit
 
 Nearest = tuple[float, Vector, Vector]
 """Signed distance, direction and deepening vector."""

@@ -31,7 +31,7 @@ def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArra
     rows = np.flatnonzero(objects.mesh_object == index)
     if len(rows) and objects.mesh_library is not None:
         # A scene without meshes does not load the kernels for them.
-        from robot_side.overlap.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
+        from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
 
         points = np.repeat(np.ascontiguousarray(point_m, dtype=np.float64).reshape(1, 3), len(rows), axis=0)
         to_meshes, _ = nearest_mesh_pairs(

@@ -13,7 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.objects.mesh_bounds import mesh_bounds
-from robot_side.overlap.mesh_library import MeshLibrary, nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_library import MeshLibrary, nearest_mesh_pairs
 
 _BALL = 1.0 / 3.0
 """Radius of the ball as a share of the depth. In a plate the vector shrinks over the last quarter of the way from the

@@ -18,7 +18,7 @@ is `nearest_kernels`.
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import Compiled
+from robot_side.compiled.kernel import Compiled
 from robot_side.pairs.nearest_kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
 
 

@@ -178,7 +178,7 @@ def evaluate(
             volume[part], gradient[part], _ = kernel(points[part], pair_radii_m[part], *of_pairs)
     part = pairs.meshes
     if part.start < part.stop and objects.mesh_library is not None:
-        from robot_side.overlap.mesh_library import mesh_pairs  # noqa: PLC0415
+        from robot_side.overlap.meshes.mesh_library import mesh_pairs  # noqa: PLC0415
 
         volume[part], gradient[part], _ = mesh_pairs(
             points[part], pair_radii_m[part], objects.mesh_library, *_placed(objects, pairs.primitive_index[part])

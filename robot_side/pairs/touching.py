@@ -3,7 +3,7 @@
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.overlap.compile import COUNT, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.kernel import COUNT, compiled, input_array, input_indices, output_indices
 from robot_side.pairs.candidates import CandidatePairs
 from robot_side.pairs.overlaps import NearestSurfaces
 

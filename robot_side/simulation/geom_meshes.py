@@ -8,10 +8,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from robot_side.overlap.closed_surface import signed_volume
-from robot_side.overlap.mesh import Mesh
-from robot_side.overlap.mesh_library import MeshLibrary
-from robot_side.overlap.mesh_shapes import (
+from robot_side.overlap.meshes.closed_surface import signed_volume
+from robot_side.overlap.meshes.mesh import Mesh
+from robot_side.overlap.meshes.mesh_library import MeshLibrary
+from robot_side.overlap.meshes.mesh_shapes import (
     ShapeMesh,
     capsule_mesh,
     convex_hull_mesh,

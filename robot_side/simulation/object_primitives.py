@@ -13,7 +13,7 @@ from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
 
 if TYPE_CHECKING:
-    from robot_side.overlap.mesh_library import MeshLibrary
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 _EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
 _MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH}

@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import NUMBER, compiled, inlined, input_array, output_array
-from robot_side.overlap.vectors import Vector, add, dot, load, norm, scale
+from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
+from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale
 from robot_side.pairs.overlaps import Overlaps
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array
 from robot_side.objects.perceived import Role
-from robot_side.overlap.compile import NUMBER, TRUTH, compiled, input_array
 from robot_side.pairs.overlaps import Overlaps, by_object, select
 from robot_side.stiffness.alignment import alignments, trust
 from robot_side.stiffness.object_shares import Shares, object_shares

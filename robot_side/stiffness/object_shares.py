@@ -3,7 +3,7 @@
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.overlap.compile import compiled, input_array, input_indices, output_array
+from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
 from robot_side.pairs.overlaps import Overlaps
 
 Shares = list[float]

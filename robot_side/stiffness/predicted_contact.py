@@ -17,9 +17,9 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.arm.port import GripperPose
+from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_array
+from robot_side.compiled.vectors import dot, load
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap.compile import COUNT, NUMBER, compiled, input_array, output_array
-from robot_side.overlap.vectors import dot, load
 from robot_side.pairs.candidates import CandidatePairs, bounding_spheres
 from robot_side.pairs.overlaps import NearestSurfaces, nearest_surfaces
 

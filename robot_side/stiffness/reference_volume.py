@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.overlap.compile import compiled, input_array, output_array
-from robot_side.overlap.vectors import dot, load
+from robot_side.compiled.kernel import compiled, input_array, output_array
+from robot_side.compiled.vectors import dot, load
 
 _LEAST_ENLARGEMENT_M = 1e-3
 """A gripper that is hardly enlarged would make the step from nothing to s = 1 within micrometres."""

@@ -1,0 +1,1 @@
+"""What compiling with Numba takes: decorators, a safe cache, vectors in registers."""

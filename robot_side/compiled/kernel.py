@@ -1,0 +1,147 @@
+"""Typed decorators around Numba: `inlined` for building blocks, `compiled` for what Python calls.
+
+Numba is imported untyped; everything else in this package sees ordinary typed functions.
+"""
+
+import contextlib
+import functools
+import threading
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+import numba.extending
+
+from robot_side.compiled.numba_inside import WithoutMachineCode, keep_on_disk
+from robot_side.compiled.sources import digest
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+# Division by zero follows IEEE 754 instead of raising, which lets LLVM vectorise. No fastmath flag is set:
+# results stay the same from machine to machine and NaN is not assumed away.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+
+
+def input_array(dimensions: int) -> Any:
+    """The Numba type of a C-contiguous float64 array that the kernel only reads.
+
+    Read-only and writable arrays are both accepted, so that neither brings a compilation of its own.
+    """
+    return numba.types.Array(numba.types.float64, dimensions, "C", readonly=True)
+
+
+def output_array(dimensions: int) -> Any:
+    """The Numba type of a C-contiguous float64 array that the kernel fills."""
+    return numba.types.Array(numba.types.float64, dimensions, "C")
+
+
+def input_indices() -> Any:
+    """The Numba type of a C-contiguous int64 array (n,) that the kernel only reads."""
+    return numba.types.Array(numba.types.int64, 1, "C", readonly=True)
+
+
+def output_indices() -> Any:
+    """The Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
+    return numba.types.Array(numba.types.int64, 1, "C")
+
+
+NUMBER: Any = numba.types.float64
+"""The Numba type of a float."""
+TRUTH: Any = numba.types.boolean
+"""The Numba type of a bool."""
+COUNT: Any = numba.types.int64
+"""The Numba type of an int."""
+
+
+_FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode}
+
+
+def inlined(function: _Function) -> _Function:
+    """Compile `function` into whichever kernel calls it."""
+    return cast(_Function, numba.njit(forceinline=True, **_FOR_CALLERS)(function))
+
+
+def building_block(function: _Function) -> _Function:
+    """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
+    return cast(_Function, numba.njit(**_FOR_CALLERS)(function))
+
+
+def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return NUMBER(NUMBER, NUMBER, NUMBER), generate
+
+
+fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
+"""The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
+
+
+def _power_of_two_below(_typing: Any, _length: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        integer, double = context.get_value_type(numba.types.int64), context.get_value_type(NUMBER)
+        exponent = builder.and_(builder.bitcast(arguments[0], integer), integer(0x7FF0000000000000))
+        return builder.bitcast(exponent, double)
+
+    return NUMBER(NUMBER), generate
+
+
+power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
+"""The largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only."""
+
+_kernels: list["Compiled"] = []
+
+
+def imported_kernels() -> tuple["Compiled", ...]:
+    """The kernels of every module that has been imported so far."""
+    return tuple(_kernels)
+
+
+class Compiled:
+    """A kernel with one signature, compiled (or loaded from the cache on disk) when it is first needed.
+
+    One signature means that no later call can start a compilation: an array of another type, number of
+    dimensions or layout raises TypeError instead of stalling a running tick.
+    """
+
+    def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
+        self.name = f"{function.__module__}.{function.__qualname__}"
+        self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
+        self.function = function
+        """What it is compiled from."""
+        self._signature = (returns or numba.types.void)(*arguments)
+        self._preparing = threading.Lock()
+        self.ready = False
+        """Whether it is compiled, so that the next call takes no longer than any other."""
+        _kernels.append(self)
+
+    def prepare(self) -> None:
+        """Compile or load now."""
+        with self._preparing:
+            if not self.ready:
+                # Only now does every building block exist. Without any writable place for it (a read-only image,
+                # say) the kernel works uncached.
+                with contextlib.suppress(RuntimeError):
+                    keep_on_disk(self._dispatcher, self.function, digest)
+                self._dispatcher.compile(self._signature)
+                self._dispatcher.disable_compile()
+                self.ready = True
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the kernel; TypeError for arrays that its signature does not name."""
+        if not self.ready:
+            self.prepare()
+        return self._dispatcher(*arguments)
+
+    @property
+    def cache_hits(self) -> int:
+        """How often machine code came from the cache on disk: 0 or 1."""
+        return sum(self._dispatcher.stats.cache_hits.values())
+
+
+def compiled(*arguments: Any, returns: Any = None) -> Callable[[Callable[..., Any]], Compiled]:
+    """Make a function of these Numba argument types a `Compiled` kernel.
+
+    It fills its output arrays, and returns a value of the type `returns` unless that is None.
+    """
+    return functools.partial(Compiled, arguments=arguments, returns=returns)

@@ -1,0 +1,113 @@
+"""What a kernel is built from: the files of every function that goes into it, and the constants that these read."""
+
+import functools
+import hashlib
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, cast
+
+import numpy as np
+
+_OURS = frozenset({"common", "robot_side"})
+_COMPILERS = ("sources.py", "kernel.py", "numba_inside.py")
+"""The files beside this one that decide how any kernel is compiled."""
+
+
+def sources(function: Callable[..., Any]) -> frozenset[Path]:
+    """Find the source files of `function` and of every function of ours that it names, directly or through others.
+
+    Where they lie does not matter. A module that is named as a whole counts, too.
+    """
+    here = Path(__file__).parent
+    return frozenset(here / name for name in _COMPILERS) | {
+        Path(file) for part in _parts(function) if (file := _file(part)) is not None
+    }
+
+
+def digest(function: Callable[..., Any]) -> str:
+    """Digest the content of `sources(function)` and the values of the constants that its parts read by name.
+
+    Constants count by value, because a number does not know the file from which it was imported.
+    """
+    result = hashlib.sha256()
+    for path in sorted(sources(function)):
+        result.update("/".join(path.parts[-2:]).encode() + b"\0" + _content(path) + b"\0")
+    for line in sorted(_constants(function)):
+        result.update(line.encode() + b"\0")
+    return result.hexdigest()
+
+
+@functools.cache
+def _content(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+def _parts(function: Callable[..., Any]) -> set[Any]:
+    """Every function, class and module of ours that compiling `function` looks into."""
+    found: set[Any] = set()
+    waiting: list[Any] = [inspect.unwrap(function)]
+    while waiting:
+        part = waiting.pop()
+        if part not in found:
+            found.add(part)
+            if isinstance(part, FunctionType):
+                waiting += [named for _, value in _named(part) if (named := _ours(value, part)) is not None]
+    return found
+
+
+def _ours(value: object, user: FunctionType) -> Any:
+    """The function, class or module of ours behind a value that `user` names; None where there is none."""
+    if isinstance(value, ModuleType):
+        return value if value.__name__.partition(".")[0] in _OURS else None
+    if hasattr(value, "__wrapped__"):
+        # Numba's dispatchers and intrinsics wrap the function that they were made from.
+        return inspect.unwrap(cast(Callable[..., Any], value))
+    if not isinstance(value, FunctionType | type):
+        return None
+    return value if value.__module__ == user.__module__ or value.__module__.partition(".")[0] in _OURS else None
+
+
+def _named(function: FunctionType) -> Iterator[tuple[str, object]]:
+    """The globals and the variables of surrounding functions that `function` names, with their values."""
+    for name in _names(function.__code__):
+        if name in function.__globals__:
+            yield name, function.__globals__[name]
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def _names(code: CodeType) -> set[str]:
+    names = set(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            names |= _names(constant)
+    return names
+
+
+def _constants(function: Callable[..., Any]) -> Iterator[str]:
+    for part in _parts(function):
+        if isinstance(part, FunctionType):
+            for name, value in _named(part):
+                text = _value(value)
+                if text is not None:
+                    yield f"{part.__module__}.{part.__qualname__}: {name} = {text}"
+
+
+def _value(value: object) -> str | None:
+    """The value as a text that is the same in every process; None for what is no constant."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
+    if isinstance(value, tuple):
+        parts = [_value(part) for part in value]
+        return None if None in parts else f"({', '.join(map(str, parts))})"
+    return repr(value) if isinstance(value, bool | int | float | complex | str | np.generic) else None
+
+
+def _file(part: Any) -> str | None:
+    if isinstance(part, FunctionType):
+        return part.__code__.co_filename
+    name = part.__name__ if isinstance(part, ModuleType) else part.__module__
+    return getattr(sys.modules.get(name), "__file__", None)

@@ -1,0 +1,114 @@
+"""Checks of the public functions' arguments, and their broadcasting against each other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from common.arrays import FloatArray
+from robot_side.overlap.checks.array_searches import NONE, first_outside, first_short, first_skewed
+
+LARGEST = 1e50
+"""The largest magnitude of any coordinate or length (m): products of six of them stay finite."""
+
+SMALLEST_NORMAL = 1e-50
+"""The shortest normal of a half-space."""
+
+ORTHONORMALITY = 1e-6
+"""The largest Frobenius norm of QᵀQ - I of a rotation Q."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument that has been checked: every row of the last `trailing` dimensions is one item."""
+
+    name: str
+    values: FloatArray
+    trailing: tuple[int, ...]
+
+    @property
+    def leading(self) -> tuple[int, ...]:
+        """The dimensions that broadcast."""
+        return self.values.shape[: self.values.ndim - len(self.trailing)]
+
+    @property
+    def items(self) -> FloatArray:
+        """The items in one row after the other, (items, *trailing), contiguous."""
+        return np.ascontiguousarray(self.values).reshape(-1, *self.trailing)
+
+    def refuse(self, index: tuple[int, ...], what_is_valid: str) -> NoReturn:
+        """ValueError about the item or number at `index`."""
+        label = self.name + (f"[{', '.join(map(str, index))}]" if index else "")
+        raise ValueError(f"{label} = {self.values[index].tolist()} is out of range; valid: {what_is_valid}")
+
+    def rows(self, shape: tuple[int, ...]) -> FloatArray:
+        """The items repeated to the leading dimensions `shape`, flattened to (items, *trailing), contiguous."""
+        if self.leading == shape:
+            return self.items
+        repeated = np.broadcast_to(self.values, (*shape, *self.trailing))
+        return np.ascontiguousarray(repeated).reshape(int(np.prod(shape, dtype=np.int64)), *self.trailing)
+
+
+def numbers(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
+    """`value` as finite float64 with the last dimensions `trailing`, or ValueError."""
+    return _within(name, value, trailing, -LARGEST, f"finite, magnitude at most {LARGEST:g}")
+
+
+def lengths(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
+    """`numbers` that are not negative."""
+    return _within(name, value, trailing, 0.0, f"finite, 0 to {LARGEST:g} m")
+
+
+def directions(name: str, value: npt.ArrayLike) -> Argument:
+    """`numbers` (..., 3) of which no vector is 0."""
+    argument = numbers(name, value, (3,))
+    if (short := first_short(argument.items, SMALLEST_NORMAL)) != NONE:
+        argument.refuse(_index(short, argument.leading), f"a vector of length {SMALLEST_NORMAL:g} or more")
+    return argument
+
+
+def rotations(name: str, value: npt.ArrayLike) -> Argument:
+    """`numbers` (..., 3, 3) of which every matrix is orthonormal."""
+    argument = numbers(name, value, (3, 3))
+    if (skewed := first_skewed(argument.items, ORTHONORMALITY)) != NONE:
+        what_is_valid = f"an orthonormal matrix Q, ‖QᵀQ - I‖ <= {ORTHONORMALITY:g}"
+        argument.refuse(_index(skewed, argument.leading), what_is_valid)
+    return argument
+
+
+def _within(name: str, value: npt.ArrayLike, trailing: tuple[int, ...], lowest: float, what_is_valid: str) -> Argument:
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} is no rectangular array; valid: {_shape_text(trailing)}") from error
+    if raw.dtype.kind not in "iuf":
+        raise ValueError(f"{name} has the type {raw.dtype}; valid: real numbers")
+    values = raw.astype(np.float64, copy=False)
+    if values.ndim < len(trailing) or values.shape[values.ndim - len(trailing) :] != trailing:
+        raise ValueError(f"{name} has the shape {values.shape}; valid: {_shape_text(trailing)}")
+    argument = Argument(name, values, trailing)
+    if (outside := first_outside(argument.items.reshape(-1), lowest, LARGEST)) != NONE:
+        argument.refuse(_index(outside, values.shape), what_is_valid)
+    return argument
+
+
+def broadcast(arguments: Sequence[Argument]) -> tuple[int, ...]:
+    """The common leading dimensions of the arguments, or ValueError."""
+    first = arguments[0].leading
+    if all(argument.leading == first for argument in arguments):
+        return first
+    try:
+        return np.broadcast_shapes(*(argument.leading for argument in arguments))
+    except ValueError as error:
+        shapes = ", ".join(f"{argument.name} {argument.values.shape}" for argument in arguments)
+        raise ValueError(f"the leading dimensions do not broadcast: {shapes}") from error
+
+
+def _index(position: int, shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(int(place) for place in np.unravel_index(position, shape))
+
+
+def _shape_text(trailing: tuple[int, ...]) -> str:
+    return f"the shape ({', '.join(['...', *map(str, trailing)])})"

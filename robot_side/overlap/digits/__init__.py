@@ -1,0 +1,1 @@
+"""Arithmetic beyond a double, and arctangents."""

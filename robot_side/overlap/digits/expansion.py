@@ -1,0 +1,71 @@
+"""Sums and products without any rounding, where a sign decides between something and nothing.
+
+The terms of a sum are distilled by two-sums until one of them is all of it (Ogita, Rump and Oishi, "Accurate sum and
+dot product", 2005): slow, and only asked where double-double cannot tell a value well from 0.
+"""
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import building_block
+from robot_side.compiled.vectors import norm
+from robot_side.overlap.digits.double_double import two_product, two_sum
+from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_cross, precise_dot
+
+_UNCERTAIN = 1e-15
+"""Determinants below this, for vectors of length 1, are taken again without rounding."""
+
+
+@building_block
+def exact_sum(terms: FloatArray) -> float:
+    """The sum of the terms, which are overwritten, to a relative error of 1e-15."""
+    for _ in range(terms.size):
+        # Each pass leaves the sum as it is and gathers it in the last term.
+        rest = 0.0
+        for term in range(1, terms.size):
+            terms[term], terms[term - 1] = two_sum(terms[term], terms[term - 1])
+            rest += abs(terms[term - 1])
+        if rest <= 1e-16 * abs(terms[-1]):
+            break
+    return float(terms[-1])
+
+
+@building_block
+def exact_power(point: PreciseVector, radius: float) -> float:
+    """R² - |point|² to a relative error of 1e-15."""
+    terms = np.empty(20)
+    terms[0], terms[1] = two_product(radius, radius)
+    count = 2
+    for axis in range(3):
+        high, low = point[axis]
+        terms[count], terms[count + 1] = two_product(-high, high)
+        terms[count + 2], terms[count + 3] = two_product(-2.0 * high, low)
+        terms[count + 4], terms[count + 5] = two_product(-low, low)
+        count += 6
+    return exact_sum(terms)
+
+
+@building_block
+def determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
+    """The determinant a · (b × c) to a relative error of 1e-15: 0 only where it is exactly 0."""
+    value = precise_dot(a, precise_cross(b, c))[0]
+    if abs(value) > _UNCERTAIN * norm(highs(a)) * norm(highs(b)) * norm(highs(c)):
+        return value
+    return _exact_determinant(a, b, c)
+
+
+@building_block
+def _exact_determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
+    """The determinant a · (b × c) to a relative error of 1e-15."""
+    terms = np.empty(192)
+    count = 0
+    for first in range(3):
+        for cyclic in range(1, 3):
+            second, third, sign = (first + cyclic) % 3, (first - cyclic) % 3, 3.0 - 2.0 * cyclic
+            for choice in range(8):
+                x, y, z = a[first][choice & 1], b[second][choice >> 1 & 1], c[third][choice >> 2]
+                high, low = two_product(sign * x, y)
+                terms[count], terms[count + 1] = two_product(high, z)
+                terms[count + 2], terms[count + 3] = two_product(low, z)
+                count += 4
+    return exact_sum(terms)

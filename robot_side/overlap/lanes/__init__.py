@@ -1,0 +1,1 @@
+"""Boxes and tetrahedra, 64 pairs at a time in vector instructions."""

@@ -1,0 +1,190 @@
+"""Many spheres with as many boxes: pairs that do not cut are settled by bounds, the others go through lanes."""
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import (
+    COUNT,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    output_array,
+    output_indices,
+    power_of_two_below,
+)
+from robot_side.compiled.vectors import cross, dot, scale, subtract
+from robot_side.overlap.lanes.box_lane import Columns, box_lane
+from robot_side.overlap.lanes.lanes import (
+    LANES,
+    NOTHING,
+    PARTIAL,
+    RESULT_COLUMNS,
+    WHOLE_SOLID,
+    WHOLE_SPHERE,
+    WIDTH,
+    column,
+    copy_lane,
+    lane_groups,
+    load_rows,
+    load_vectors,
+    scatter,
+    store_result,
+    vector_column,
+    weight,
+)
+from robot_side.overlap.primitives.solid import sphere_area, sphere_volume
+
+# Columns of a block: what a pair consists of, then what its bounds tell, then its result.
+_CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
+_BOUNDS, _SOLID_VOLUME, _RESULT = 19, 20, 21
+_COLUMNS = _RESULT + RESULT_COLUMNS
+
+_SLACK = 1e-5
+"""Share of all lengths by which bounds must settle a pair: rotations are orthonormal only to 1e-6."""
+
+
+@compiled(
+    input_array(2),
+    input_array(1),
+    input_array(2),
+    input_array(3),
+    input_array(2),
+    output_array(1),
+    output_array(2),
+    output_array(1),
+    output_indices(),
+    returns=COUNT,
+)
+def overlap_boxes(
+    centers: FloatArray,
+    radii: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+    rows: IntArray,
+) -> int:
+    """Spheres `centers` (p, 3), `radii` (p,) with boxes; the results must hold zeros.
+
+    The boxes are given by `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world and `box_half_sizes` (p, 3).
+
+    Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
+    worked out to its last entry, and returns how many need precise forms.
+    """
+    block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
+    pairs = np.empty(LANES, dtype=np.int64)
+    waiting_count = unsettled = partial = 0
+    total = radii.size
+    for first in range(0, total, LANES):
+        count = min(LANES, total - first)
+        _load(centers, radii, box_centers, box_rotations, box_half_sizes, first, count, block)
+        if _bound(block, lane_groups(count)) == 0:
+            continue
+        for lane in range(count):
+            verdict = column(block, _BOUNDS, lane)
+            if verdict == NOTHING:
+                continue
+            pair = first + lane
+            if verdict == PARTIAL:
+                copy_lane(block, lane, waiting, waiting_count, _INPUTS)
+                pairs[waiting_count] = pair
+                waiting_count += 1
+                if waiting_count == LANES:
+                    _work_out(waiting, LANES // WIDTH)
+                    partial += LANES
+                    unsettled = scatter(waiting, _RESULT, pairs, LANES, volumes, gradients, areas, rows, unsettled)
+                    waiting_count = 0
+            elif verdict == WHOLE_SOLID:
+                volumes[pair] = column(block, _SOLID_VOLUME, lane)
+            else:
+                volumes[pair], areas[pair] = sphere_volume(radii[pair]), sphere_area(radii[pair])
+    if waiting_count > 0:
+        for lane in range(waiting_count, lane_groups(waiting_count) * WIDTH):
+            copy_lane(waiting, 0, waiting, lane, _INPUTS)
+        _work_out(waiting, lane_groups(waiting_count))
+        partial += waiting_count
+        unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
+    rows[total] = partial
+    return unsettled
+
+
+@inlined
+def _load(
+    centers: FloatArray,
+    radii: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    first: int,
+    count: int,
+    block: FloatArray,
+) -> None:
+    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(radii, first, count, 1, block, _RADIUS)
+    load_vectors(box_centers.reshape(-1), first, count, block, _BOX_CENTER)
+    load_rows(box_rotations.reshape(-1), first, count, 9, block, _ROTATION)
+    load_vectors(box_half_sizes.reshape(-1), first, count, block, _HALF_SIZES)
+    for lane in range(count, lane_groups(count) * WIDTH):
+        copy_lane(block, 0, block, lane, _INPUTS)
+
+
+@inlined
+def _columns(block: FloatArray, lane: int) -> Columns:
+    first, second = vector_column(block, _ROTATION, lane), vector_column(block, _ROTATION + 3, lane)
+    third = vector_column(block, _ROTATION + 6, lane)
+    return (
+        (first[0], second[0], third[0]),
+        (first[1], second[1], third[1]),
+        (first[2], second[2], third[2]),
+    )
+
+
+@building_block
+def _bound(block: FloatArray, groups: int) -> int:
+    """Fill in what the bounds of the first groups of lanes tell, and the boxes' volumes; the sum of the weights."""
+    total = 0
+    for lane in range(groups * WIDTH):
+        q_0, q_1, q_2 = _columns(block, lane)
+        half = vector_column(block, _HALF_SIZES, lane)
+        radius = column(block, _RADIUS, lane)
+        middle = subtract(vector_column(block, _BOX_CENTER, lane), vector_column(block, _CENTER, lane))
+        volume = 8.0 * abs(dot(q_0, cross(q_1, q_2))) * (half[0] * half[1] * half[2])
+        x, y, z = abs(dot(middle, q_0)), abs(dot(middle, q_1)), abs(dot(middle, q_2))
+        slack = _SLACK * (radius + (half[0] + half[1] + half[2]) + (x + y + z))
+        beyond = (
+            max(x - half[0] - slack, 0.0),
+            max(y - half[1] - slack, 0.0),
+            max(z - half[2] - slack, 0.0),
+        )
+        corner = x + half[0] + slack, y + half[1] + slack, z + half[2] + slack
+        lowest = min(half[0] - x, half[1] - y, half[2] - z)
+        radius_2 = radius * radius
+        away = (dot(beyond, beyond) >= radius_2) | (volume == 0.0)
+        within = dot(corner, corner) <= radius_2
+        verdict = WHOLE_SPHERE if lowest - slack >= radius else PARTIAL
+        verdict = WHOLE_SOLID if within else verdict
+        verdict = NOTHING if away else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+        block[np.uint64(_SOLID_VOLUME * LANES + lane)] = volume
+    return total
+
+
+@building_block
+def _work_out(block: FloatArray, groups: int) -> None:
+    for lane in range(groups * WIDTH):
+        radius = column(block, _RADIUS, lane)
+        # Lengths near 1 keep products of many from overflowing; a power of two takes no digit.
+        size = power_of_two_below(radius)
+        shrink = 1.0 / size
+        overlap, unsettled = box_lane(
+            scale(shrink, vector_column(block, _CENTER, lane)),
+            shrink * radius,
+            scale(shrink, vector_column(block, _BOX_CENTER, lane)),
+            _columns(block, lane),
+            scale(shrink, vector_column(block, _HALF_SIZES, lane)),
+        )
+        store_result(block, _RESULT, lane, overlap, size, unsettled)

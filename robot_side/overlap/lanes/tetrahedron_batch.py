@@ -1,0 +1,232 @@
+"""Many spheres with as many tetrahedra: pairs that do not cut are settled by bounds, the others go through lanes."""
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import (
+    COUNT,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    output_array,
+    output_indices,
+    power_of_two_below,
+)
+from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.lanes.lanes import (
+    LANES,
+    NOTHING,
+    PARTIAL,
+    RESULT_COLUMNS,
+    SOME_PARTIAL,
+    WHOLE_SOLID,
+    WHOLE_SPHERE,
+    WIDTH,
+    column,
+    copy_lane,
+    lane_groups,
+    load_rows,
+    load_vectors,
+    scatter,
+    store_result,
+    vector_column,
+    weight,
+)
+from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
+from robot_side.overlap.primitives.solid import sphere_area, sphere_volume
+
+# Columns of a block: what a pair consists of, then what its bounds tell, then its result.
+_CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
+_BOUNDS, _SOLID_VOLUME, _RESULT = 16, 17, 18
+_COLUMNS = _RESULT + RESULT_COLUMNS
+
+_SURE = 1.0 + 1e-9
+"""Bounds settle a pair only with this margin for what they round."""
+
+_ROUNDING_2 = 1e-21
+"""(8 · 2⁻⁵³)² / 1e-9: what products of three lengths may round, squared, where the margin above does not cover it."""
+
+
+@compiled(
+    input_array(2),
+    input_array(1),
+    input_array(3),
+    output_array(1),
+    output_array(2),
+    output_array(1),
+    output_indices(),
+    returns=COUNT,
+)
+def overlap_tetrahedra(
+    centers: FloatArray,
+    radii: FloatArray,
+    vertices: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+    rows: IntArray,
+) -> int:
+    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3); the results must hold zeros.
+
+    Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
+    worked out to its last entry, and returns how many need precise forms.
+    """
+    block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
+    pairs = np.empty(LANES, dtype=np.int64)
+    waiting_count = unsettled = partial = 0
+    total = radii.size
+    for first in range(0, total, LANES):
+        count = min(LANES, total - first)
+        _load(centers, radii, vertices, first, count, block)
+        left = _bound_by_corners(block, lane_groups(count))
+        if left == 0:
+            continue
+        if left % SOME_PARTIAL > 0:
+            left = _measure_within(block, lane_groups(count))
+        if left >= SOME_PARTIAL:
+            _bound_by_planes(block, lane_groups(count))
+        for lane in range(count):
+            verdict = column(block, _BOUNDS, lane)
+            if verdict == NOTHING:
+                continue
+            pair = first + lane
+            if verdict == PARTIAL:
+                copy_lane(block, lane, waiting, waiting_count, _INPUTS)
+                pairs[waiting_count] = pair
+                waiting_count += 1
+                if waiting_count == LANES:
+                    _work_out(waiting, LANES // WIDTH)
+                    partial += LANES
+                    unsettled = scatter(waiting, _RESULT, pairs, LANES, volumes, gradients, areas, rows, unsettled)
+                    waiting_count = 0
+            elif verdict == WHOLE_SOLID:
+                volumes[pair] = column(block, _SOLID_VOLUME, lane)
+            else:
+                volumes[pair], areas[pair] = sphere_volume(radii[pair]), sphere_area(radii[pair])
+    if waiting_count > 0:
+        for lane in range(waiting_count, lane_groups(waiting_count) * WIDTH):
+            copy_lane(waiting, 0, waiting, lane, _INPUTS)
+        _work_out(waiting, lane_groups(waiting_count))
+        partial += waiting_count
+        unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
+    rows[total] = partial
+    return unsettled
+
+
+@inlined
+def _load(
+    centers: FloatArray, radii: FloatArray, vertices: FloatArray, first: int, count: int, block: FloatArray
+) -> None:
+    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(radii, first, count, 1, block, _RADIUS)
+    load_rows(vertices.reshape(-1), first, count, 12, block, _CORNERS)
+    for lane in range(count, lane_groups(count) * WIDTH):
+        copy_lane(block, 0, block, lane, _INPUTS)
+
+
+@inlined
+def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vector]:
+    return (
+        vector_column(block, _CORNERS, lane),
+        vector_column(block, _CORNERS + 3, lane),
+        vector_column(block, _CORNERS + 6, lane),
+        vector_column(block, _CORNERS + 9, lane),
+    )
+
+
+@building_block
+def _bound_by_corners(block: FloatArray, groups: int) -> int:
+    """Fill in what the corners and their bounding box tell; the sum of the weights."""
+    total = 0
+    for lane in range(groups * WIDTH):
+        first, second, third, fourth = _corners(block, lane)
+        center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
+        a, b = subtract(first, center), subtract(second, center)
+        c, d = subtract(third, center), subtract(fourth, center)
+        radius_2 = radius * radius
+        beyond_2 = (
+            _beyond_2(a[0], b[0], c[0], d[0]) + _beyond_2(a[1], b[1], c[1], d[1]) + _beyond_2(a[2], b[2], c[2], d[2])
+        )
+        farthest_2 = max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
+        away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
+        verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
+        verdict = NOTHING if away else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+    return total
+
+
+@building_block
+def _measure_within(block: FloatArray, groups: int) -> int:
+    """Fill in the volumes of the tetrahedra, for those within the sphere; the sum of the weights."""
+    total = 0
+    for lane in range(groups * WIDTH):
+        first, second, third, fourth = _corners(block, lane)
+        ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
+        volume_6 = dot(ab, cross(ac, ad))
+        longest_2 = max(dot(ab, ab), dot(ac, ac), dot(ad, ad))
+        # The volume of a flatter one would lose digits here.
+        flat = volume_6 * volume_6 <= 1e-14 * (longest_2 * longest_2 * longest_2)
+        verdict = column(block, _BOUNDS, lane)
+        verdict = PARTIAL if (verdict == WHOLE_SOLID) & flat else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+        block[np.uint64(_SOLID_VOLUME * LANES + lane)] = abs(volume_6) / 6.0
+    return total
+
+
+@building_block
+def _bound_by_planes(block: FloatArray, groups: int) -> None:
+    """Settle more of the pairs that the corners left undecided, by the planes of the faces."""
+    for lane in range(groups * WIDTH):
+        first, second, third, fourth = _corners(block, lane)
+        center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
+        a, b = subtract(first, center), subtract(second, center)
+        ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
+        size_2 = max(dot(a, a), dot(ab, ab), dot(ac, ac), dot(ad, ad))
+        enough_2, rounding = radius * radius * _SURE, _ROUNDING_2 * (size_2 * size_2 * size_2)
+        across_d = cross(ac, ab)
+        sense = 1.0 if dot(ad, across_d) < 0.0 else -1.0
+        below_a, above_a = _side(sense, b, cross(subtract(third, second), subtract(fourth, second)), enough_2, rounding)
+        below_b, above_b = _side(sense, a, cross(ad, ac), enough_2, rounding)
+        below_c, above_c = _side(sense, a, cross(ab, ad), enough_2, rounding)
+        below_d, above_d = _side(sense, a, across_d, enough_2, rounding)
+        verdict = column(block, _BOUNDS, lane)
+        partial = verdict == PARTIAL
+        verdict = WHOLE_SPHERE if partial & (below_a & below_b & below_c & below_d) else verdict
+        block[np.uint64(_BOUNDS * LANES + lane)] = (
+            NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
+        )
+
+
+@inlined
+def _beyond_2(a: float, b: float, c: float, d: float) -> float:
+    """The squared distance (m²) of 0 from the interval that a to d span."""
+    gap = max(min(a, b, c, d), -max(a, b, c, d), 0.0)
+    return gap * gap
+
+
+@inlined
+def _side(sense: float, corner: Vector, across: Vector, enough_2: float, rounding: float) -> tuple[bool, bool]:
+    """Whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane.
+
+    `rounding` (m⁶) is the square of what the product of the face's normal, twice its area long, may have rounded.
+    """
+    height = sense * dot(corner, across)
+    far = height * height >= enough_2 * dot(across, across) + rounding
+    return far & (height > 0.0), far & (height < 0.0)
+
+
+@building_block
+def _work_out(block: FloatArray, groups: int) -> None:
+    for lane in range(groups * WIDTH):
+        radius = column(block, _RADIUS, lane)
+        # Lengths near 1 keep products of many from overflowing; a power of two takes no digit.
+        size = power_of_two_below(radius)
+        shrink = 1.0 / size
+        first, second, third, fourth = _corners(block, lane)
+        corners = scale(shrink, first), scale(shrink, second), scale(shrink, third), scale(shrink, fourth)
+        center = scale(shrink, vector_column(block, _CENTER, lane))
+        overlap, unsettled = tetrahedron_lane(center, shrink * radius, corners)
+        store_result(block, _RESULT, lane, overlap, size, unsettled)

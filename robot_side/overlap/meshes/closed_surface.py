@@ -1,0 +1,172 @@
+"""What makes a list of triangles the surface of a solid: closed, oriented outward, its parts not in each other."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap.checks.arguments import numbers
+
+_FLAT = 1e-14
+"""A part whose volume is below this share of its size cubed counts as flat, and has no orientation."""
+_SAMPLES = 8
+_CERTAIN = 0.1
+
+
+def checked_vertices(vertices: npt.ArrayLike) -> FloatArray:
+    """`vertices` as finite float64 (v, 3), or ValueError."""
+    values = numbers("vertices", vertices, (3,)).values
+    if values.ndim != 2:
+        raise ValueError(f"vertices has the shape {values.shape}; valid: the shape (v, 3)")
+    return values
+
+
+def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
+    """`triangles` as int64 (t, 3) of indices below `vertex_count`, or ValueError."""
+    try:
+        raw = np.asarray(triangles)
+    except ValueError as error:
+        raise ValueError("triangles is no rectangular array; valid: the shape (t, 3)") from error
+    if raw.ndim != 2 or raw.shape[1] != 3 or len(raw) == 0:
+        raise ValueError(f"triangles has the shape {raw.shape}; valid: the shape (t, 3), t > 0")
+    if raw.dtype.kind not in "iu":
+        raise ValueError(f"triangles has the type {raw.dtype}; valid: integers, indices of vertices")
+    if vertex_count == 0:
+        raise ValueError("vertices is empty; valid: four vertices or more")
+    wrong = np.argwhere((raw < 0) | (raw >= vertex_count))
+    if len(wrong):
+        row = int(wrong[0, 0])
+        raise ValueError(f"triangles[{row}] = {raw[row].tolist()} is out of range; valid: 0 to {vertex_count - 1}")
+    return raw.astype(np.int64)
+
+
+def merged(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """(triangles (k, 3) with each set of equal vertices as one, the triangles' numbers (k,)).
+
+    Triangles that have a corner twice bound nothing and are left out.
+    """
+    # Adding 0 makes -0 equal to 0.
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    same = first[inverse.ravel()][triangles]
+    kept = (same[:, 0] != same[:, 1]) & (same[:, 1] != same[:, 2]) & (same[:, 2] != same[:, 0])
+    return np.asarray(same[kept], dtype=np.int64), np.flatnonzero(kept)
+
+
+def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
+    """ValueError naming the first edge that is not used as often in one direction as in the other."""
+    starts, ends = triangles, np.roll(triangles, -1, axis=1)
+    keys = _edge_keys(starts, ends)
+    _, place = np.unique(keys, return_inverse=True)
+    balance = np.bincount(place, weights=np.where(starts < ends, 1.0, -1.0).ravel())
+    open_edges = np.flatnonzero(balance[place] != 0.0)
+    if len(open_edges) == 0:
+        return
+    row, corner = divmod(int(open_edges[0]), 3)
+    start, end = int(starts[row, corner]), int(ends[row, corner])
+    forward = int(np.count_nonzero((starts == start) & (ends == end)))
+    backward = int(np.count_nonzero((starts == end) & (ends == start)))
+    raise ValueError(
+        f"triangles[{numbers_given[row]}]: its edge from vertex {start} to {end} is used {forward} times in this "
+        f"direction and {backward} times in the other; valid: a closed surface, as often in either"
+    )
+
+
+def components(triangles: IntArray) -> IntArray:
+    """(t,): the number of the part that each triangle belongs to; parts hang together through edges."""
+    keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
+    _, place = np.unique(keys, return_inverse=True)
+    count = len(triangles)
+    rows = np.repeat(np.arange(count), 3)
+    graph = coo_array((np.ones(3 * count), (rows, count + place)), shape=(count + place.max() + 1,) * 2)
+    labels = connected_components(graph, directed=False)[1][:count]
+    return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
+
+
+def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
+    """ValueError naming the first triangle that is there twice, the same way round: a solid laid over itself."""
+    first = triangles.argmin(axis=1)
+    rows = np.arange(len(triangles))
+    turned = np.column_stack([triangles[rows, (first + corner) % 3] for corner in range(3)])
+    _, place, count = np.unique(turned, axis=0, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    repeated = np.flatnonzero(count[place] > 1)
+    if len(repeated) == 0:
+        return
+    one, other = np.flatnonzero(place == place[repeated[0]])[:2]
+    raise ValueError(
+        f"triangles[{numbers_given[other]}] is triangles[{numbers_given[one]}] again, the same way round; "
+        "valid: each triangle once"
+    )
+
+
+def signed_volume(corners: FloatArray) -> float:
+    """The volume (m³) within closed triangles `corners` (t, 3, 3), negative if they are oriented inward."""
+    # In extended precision where the machine has it: the terms of a thin plate cancel.
+    a, b, c = np.moveaxis((corners - corners.reshape(-1, 3).mean(axis=0)).astype(np.longdouble), 1, 0)
+    return float(np.sum(a * np.cross(b, c)) / 6.0)
+
+
+def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArray) -> None:
+    """ValueError unless each part is oriented outward where the others leave space, and inward within another."""
+    order = np.argsort(parts, kind="stable")
+    ends = np.cumsum(np.bincount(parts))
+    members = np.split(order, ends[:-1])
+    if len(members) == 1:
+        boxes = np.empty((0, 2, 3))
+    else:
+        starts = ends - np.bincount(parts)
+        lowest = np.minimum.reduceat(corners.min(axis=1)[order], starts)
+        highest = np.maximum.reduceat(corners.max(axis=1)[order], starts)
+        boxes = np.stack([lowest, highest], axis=1)
+    for part, own in enumerate(members):
+        volume, size = signed_volume(corners[own]), float(np.ptp(corners[own].reshape(-1, 3), axis=0).max())
+        if abs(volume) <= _FLAT * size**3:
+            continue
+        first = int(numbers_given[own[0]])
+        around = _winding_around(corners, members, boxes, part)
+        if volume < 0.0 and around in (0, None):
+            raise ValueError(
+                f"triangles[{first}] and those connected with it enclose {volume:.3g} m³; valid: a volume above 0, "
+                "corners anticlockwise as seen from outside (clockwise only round a cavity)"
+            )
+        if volume > 0.0 and around not in (0, None):
+            raise ValueError(
+                f"triangles[{first}] and those connected with it lie within another part of the mesh; "
+                "valid: parts that do not overlap"
+            )
+
+
+def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: FloatArray, part: int) -> int | None:
+    """How often the other parts go round this one; None where this part touches them wherever it was tried."""
+    if len(members) == 1:
+        return 0
+    candidates = corners[members[part]].mean(axis=1)
+    points = candidates[np.linspace(0, len(candidates) - 1, _SAMPLES).astype(int)]
+    winding = np.zeros(len(points))
+    for row, point in enumerate(points):
+        # A part goes round nothing that lies outside of its box.
+        near = np.flatnonzero((boxes[:, 0] <= point).all(axis=1) & (point <= boxes[:, 1]).all(axis=1))
+        others = [members[other] for other in near.tolist() if other != part]
+        if others:
+            winding[row] = _winding(corners[np.concatenate(others)], point)
+    off = np.abs(winding - np.round(winding))
+    best = int(off.argmin())
+    return round(float(winding[best])) if off[best] < _CERTAIN else None
+
+
+def _winding(corners: FloatArray, point: FloatArray) -> float:
+    """The winding number about `point` of triangles (t, 3, 3), by van Oosterom's and Strackee's solid angles."""
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    length_a, length_b, length_c = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    cosine = length_a * length_b * length_c + np.sum(a * b, axis=1) * length_c
+    cosine += np.sum(b * c, axis=1) * length_a + np.sum(c * a, axis=1) * length_b
+    return float(np.sum(np.arctan2(np.sum(a * np.cross(b, c), axis=1), cosine)) / (2.0 * np.pi))
+
+
+def _edge_keys(starts: IntArray, ends: IntArray) -> IntArray:
+    """(3 t,): one number for each edge whatever its direction."""
+    count = int(starts.max()) + 1
+    return np.asarray((np.minimum(starts, ends) * count + np.maximum(starts, ends)).ravel(), dtype=np.int64)

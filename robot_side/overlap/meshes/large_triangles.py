@@ -1,0 +1,85 @@
+"""Lanes of triangles that are large beside the ball: the rounding errors of their far corners matter near the centre.
+
+Their edges' foot points and their heights are worked out again in double-double arithmetic.
+"""
+
+import math
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, cross, dot, norm, scale
+from robot_side.overlap.digits.double_double import divided
+from robot_side.overlap.digits.double_double_vectors import (
+    PreciseVector,
+    highs,
+    precise_cross,
+    precise_dot,
+    precise_scale,
+    precise_subtract,
+)
+from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.triangle_lanes import BASES, CORNER_DISTANCES, DISTANCES, HEIGHT, HEIGHTS, ROW, aside
+
+FAR = 3.0
+"""An edge with both ends more than this many radii away is worked out again."""
+_VANISHED = 1e-28
+"""A foot point this near to the centre, as a share of an end's distance, is a rounding error."""
+
+PreciseTriangle = tuple[PreciseVector, PreciseVector, PreciseVector]
+
+
+@inlined
+def corners_about(tables: MeshTables, triangle: int, center: PreciseVector) -> PreciseTriangle:
+    """A triangle's corners relative to the centre (m)."""
+    row = tables.triangles[triangle]
+    return (
+        precise_subtract(((row[0], 0.0), (row[1], 0.0), (row[2], 0.0)), center),
+        precise_subtract(((row[3], 0.0), (row[4], 0.0), (row[5], 0.0)), center),
+        precise_subtract(((row[6], 0.0), (row[7], 0.0), (row[8], 0.0)), center),
+    )
+
+
+@inlined
+def is_far(scratch: FloatArray, lane: int) -> bool:
+    """Whether a triangle has an edge that is far at both ends."""
+    far = 0
+    for corner in range(3):
+        far += 1 if scratch[CORNER_DISTANCES + corner * ROW + lane] > FAR else 0
+    return far > 1
+
+
+@building_block
+def refine_lane(
+    scratch: FloatArray, lane: int, tables: MeshTables, triangle: int, center: PreciseVector, radius: float
+) -> None:
+    """Work out `HEIGHTS` to `BASES` of a lane's far edges again, and `HEIGHT` if no edge is near."""
+    corners = corners_about(tables, triangle, center)
+    row = tables.triangles[triangle]
+    normal = row[9], row[10], row[11]
+    closest = math.inf
+    for edge in range(3):
+        start, end = corners[edge], corners[(edge + 1) % 3]
+        near = start if _rank(highs(start)) < _rank(highs(end)) else end
+        if dot(highs(near), highs(near)) > FAR * FAR * radius * radius:
+            along = precise_subtract(end, start)
+            factor = divided(precise_dot(along, near), precise_dot(along, along))
+            foot = highs(precise_subtract(near, precise_scale(factor, along)))
+            direction, least = scale(row[12 + edge], highs(along)), _VANISHED * norm(highs(near))
+            place = scale(1.0 / radius, foot) if norm(foot) > least else aside(direction)
+            scratch[HEIGHTS + edge * ROW + lane] = dot(normal, place)
+            scratch[DISTANCES + edge * ROW + lane] = dot(cross(direction, normal), place)
+            scratch[BASES + edge * ROW + lane] = norm(place)
+        if scratch[BASES + edge * ROW + lane] < closest:
+            closest = scratch[BASES + edge * ROW + lane]
+            scratch[HEIGHT + lane] = scratch[HEIGHTS + edge * ROW + lane]
+    if closest >= 1.0:
+        crossed = precise_cross(precise_subtract(corners[1], corners[0]), precise_subtract(corners[2], corners[0]))
+        size = norm(highs(crossed))
+        if size > 0.0:
+            scratch[HEIGHT + lane] = precise_dot(crossed, corners[0])[0] / (size * radius)
+
+
+@inlined
+def _rank(corner: Vector) -> float:
+    """Nearness, by which the end to start from is chosen: alike for the edge reversed, even if both are as near."""
+    return dot(corner, corner) * (1.0 + 1e-9 * math.tanh(corner[0] + 0.73 * corner[1] + 0.29 * corner[2]))

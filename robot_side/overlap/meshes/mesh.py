@@ -1,0 +1,116 @@
+"""Exact overlap of spheres with closed triangle meshes, convex or not (eq. 11 and 12)."""
+
+import functools
+from typing import Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap.checks.arguments import broadcast, lengths, numbers
+from robot_side.overlap.meshes.closed_surface import (
+    checked_triangles,
+    checked_vertices,
+    components,
+    merged,
+    require_all_different,
+    require_closed,
+    require_outward,
+    signed_volume,
+)
+from robot_side.overlap.meshes.mesh_kernels import overlap_loop
+from robot_side.overlap.meshes.mesh_tables import mesh_tables
+from robot_side.overlap.primitives.solid import Overlaps
+
+Array = npt.ArrayLike
+
+
+class Mesh:
+    """A solid bounded by triangles, prepared once for many queries; it does not change.
+
+    `vertices` (v, 3) in m, `triangles` (t, 3) indices of them, anticlockwise as seen from outside. Vertices at exactly
+    the same place count as one. Every edge must be used as often in one direction as in the other, no triangle be there
+    twice. Parts that hang
+    together through no edge may touch but not overlap each other; one that lies inside another is a cavity and must be
+    oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not found out: what they
+    share then counts wrongly.
+
+    ValueError for NaN, infinity, a magnitude above 1e50, wrong shapes, types or indices, an open or inward surface,
+    an overlapping part: the text names the argument and the first triangle or edge.
+    """
+
+    def __init__(self, vertices: Array, triangles: Array) -> None:
+        places = checked_vertices(vertices)
+        given = checked_triangles(triangles, len(places))
+        kept, numbers_given = merged(places, given)
+        if len(kept) == 0:
+            raise ValueError("triangles all have a corner twice; valid: a closed surface with a volume above 0")
+        require_closed(kept, numbers_given)
+        require_all_different(kept, numbers_given)
+        corners = places[kept]
+        require_outward(corners, components(kept), numbers_given)
+        self.volume_m3 = signed_volume(corners)
+        """The volume enclosed (m³)."""
+        if self.volume_m3 <= 0.0:
+            raise ValueError(f"triangles enclose {self.volume_m3:.3g} m³; valid: a volume above 0")
+        self.triangle_count = len(kept)
+        self.lowest_m: FloatArray = corners.reshape(-1, 3).min(axis=0)
+        """(3,): the least coordinates (m)."""
+        self.highest_m: FloatArray = corners.reshape(-1, 3).max(axis=0)
+        """(3,): the greatest coordinates (m)."""
+        self.tables = mesh_tables(corners, self.volume_m3)
+
+    @overload
+    def overlap(self, centers: Array, radii: Array, *, gradient: Literal[False] = False) -> FloatArray: ...
+    @overload
+    def overlap(self, centers: Array, radii: Array, *, gradient: Literal[True]) -> Overlaps: ...
+    def overlap(self, centers: Array, radii: Array, *, gradient: bool = False) -> FloatArray | Overlaps:
+        """Overlap with the spheres `centers` (..., 3), `radii` (...) in m; see `robot_side.overlap.volumes`."""
+        (volumes, gradients, areas), _ = self._query(centers, radii)
+        return (volumes, gradients, areas) if gradient else volumes
+
+    def counts(self, centers: Array, radii: Array) -> IntArray:
+        """(...): how many triangles a query of each sphere evaluates, which is what it costs."""
+        return self._query(centers, radii)[1]
+
+    def _query(self, centers: Array, radii: Array) -> tuple[Overlaps, IntArray]:
+        arguments = numbers("centers", centers, (3,)), lengths("radii", radii)
+        shape = broadcast(arguments)
+        rows = [argument.rows(shape) for argument in arguments]
+        count = len(rows[1])
+        volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
+        touched = np.empty(count, dtype=np.int64)
+        mesh_index, positions = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
+        rotations = np.ascontiguousarray(np.broadcast_to(np.eye(3), (count, 3, 3)))
+        overlap_loop(*rows, mesh_index, positions, rotations, *self.tables, volumes, gradients, areas, touched)
+        results = volumes.reshape(shape), gradients.reshape(*shape, 3), areas.reshape(shape)
+        return results, touched.reshape(shape)
+
+
+@overload
+def sphere_mesh(
+    centers: Array, radii: Array, vertices: Array, triangles: Array, *, gradient: Literal[False] = False
+) -> FloatArray: ...
+@overload
+def sphere_mesh(
+    centers: Array, radii: Array, vertices: Array, triangles: Array, *, gradient: Literal[True]
+) -> Overlaps: ...
+def sphere_mesh(
+    centers: Array, radii: Array, vertices: Array, triangles: Array, *, gradient: bool = False
+) -> FloatArray | Overlaps:
+    """Overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh; see `Mesh` and `volumes`.
+
+    The last few meshes are remembered, so that they are not prepared again; a `Mesh` of your own also saves the
+    comparison.
+    """
+    places = np.ascontiguousarray(checked_vertices(vertices))
+    indices = checked_triangles(triangles, len(places))
+    mesh = _remembered(places.tobytes(), indices.tobytes())
+    if gradient:
+        return mesh.overlap(centers, radii, gradient=True)
+    return mesh.overlap(centers, radii)
+
+
+@functools.lru_cache(maxsize=8)
+def _remembered(vertices: bytes, triangles: bytes) -> Mesh:
+    return Mesh(np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(triangles, dtype=np.int64).reshape(-1, 3))

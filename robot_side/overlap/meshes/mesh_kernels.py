@@ -1,0 +1,149 @@
+"""Overlaps and distances of (sphere, placed mesh) pairs in contiguous arrays: what a 1 kHz tick calls.
+
+Nothing is validated here, see `kernels`. A placed mesh is queried in its own frame, in which the sphere's centre is
+Qᵀ (centre - position), Q being the rotation from the mesh's frame to the world.
+"""
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import (
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_array,
+    output_indices,
+)
+from robot_side.compiled.vectors import Vector, dot, load, negative, norm, scale, subtract
+from robot_side.overlap.digits.double_double import DoubleDouble, multiple, plus, two_sum
+from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs
+from robot_side.overlap.meshes.mesh_overlap import mesh_overlap
+from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.tree_queries import is_clear_of, nearest_triangle, winding_number
+from robot_side.overlap.meshes.triangle_lanes import SCRATCH
+
+MESH_ARGUMENTS = (
+    *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
+)
+"""The Numba types of the fields of `MeshTables`."""
+
+_ON_SURFACE = 1e-12
+"""A point is on the surface within this share of the mesh's size: its side is then the nearest triangle's."""
+
+
+@inlined
+def _to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
+    """A centre in the mesh's frame; a float would be too coarse for a ball on the far end of a large mesh."""
+    away = (
+        two_sum(center[0], -positions[pair, 0]),
+        two_sum(center[1], -positions[pair, 1]),
+        two_sum(center[2], -positions[pair, 2]),
+    )
+    turned = rotations[pair].T
+    return (
+        _product(load(turned, 0), away),
+        _product(load(turned, 1), away),
+        _product(load(turned, 2), away),
+    )
+
+
+@inlined
+def _product(a: Vector, b: PreciseVector) -> DoubleDouble:
+    return plus(plus(multiple(a[0], b[0]), multiple(a[1], b[1])), multiple(a[2], b[2]))
+
+
+@inlined
+def _to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
+    rotation = rotations[pair]
+    return dot(load(rotation, 0), vector), dot(load(rotation, 1), vector), dot(load(rotation, 2), vector)
+
+
+@compiled(
+    *(input_array(2), input_array(1), input_indices(), input_array(2), input_array(3)),
+    *MESH_ARGUMENTS,
+    *(output_array(1), output_array(2), output_array(1), output_indices()),
+)
+def overlap_loop(
+    centers: FloatArray,
+    radii: FloatArray,
+    mesh_index: IntArray,
+    positions: FloatArray,
+    rotations: FloatArray,
+    triangles: FloatArray,
+    spheres: FloatArray,
+    boxes: FloatArray,
+    links: IntArray,
+    moments: FloatArray,
+    roots: IntArray,
+    mesh_volumes: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+    touched: IntArray,
+) -> None:
+    """Fill volumes, gradients (in the world's frame), areas, and how many triangles each pair evaluated."""
+    tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
+    near, scratch = np.empty(len(triangles) + 1, np.int64), np.empty(SCRATCH)
+    for pair in range(radii.size):
+        mesh, radius = mesh_index[pair], radii[pair]
+        away = subtract(load(centers, pair), load(positions, pair))
+        turned = rotations[pair].T
+        rounded = dot(load(turned, 0), away), dot(load(turned, 1), away), dot(load(turned, 2), away)
+        if is_clear_of(tables, mesh, rounded, radius):
+            volumes[pair], areas[pair], touched[pair] = 0.0, 0.0, 0
+            gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = 0.0, 0.0, 0.0
+            continue
+        center = _to_mesh(load(centers, pair), positions, rotations, pair)
+        overlap, count = mesh_overlap(center, radius, tables, mesh, near, scratch)
+        gradient = _to_world(rotations, pair, overlap[1])
+        volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
+        gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient
+
+
+@building_block
+def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, Vector]:
+    """(signed distance in m, negative inside; unit vector along which it falls fastest), in the mesh's frame."""
+    triangle, foot = nearest_triangle(tables, mesh, point)
+    distance = norm(foot)
+    normal = tables.triangles[triangle, 9], tables.triangles[triangle, 10], tables.triangles[triangle, 11]
+    root = tables.roots[mesh]
+    size = 0.0
+    for axis in range(3):
+        size = max(size, tables.boxes[root, 3 + axis] - tables.boxes[root, axis])
+    if distance <= _ON_SURFACE * size:
+        return (distance if dot(foot, normal) <= 0.0 else -distance), negative(normal)
+    outward = scale(1.0 / distance, foot)
+    if winding_number(tables, mesh, point) > 0:
+        return -distance, negative(outward)
+    return distance, outward
+
+
+@compiled(
+    *(input_array(2), input_indices(), input_array(2), input_array(3)),
+    *MESH_ARGUMENTS,
+    *(output_array(1), output_array(2)),
+)
+def nearest_loop(
+    centers: FloatArray,
+    mesh_index: IntArray,
+    positions: FloatArray,
+    rotations: FloatArray,
+    triangles: FloatArray,
+    spheres: FloatArray,
+    boxes: FloatArray,
+    links: IntArray,
+    moments: FloatArray,
+    roots: IntArray,
+    mesh_volumes: FloatArray,
+    distances: FloatArray,
+    directions: FloatArray,
+) -> None:
+    """Fill signed distances (m) and directions (in the world's frame)."""
+    tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
+    for pair in range(mesh_index.size):
+        point = _to_mesh(load(centers, pair), positions, rotations, pair)
+        distance, direction = _signed_distance(tables, mesh_index[pair], highs(point))
+        distances[pair] = distance
+        directions[pair, 0], directions[pair, 1], directions[pair, 2] = _to_world(rotations, pair, direction)

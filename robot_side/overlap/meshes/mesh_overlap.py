@@ -1,0 +1,186 @@
+"""One sphere and one closed mesh (eq. 11); `triangle_lanes` has the idea."""
+
+import math
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, add, dot, scale
+from robot_side.overlap.digits.double_double import ZERO, divided, plus
+from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
+from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
+from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.small_mesh_overlap import beyond_face
+from robot_side.overlap.meshes.tree_queries import gather_near, nearest_triangle, squared_distance, winding_number
+from robot_side.overlap.meshes.triangle_lanes import (
+    CORNERS,
+    IMAGINARY,
+    LANES,
+    MOMENT,
+    PUSH,
+    PUSH_Y,
+    PUSH_Z,
+    REAL,
+    ROW,
+    TURN,
+    Complex,
+    reduce_lanes,
+    times,
+    triangle_geometry,
+    triangle_terms,
+)
+from robot_side.overlap.primitives.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+
+_WHOLE = 4.0 * math.pi
+_UNDECIDED_AREA = 1e-11
+"""Solid angles (sr) this near to 0 or 4π may be either."""
+_UNDECIDED_VOLUME = 1e-8
+"""Volumes of the part inside (the ball's radius being 1) that tell nothing about which."""
+_SMALL_VOLUME = 1e-5
+"""A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
+_CLOSE = 0.02
+"""A centre farther than this from the surface (in radii) cannot be inside where the volume is small."""
+
+
+@building_block
+def mesh_overlap(
+    precise_center: PreciseVector,
+    radius: float,
+    tables: MeshTables,
+    mesh: int,
+    near: IntArray,
+    scratch: FloatArray,
+) -> tuple[Overlap, int]:
+    """(the overlap of the sphere with a mesh, how many triangles were evaluated for it).
+
+    The centre (m) is in the mesh's frame; `near` has room for one triangle more than the
+    mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
+    """
+    center = highs(precise_center)
+    least_2, most_2 = _box_distances_2(tables, mesh, center)
+    if least_2 >= radius * radius or radius == 0.0:
+        return nothing(), 0
+    if most_2 <= radius * radius * (1.0 - 1e-12):
+        return whole_solid(tables.volumes[mesh]), 0
+    count = gather_near(tables, mesh, center, radius, near)
+    if count == 0:
+        if winding_number(tables, mesh, center) > 0:
+            return whole_sphere(radius), 0
+        return nothing(), 0
+    product, turn, moment, push = _sum_triangles(precise_center, radius, tables, near, count, scratch)
+    covered = -2.0 * (math.atan2(product[1], product[0]) + turn)
+    covered -= _WHOLE * math.floor(covered / _WHOLE)
+    if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
+        covered -= _WHOLE if covered > 0.5 * _WHOLE else 0.0
+        part = (moment + covered) / 3.0
+        if part < -_UNDECIDED_VOLUME or (part < _UNDECIDED_VOLUME and _mostly_inside(tables, mesh, center, radius)):
+            covered += _WHOLE
+    volume = (moment + covered) / 3.0
+    if volume < _SMALL_VOLUME:
+        applies, small, small_covered, small_push = _small_overlap(precise_center, radius, tables, near, count)
+        if applies:
+            volume, covered, push = small, small_covered, small_push
+    # In radii up to here.
+    area = radius * radius
+    overlap = volume * area * radius, scale(-area, push), covered * area
+    return bounded(overlap, radius, tables.volumes[mesh]), count
+
+
+@inlined
+def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, float]:
+    """The squared distances (m²) from `point` to the nearest and the farthest point of a mesh's box."""
+    least, most = 0.0, 0.0
+    root = tables.roots[mesh]
+    for axis in range(3):
+        below, above = tables.boxes[root, axis] - point[axis], point[axis] - tables.boxes[root, 3 + axis]
+        gap, reach = max(below, above, 0.0), max(-below, -above)
+        least += gap * gap
+        most += reach * reach
+    return least, most
+
+
+@building_block
+def _sum_triangles(
+    precise_center: PreciseVector,
+    radius: float,
+    tables: MeshTables,
+    near: IntArray,
+    count: int,
+    scratch: FloatArray,
+) -> tuple[Complex, float, float, Vector]:
+    """The product of the numbers and the sums of `TURN`, `MOMENT` and `PUSH` over the triangles in `near`."""
+    product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
+    for first in range(0, count, LANES):
+        size = min(count - first, LANES)
+        _load_lanes(tables, near, first, size, scratch)
+        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
+        for lane in range(size):
+            triangle = near[first + lane]
+            if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
+                refine_lane(scratch, lane, tables, triangle, precise_center, radius)
+        triangle_terms(scratch, size)
+        reduce_lanes(scratch, size)
+        product = times(product, (scratch[REAL], scratch[IMAGINARY]))
+        rescale = 1.0 / (abs(product[0]) + abs(product[1]))
+        product = product[0] * rescale, product[1] * rescale
+        turn += scratch[TURN]
+        moment += scratch[MOMENT]
+        push = add(push, (scratch[PUSH], scratch[PUSH_Y], scratch[PUSH_Z]))
+    return product, turn, moment, push
+
+
+@building_block
+def _small_overlap(
+    center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int
+) -> tuple[bool, float, float, Vector]:
+    """(whether it applies, volume, covered solid angle, Σ A n) of the triangles in `near`, the radius being 1."""
+    volume, covered, push = ZERO, ZERO, (ZERO, ZERO, ZERO)
+    to_radii = divided((1.0, 0.0), (radius, 0.0))
+    for index in range(count):
+        triangle = near[index]
+        apart_2 = squared_distance(tables, triangle, highs(center)) / (radius * radius)
+        if apart_2 < _CLOSE * _CLOSE:
+            return False, 0.0, 0.0, (0.0, 0.0, 0.0)
+        if apart_2 < 1.000001:
+            corners = corners_about(tables, triangle, center)
+            scaled = (
+                precise_scale(to_radii, corners[0]),
+                precise_scale(to_radii, corners[1]),
+                precise_scale(to_radii, corners[2]),
+            )
+            part, angle, area = beyond_face(scaled)
+            volume, covered, push = plus(volume, part), plus(covered, angle), precise_add(push, area)
+    return True, volume[0], covered[0], highs(push)
+
+
+@inlined
+def _lows(vector: PreciseVector) -> Vector:
+    return vector[0][1], vector[1][1], vector[2][1]
+
+
+@inlined
+def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
+    for lane in range(size):
+        triangle = near[first + lane]
+        for field in range(15):
+            scratch[CORNERS + field * ROW + lane] = tables.triangles[triangle, field]
+
+
+@building_block
+def _mostly_inside(tables: MeshTables, mesh: int, center: Vector, radius: float) -> bool:
+    """Whether the ball lies inside the mesh, which is known of all but a tiny part of it to be so or not to be so.
+
+    The centre itself may be in that part, in a needle or a narrow slit: of some points the one farthest from the
+    surface decides.
+    """
+    best, best_2 = center, -1.0
+    for number in range(8):
+        turn, level = 2.4 * number, (number - 3.5) / 4.5
+        flat = math.sqrt(1.0 - level * level)
+        point = add(center, scale(0.6 * radius, (flat * math.cos(turn), flat * math.sin(turn), level)))
+        foot = nearest_triangle(tables, mesh, point)[1]
+        distance_2 = dot(foot, foot)
+        if distance_2 > best_2:
+            best, best_2 = point, distance_2
+        if best_2 > 0.01 * radius * radius:
+            break
+    return winding_number(tables, mesh, best) > 0

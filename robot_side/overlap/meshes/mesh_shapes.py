@@ -1,0 +1,127 @@
+"""Closed meshes around round solids, never smaller than these, with a bound on the volume they add; convex hulls.
+
+Each function returns (vertices (v, 3) in m, triangles (t, 3), excess): the solid lies within the mesh, whose volume is
+greater by at most the share `excess` of the solid's. Rounding may move a vertex by its last digit.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap.checks.arguments import lengths, numbers
+
+ShapeMesh = tuple[FloatArray, IntArray, float]
+"""(vertices (v, 3), triangles (t, 3), greatest share of the solid's volume by which the mesh's is greater)."""
+
+_LEAST_SEGMENTS = 3
+
+
+def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> ShapeMesh:
+    """A prism of `segments` sides, each touching the cylinder about the z axis, |z| <= half_length; m.
+
+    The excess is that of a circumscribed polygon: (n / π) tan(π / n) - 1. ValueError for sizes not above 0 and fewer
+    than 3 segments.
+    """
+    _require_sizes(radius=radius, half_length=half_length)
+    _require_segments(segments)
+    turns = 2.0 * np.pi * np.arange(segments) / segments
+    reach = radius / np.cos(np.pi / segments)
+    ring = np.column_stack([reach * np.cos(turns), reach * np.sin(turns)])
+    ends = [np.column_stack([ring, np.full(segments, z)]) for z in (-half_length, half_length)]
+    excess = segments / np.pi * np.tan(np.pi / segments) - 1.0
+    vertices = np.concatenate(ends)
+    return vertices, _outward_hull(vertices), float(excess)
+
+
+def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh:
+    """A polyhedron about the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
+
+    The sphere's octahedron with `subdivisions` triangles along each edge, enlarged until no face cuts the sphere, and
+    stretched. Its volume is known, so that the excess is the very one. ValueError for sizes not above 0 and fewer
+    than 1 subdivision.
+    """
+    axes = lengths("semi_axes", semi_axes).values
+    if axes.shape != (3,) or not np.all(axes > 0.0):
+        raise ValueError(f"semi_axes = {axes.tolist()} is out of range; valid: three lengths above 0 m")
+    vertices, triangles, excess = _round(subdivisions, 0.0)
+    return vertices * axes, triangles, excess
+
+
+def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> ShapeMesh:
+    """A polyhedron about the capsule of points within `radius` of the segment |z| <= half_length on the z axis; m.
+
+    The halves of an `ellipsoid_mesh` of equal axes, moved apart. ValueError as for that.
+    """
+    _require_sizes(radius=radius, half_length=half_length)
+    vertices, triangles, excess = _round(subdivisions, half_length / radius)
+    return vertices * radius, triangles, excess
+
+
+def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
+    """The convex hull of `points` (n, 3) in m, with only those vertices that it needs; the excess is 0.
+
+    ValueError for points all in one plane.
+    """
+    places = numbers("points", points, (3,)).values.reshape(-1, 3)
+    try:
+        hull = ConvexHull(places)
+    except (QhullError, ValueError) as error:
+        raise ValueError(
+            f"points ({len(places)}, 3) have no convex hull; valid: 4 or more, not in one plane"
+        ) from error
+    vertices = places[hull.vertices]
+    return vertices, _outward_hull(vertices), 0.0
+
+
+def _outward_hull(vertices: FloatArray) -> IntArray:
+    """The triangles (t, 3) of the convex hull, anticlockwise as seen from outside."""
+    hull = ConvexHull(vertices)
+    corners = vertices[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.sum(normals * hull.equations[:, :3], axis=1) < 0.0
+    triangles = np.array(hull.simplices, dtype=np.int64)
+    triangles[inward] = triangles[inward][:, ::-1]
+    return triangles
+
+
+def _round(subdivisions: int, half_length: float) -> ShapeMesh:
+    """About the unit sphere, its halves moved apart by ±half_length along z; the ring between them is a prism."""
+    if subdivisions < 1:
+        raise ValueError(f"subdivisions = {subdivisions} is out of range; valid: 1 or more")
+    steps = range(-subdivisions, subdivisions + 1)
+    lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == subdivisions]
+    directions = np.array(lattice, dtype=np.float64)
+    level = np.flatnonzero(directions[:, 2] == 0.0)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    triangles = _outward_hull(directions)
+    nearest = _face_distances(directions, triangles).min()
+    vertices = directions / nearest
+    if half_length > 0.0:
+        vertices[:, 2] += np.copysign(half_length, vertices[:, 2]) * (vertices[:, 2] != 0.0)
+        shift = np.array([0.0, 0.0, half_length])
+        waist = vertices[level]
+        vertices = np.concatenate([np.delete(vertices, level, axis=0), waist + shift, waist - shift])
+        triangles = _outward_hull(vertices)
+    solid = np.pi * (4.0 / 3.0 + 2.0 * half_length)
+    corners = vertices[triangles]
+    volume = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    return vertices, triangles, float(volume / solid - 1.0)
+
+
+def _face_distances(vertices: FloatArray, triangles: IntArray) -> FloatArray:
+    """(t,): the distances of the triangles' planes from the origin."""
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    normals = np.cross(b - a, c - a)
+    return np.asarray(np.abs(np.sum(a * normals, axis=1)) / np.linalg.norm(normals, axis=1))
+
+
+def _require_sizes(**sizes: float) -> None:
+    for name, value in sizes.items():
+        if not (lengths(name, value).values > 0.0).all():
+            raise ValueError(f"{name} = {value} is out of range; valid: above 0 m")
+
+
+def _require_segments(segments: int) -> None:
+    if segments < _LEAST_SEGMENTS:
+        raise ValueError(f"segments = {segments} is out of range; valid: {_LEAST_SEGMENTS} or more")

@@ -1,0 +1,165 @@
+"""Walks over a mesh's tree: the triangles that a ball may reach, the nearest one, the winding number."""
+
+import math
+
+from common.arrays import IntArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
+from robot_side.overlap.meshes.mesh_tables import MeshTables
+
+_CERTAIN = 0.2
+"""A winding number this near to a whole number is taken for it."""
+
+
+@inlined
+def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
+    """The squared distance (m²) from `point` to the box of a node."""
+    total = 0.0
+    for axis in range(3):
+        low, high = tables.boxes[node, axis], tables.boxes[node, 3 + axis]
+        gap = max(low - point[axis], point[axis] - high, 0.0)
+        total += gap * gap
+    return total
+
+
+@inlined
+def is_clear_of(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
+    """Whether a ball lies outside a mesh's box, whatever `point` has lost in rounding."""
+    apart_2 = _box_distance_2(tables, tables.roots[mesh], point)
+    return apart_2 > 1.000001 * radius * radius + 1e-24 * dot(point, point)
+
+
+@building_block
+def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, near: IntArray) -> int:
+    """Write the triangles that the ball (`point`, `radius`) may reach into `near`; how many.
+
+    All that it reaches are among them. `near` has room for every triangle of the mesh and one more.
+    """
+    count = 0
+    node, end = tables.roots[mesh], tables.roots[mesh + 1]
+    while node < end:
+        if _box_distance_2(tables, node, point) > radius * radius:
+            node = tables.links[3 * node]
+            continue
+        first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(first, first + size):
+            gap_x = tables.spheres[triangle, 0] - point[0]
+            gap_y = tables.spheres[triangle, 1] - point[1]
+            gap_z = tables.spheres[triangle, 2] - point[2]
+            reach = tables.spheres[triangle, 3] + radius
+            # Written in any case, kept by counting on: no branch to guess.
+            near[count] = triangle
+            count += 1 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z <= reach * reach else 0
+        node += 1
+    return count
+
+
+@inlined
+def _corner(tables: MeshTables, triangle: int, number: int) -> Vector:
+    return (
+        tables.triangles[triangle, 3 * number],
+        tables.triangles[triangle, 3 * number + 1],
+        tables.triangles[triangle, 3 * number + 2],
+    )
+
+
+@building_block
+def _to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
+    """The vector (m) from `point` to the nearest point of a triangle."""
+    normal = _corner(tables, triangle, 3)
+    best, best_2 = (0.0, 0.0, 0.0), math.inf
+    inside = True
+    for number in range(3):
+        start = subtract(_corner(tables, triangle, number), point)
+        end = subtract(_corner(tables, triangle, (number + 1) % 3), point)
+        edge = subtract(end, start)
+        along = min(max(-dot(start, edge) * tables.triangles[triangle, 12 + number] ** 2, 0.0), 1.0)
+        foot = add(start, scale(along, edge)) if along < 0.5 else subtract(end, scale(1.0 - along, edge))
+        distance_2 = dot(foot, foot)
+        if distance_2 < best_2:
+            best, best_2 = foot, distance_2
+        inside = inside and dot(start, cross(edge, normal)) >= 0.0
+    if inside:
+        # The corner nearest to the foot rounds least; any does near the triangle.
+        return scale(dot(best, normal), normal)
+    return best
+
+
+@building_block
+def squared_distance(tables: MeshTables, triangle: int, point: Vector) -> float:
+    """The squared distance (m²) from `point` to a triangle."""
+    foot = _to_triangle(tables, triangle, point)
+    return dot(foot, foot)
+
+
+@building_block
+def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int, Vector]:
+    """(the triangle nearest to `point`, the vector in m from there to its nearest point)."""
+    first, end = tables.roots[mesh], tables.roots[mesh + 1]
+    # Going down to the nearer child gives a good bound to begin with.
+    node = first
+    while tables.links[3 * node + 2] == 0:
+        second = tables.links[3 * (node + 1)]
+        nearer = _box_distance_2(tables, node + 1, point) <= _box_distance_2(tables, second, point)
+        node = node + 1 if nearer else second
+    best = tables.links[3 * node + 1]
+    foot = _to_triangle(tables, best, point)
+    bound = dot(foot, foot)
+    node = first
+    while node < end:
+        if _box_distance_2(tables, node, point) > bound:
+            node = tables.links[3 * node]
+            continue
+        start, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(start, start + size):
+            gap = subtract(load(tables.spheres, triangle), point)
+            reach = tables.spheres[triangle, 3] + math.sqrt(bound)
+            if dot(gap, gap) <= reach * reach:
+                other = _to_triangle(tables, triangle, point)
+                if dot(other, other) < bound:
+                    best, foot, bound = triangle, other, dot(other, other)
+        node += 1
+    return best, foot
+
+
+@inlined
+def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
+    """The signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
+    a = subtract(_corner(tables, triangle, 0), point)
+    b = subtract(_corner(tables, triangle, 1), point)
+    c = subtract(_corner(tables, triangle, 2), point)
+    length_a, length_b, length_c = norm(a), norm(b), norm(c)
+    cosine = length_a * length_b * length_c
+    cosine += dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
+    sine = dot(a, cross(b, c))
+    return 2.0 * math.atan2(sine, cosine) if sine != 0.0 else 0.0
+
+
+@building_block
+def winding_number(tables: MeshTables, mesh: int, point: Vector) -> int:
+    """How often the mesh's surface goes round `point`, which lies off it: 1 inside, 0 outside.
+
+    Triangles far from the point count as dipoles (Barill and others, Fast Winding Numbers, 2018). The sum is a whole
+    number in truth; one that is not near enough to any is formed anew with fewer dipoles, at last with none.
+    """
+    total = 0.0
+    for share in (2.0, 4.0, math.inf):
+        total = 0.0
+        node, end = tables.roots[mesh], tables.roots[mesh + 1]
+        while node < end:
+            away = subtract(load(tables.moments, node), point)
+            distance_2 = dot(away, away)
+            limit = share * tables.moments[node, 6]
+            if distance_2 > limit * limit:
+                area = tables.moments[node, 3], tables.moments[node, 4], tables.moments[node, 5]
+                total += dot(area, away) / (distance_2 * math.sqrt(distance_2))
+                node = tables.links[3 * node]
+                continue
+            first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+            for triangle in range(first, first + size):
+                total += _solid_angle(tables, triangle, point)
+            node += 1
+        total /= 4.0 * math.pi
+        if abs(total - math.floor(total + 0.5)) < _CERTAIN:
+            break
+    return math.floor(total + 0.5)

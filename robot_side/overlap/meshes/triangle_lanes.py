@@ -1,0 +1,265 @@
+"""Many triangles against one ball at once: branch-free loops over lanes, which LLVM turns into vector code.
+
+Put the sphere's centre at the origin and its radius at 1. A face at the signed distance h along its outward
+normal hides, as seen from the centre, a part of the sphere by the piece of it that lies inside the ball; call
+the solid angle of that piece Ω, with the sign of h. Far faces need not be visited: the solid angles of a closed
+surface sum to 4π w, w its winding number about the centre, so that the part of the sphere's surface inside
+the solid is
+
+    S = 4π w - Σ Ω        (sum over the faces that reach the ball)
+
+and, the volume being (Σ h A + S) / 3, only S modulo 4π is wanted: it lies between 0 and 4π.
+
+Ω is summed from the face's edges. With p the foot point of the centre on an edge's line, h = n·p, d the signed
+distance of p from the face's own foot point, b = |p|, t the place of an edge's end along the edge, clipped to the
+ball, and c its distance, the triangle (face's foot, edge's foot, end) is seen under the solid angle
+2 atan(d t / ((b + h)(b + c))); what of the face's disc lies beyond the edges' ends adds (1 - |h|) φ, φ being its
+angle. The half angles multiply as complex numbers over all edges of all faces and take no arctangent.
+
+Two faces that share an edge use the same p to the last bit. An edge or corner that passes through the centre, where
+each face's angle is undetermined, is therefore moved by a rounding error for both alike, and the sum modulo 4π, which
+does not depend on where an edge runs inside the ball, stays right.
+"""
+
+import math
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.digits.arctangent import arctangent
+
+LANES = 64
+"""Triangles handled at once."""
+ROW = LANES + 8
+"""The distance between two rows of the scratch array: rows 4096 bytes apart would get in each other's way."""
+
+# The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
+# rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
+CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * ROW, 6 * ROW, 9 * ROW, 12 * ROW
+HEIGHTS, DISTANCES, BASES = 15 * ROW, 18 * ROW, 21 * ROW
+STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * ROW, 27 * ROW, 30 * ROW, 33 * ROW
+REAL, IMAGINARY, TURN, MOMENT = 34 * ROW, 35 * ROW, 36 * ROW, 37 * ROW
+PUSH, PUSH_Y, PUSH_Z = 38 * ROW, 39 * ROW, 40 * ROW
+SCRATCH = 41 * ROW
+"""The length of the scratch array."""
+
+ASIDE = 0.62e-30, -0.51e-30, 0.47e-30
+"""By how much all triangles are moved out of positions in which a corner, edge or face passes through the centre."""
+_ROUNDING = 4e-16
+"""A foot point this near to the centre, as a share of the end's distance that it comes from, is a rounding error."""
+_FAR = 1e18
+
+
+@inlined
+def _load3(scratch: FloatArray, row: int, lane: int) -> Vector:
+    return scratch[row + lane], scratch[row + ROW + lane], scratch[row + 2 * ROW + lane]
+
+
+@inlined
+def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
+    scratch[row + lane] = values[0]
+    scratch[row + ROW + lane] = values[1]
+    scratch[row + 2 * ROW + lane] = values[2]
+
+
+@inlined
+def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: float) -> Vector:
+    """`corner` from the centre, in radii, moved by what only coordinates of 0 take notice of."""
+    x, y, z = scale(scaling, subtract(subtract(corner, center), center_rest))
+    return x + ASIDE[0], y + ASIDE[1], z + ASIDE[2]
+
+
+@inlined
+def aside(along: Vector) -> Vector:
+    """The foot point on an edge through the centre, moved like everything else: across `along`, its unit vector."""
+    return subtract(ASIDE, scale(dot(ASIDE, along), along))
+
+
+@inlined
+def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along: Vector) -> Vector:
+    """The foot point on an edge's line, worked out from the end of lower rank: alike for the edge reversed."""
+    from_start = start_rank < end_rank
+    near = (
+        start[0] if from_start else end[0],
+        start[1] if from_start else end[1],
+        start[2] if from_start else end[2],
+    )
+    raw = subtract(near, scale(dot(near, along), along))
+    # Where the edge passes close to the centre its rounding error lies along the edge as likely as across it.
+    x, y, z = subtract(raw, scale(dot(raw, along), along))
+    vanished = max(abs(x), abs(y), abs(z)) <= _ROUNDING * max(abs(near[0]), abs(near[1]), abs(near[2]))
+    instead = aside(along)
+    return instead[0] if vanished else x, instead[1] if vanished else y, instead[2] if vanished else z
+
+
+@building_block
+def triangle_geometry(scratch: FloatArray, count: int, center: Vector, center_rest: Vector, radius: float) -> None:
+    """Fill `HEIGHTS` to `HEIGHT` from the corners, normals and inverse edge lengths of `count` lanes.
+
+    The centre is `center` + `center_rest` (m), the corners are made relative to it, in radii.
+    """
+    scaling = 1.0 / radius
+    for lane in range(count):
+        raw_a = _load3(scratch, CORNERS, lane)
+        raw_b = _load3(scratch, SECOND_CORNERS, lane)
+        raw_c = _load3(scratch, THIRD_CORNERS, lane)
+        normal = _load3(scratch, NORMAL, lane)
+        inverse = _load3(scratch, INVERSE_LENGTHS, lane)
+        along_ab = scale(inverse[0], subtract(raw_b, raw_a))
+        along_bc = scale(inverse[1], subtract(raw_c, raw_b))
+        along_ca = scale(inverse[2], subtract(raw_a, raw_c))
+        a = _relative(raw_a, center, center_rest, scaling)
+        b = _relative(raw_b, center, center_rest, scaling)
+        c = _relative(raw_c, center, center_rest, scaling)
+        a_2, b_2, c_2 = dot(a, a), dot(b, b), dot(c, c)
+        # The nearer end comes first; the small second part decides between ends that are equally near.
+        rank_a = a_2 + 1e-9 * (a[0] + 0.73 * a[1] + 0.29 * a[2])
+        rank_b = b_2 + 1e-9 * (b[0] + 0.73 * b[1] + 0.29 * b[2])
+        rank_c = c_2 + 1e-9 * (c[0] + 0.73 * c[1] + 0.29 * c[2])
+        foot_ab = _foot(a, b, rank_a, rank_b, along_ab)
+        foot_bc = _foot(b, c, rank_b, rank_c, along_bc)
+        foot_ca = _foot(c, a, rank_c, rank_a, along_ca)
+        bases = math.sqrt(dot(foot_ab, foot_ab)), math.sqrt(dot(foot_bc, foot_bc)), math.sqrt(dot(foot_ca, foot_ca))
+        heights = dot(normal, foot_ab), dot(normal, foot_bc), dot(normal, foot_ca)
+        nearest_base, height = bases[0], heights[0]
+        nearer = bases[1] < nearest_base
+        nearest_base, height = (bases[1] if nearer else nearest_base), (heights[1] if nearer else height)
+        height = heights[2] if bases[2] < nearest_base else height
+        _store3(scratch, HEIGHTS, lane, heights)
+        distances = (
+            dot(cross(along_ab, normal), foot_ab),
+            dot(cross(along_bc, normal), foot_bc),
+            dot(cross(along_ca, normal), foot_ca),
+        )
+        _store3(scratch, DISTANCES, lane, distances)
+        _store3(scratch, BASES, lane, bases)
+        _store3(scratch, STARTS, lane, (dot(a, along_ab), dot(b, along_bc), dot(c, along_ca)))
+        _store3(scratch, ENDS, lane, (dot(b, along_ab), dot(c, along_bc), dot(a, along_ca)))
+        _store3(scratch, CORNER_DISTANCES, lane, (math.sqrt(a_2), math.sqrt(b_2), math.sqrt(c_2)))
+        scratch[HEIGHT + lane] = height
+
+
+Complex = tuple[float, float]
+
+
+@inlined
+def times(a: Complex, b: Complex) -> Complex:
+    """The product of two complex numbers."""
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
+@inlined
+def _times_conjugate(a: Complex, b: Complex) -> Complex:
+    return a[0] * b[0] + a[1] * b[1], a[1] * b[0] - a[0] * b[1]
+
+
+@inlined
+def _end(
+    along: float, away: float, distance: float, base: float, height: float, half_chord: float, shrink: float
+) -> tuple[Complex, Complex, float]:
+    """(turn within the face beyond the ball, half the solid angle up to the ball, clipped `along`) of an edge's end."""
+    clipped = min(max(along, -half_chord), half_chord)
+    near_away = min(away, max(1.0, base))
+    shrunk, reach = distance * shrink, min(max(along * shrink, -_FAR), _FAR)
+    cosine = shrunk * shrunk + reach * clipped
+    # An end at the face's foot point turns nothing.
+    turn = (cosine if cosine > 0.0 else 1.0), shrunk * (reach - clipped)
+    missed = base >= 1.0
+    half = (1.0 if missed else (base + height) * (base + near_away)), (0.0 if missed else distance * clipped)
+    return turn, half, clipped
+
+
+@inlined
+def _edge(
+    start: float, end: float, away_start: float, away_end: float, distance: float, base: float, height: float
+) -> tuple[Complex, Complex, float]:
+    """(turn, half solid angle, twice the straight-bounded area) of an edge."""
+    shrink = 1.0 / max(base, 1.0)
+    half_chord = math.sqrt(max((1.0 - base) * (1.0 + base), 0.0))
+    turn_start, half_start, clipped_start = _end(start, away_start, distance, base, height, half_chord, shrink)
+    turn_end, half_end, clipped_end = _end(end, away_end, distance, base, height, half_chord, shrink)
+    return (
+        _times_conjugate(turn_end, turn_start),
+        _times_conjugate(half_end, half_start),
+        distance * (clipped_end - clipped_start),
+    )
+
+
+@inlined
+def _wraps(a: Complex, b: Complex, product: Complex) -> float:
+    """How many whole turns arg a + arg b exceeds arg ab by."""
+    upper = a[1] >= 0.0 and b[1] >= 0.0 and product[1] < 0.0
+    lower = a[1] < 0.0 and b[1] < 0.0 and (product[1] > 0.0 or (product[1] == 0.0 and product[0] < 0.0))
+    return (1.0 if upper else 0.0) - (1.0 if lower else 0.0)
+
+
+@building_block
+def triangle_terms(scratch: FloatArray, count: int) -> None:
+    """Fill `REAL` to `PUSH` of `count` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
+
+    REAL + i IMAGINARY has half of the straight-bounded part of Ω for its argument, TURN is half of the rest of Ω;
+    MOMENT is h A, PUSH A n.
+    """
+    for lane in range(count):
+        normal = _load3(scratch, NORMAL, lane)
+        heights = _load3(scratch, HEIGHTS, lane)
+        distances = _load3(scratch, DISTANCES, lane)
+        bases = _load3(scratch, BASES, lane)
+        starts = _load3(scratch, STARTS, lane)
+        ends = _load3(scratch, ENDS, lane)
+        aways = _load3(scratch, CORNER_DISTANCES, lane)
+        height = scratch[HEIGHT + lane]
+        sign = -1.0 if height < 0.0 else 1.0
+        h_0, h_1, h_2 = max(sign * heights[0], 0.0), max(sign * heights[1], 0.0), max(sign * heights[2], 0.0)
+        turn_0, half_0, twice_0 = _edge(starts[0], ends[0], aways[0], aways[1], distances[0], bases[0], h_0)
+        turn_1, half_1, twice_1 = _edge(starts[1], ends[1], aways[1], aways[2], distances[1], bases[1], h_1)
+        turn_2, half_2, twice_2 = _edge(starts[2], ends[2], aways[2], aways[0], distances[2], bases[2], h_2)
+        turn_01 = times(turn_0, turn_1)
+        turn = times(turn_01, turn_2)
+        whole = _wraps(turn_0, turn_1, turn_01) + _wraps(turn_01, turn_2, turn)
+        angle = arctangent(turn[1], turn[0]) + 2.0 * math.pi * whole
+        gap = max(1.0 - abs(height), 0.0)
+        area = 0.5 * (twice_0 + twice_1 + twice_2) + 0.5 * gap * (1.0 + abs(height)) * angle
+        half = times(times(half_0, half_1), half_2)
+        size = 1.0 / (abs(half[0]) + abs(half[1]))
+        scratch[REAL + lane] = half[0] * size
+        scratch[IMAGINARY + lane] = sign * half[1] * size
+        scratch[TURN + lane] = 0.5 * sign * gap * angle
+        scratch[MOMENT + lane] = height * area
+        _store3(scratch, PUSH, lane, scale(area, normal))
+
+
+@inlined
+def _fold(scratch: FloatArray, lane: int, other: int) -> None:
+    """Take lane `other` into `lane`."""
+    real, imaginary = scratch[REAL + lane], scratch[IMAGINARY + lane]
+    other_real, other_imaginary = scratch[REAL + other], scratch[IMAGINARY + other]
+    scratch[REAL + lane] = real * other_real - imaginary * other_imaginary
+    scratch[IMAGINARY + lane] = real * other_imaginary + imaginary * other_real
+    scratch[TURN + lane] += scratch[TURN + other]
+    scratch[MOMENT + lane] += scratch[MOMENT + other]
+    scratch[PUSH + lane] += scratch[PUSH + other]
+    scratch[PUSH_Y + lane] += scratch[PUSH_Y + other]
+    scratch[PUSH_Z + lane] += scratch[PUSH_Z + other]
+
+
+@building_block
+def reduce_lanes(scratch: FloatArray, count: int) -> None:
+    """Gather the product of the complex numbers and the sums of the rest in lane 0."""
+    # Constant counts make vector code without remainders; the lanes that this needs are filled with what adds nothing.
+    filled = 64 if count > 32 else 32 if count > 16 else 16 if count > 8 else 8
+    for lane in range(count, filled):
+        scratch[REAL + lane] = 1.0
+        for row in range(1, 7):
+            scratch[REAL + row * ROW + lane] = 0.0
+    if count > 32:
+        for lane in range(32):
+            _fold(scratch, lane, lane + 32)
+    if count > 16:
+        for lane in range(16):
+            _fold(scratch, lane, lane + 16)
+    if count > 8:
+        for lane in range(8):
+            _fold(scratch, lane, lane + 8)
+    for lane in range(1, min(count, 8)):
+        _fold(scratch, 0, lane)

@@ -1,0 +1,1 @@
+"""One pair of a box or tetrahedron, as exactly as it takes."""

@@ -1,0 +1,197 @@
+"""The overlap of a sphere with a tetrahedron or a box, to the accuracy of the input at every size of the overlap.
+
+Caps, and lone edges and corners that hardly reach the ball, have forms of their own, in which nothing cancels. All
+else is the sum over faces in double-double. That leaves about 1e-31 of the sphere's volume, more if the solid is much
+larger than the sphere; what comes out smaller than that is replaced by the form of the feature reached deepest.
+"""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import scale
+from robot_side.overlap.digits.double_double import rounded, times
+from robot_side.overlap.digits.double_double_vectors import (
+    PreciseVector,
+    highs,
+    load_number,
+    load_vector,
+    precise_cross,
+    precise_negative,
+)
+from robot_side.overlap.precise.face_sum import sum_over_faces
+from robot_side.overlap.precise.features import (
+    CORNER_EDGES,
+    CORNERS,
+    DIRECTIONS,
+    EDGE_ENDS,
+    EDGE_FACES,
+    EDGES,
+    ENDS,
+    FACES,
+    FEET,
+    HALF_CHORDS,
+    HEIGHTS,
+    LENGTHS,
+    NORMALS,
+    POINTS,
+    POWERS,
+    SIDES,
+    STARTS,
+    depth_and_rest,
+    distance_in_face,
+    measure_all,
+    measure_corner,
+    measure_direction,
+    measure_edge,
+    measure_face,
+)
+from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, corner_overlap, edge_overlap
+from robot_side.overlap.precise.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
+from robot_side.overlap.primitives.half_space import cap
+from robot_side.overlap.primitives.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+
+NOISE = 1e-29
+"""What rounding may leave of a sum over faces, in R³, or in R² times the size of the solid if that is larger."""
+
+
+@building_block
+def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, solid_volume: float) -> Overlap:
+    """The overlap of the ball about the origin with the solid whose corners are in `features`; 1 <= `radius` < 2.
+
+    `solid` is its kind and `solid_volume` its volume, which is 0 for nothing else than a solid without volume.
+    """
+    if solid_volume == 0.0 or radius == 0.0:
+        return nothing()
+    reached, number = screened(features, solid, radius)
+    if reached != ANYTHING:
+        _measure_lone(features, solid, radius, reached, number)
+        alone, sharpness = _local_form(features, solid, radius, reached, number)
+        if sharpness < (SHARP_CORNER if reached == CORNER else SHARP_EDGE):
+            return bounded(alone, radius, solid_volume)
+    measure_all(features, solid, radius)
+    farthest, inside = 0.0, 0
+    for corner in range(CORNERS[solid]):
+        farthest = max(farthest, features[LENGTHS + corner, 0, 0])
+        inside += 1 if features[POWERS + corner, 0, 0] >= 0.0 else 0
+    if inside == CORNERS[solid]:
+        return whole_solid(solid_volume)
+    summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
+    noise = NOISE * radius * radius * max(radius, farthest)
+    if summed[0] > noise:
+        return summed
+    most = min(noise, solid_volume)
+    reached, number = _deepest(features, solid)
+    local, _ = _local_form(features, solid, radius, reached, number)
+    # A corner or edge within the ball has some volume there, if too thin for its faces to be told apart.
+    thin = most if reached in (CORNER, EDGE) else 0.0
+    return _below_noise(local, summed, most, thin, radius)
+
+
+@inlined
+def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radius: float) -> Overlap:
+    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not.
+
+    The volume is at most `most`, and `thin` where the form has none.
+    """
+    volume, gradient, area = local
+    volume = thin if volume == 0.0 else volume
+    if volume == 0.0:
+        return nothing()
+    most_area = NOISE * radius * radius
+    if summed[2] > most_area:
+        return min(volume, most), summed[1], summed[2]
+    share = most_area / area if area > most_area else 1.0
+    return min(volume, most), scale(share, gradient), share * area
+
+
+@building_block
+def _local_form(
+    features: FloatArray, solid: np.int64, radius: float, reached: int, number: int
+) -> tuple[Overlap, float]:
+    """The overlap with the reached feature alone, and its sharpness: 0 where that is the whole truth."""
+    overlap, sharpness = nothing(), math.inf
+    if reached == NOTHING:
+        sharpness = 0.0
+    elif reached == WHOLE_SPHERE:
+        overlap, sharpness = whole_sphere(radius), 0.0
+    elif reached == FACE:
+        depth, rest = depth_and_rest(features, number, radius)
+        overlap, sharpness = cap(depth, rest, radius, highs(load_vector(features, NORMALS + number))), 0.0
+    elif reached == EDGE and features[HALF_CHORDS + number, 0, 0] > 0.0:
+        overlap, sharpness = _edge_wedge(features, solid, number, radius)
+    elif reached == CORNER and features[POWERS + number, 0, 0] > 0.0:
+        overlap, sharpness = _corner_cone(features, solid, number, radius)
+    return overlap, sharpness
+
+
+@building_block
+def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached: int, number: int) -> None:
+    """Fill in what the form of a lone feature needs."""
+    if reached == FACE:
+        measure_face(features, solid, number)
+    elif reached == EDGE:
+        measure_direction(features, solid, number)
+        measure_edge(features, solid, number, radius)
+        for side in range(2):
+            measure_face(features, solid, EDGE_FACES[solid, number, side])
+    elif reached == CORNER:
+        measure_corner(features, number, radius)
+        for own in range(3):
+            measure_direction(features, solid, CORNER_EDGES[solid, number, own])
+
+
+@building_block
+def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
+    """The corner, else edge, else face that reaches deepest into the ball, with nearly nothing in common with it."""
+    deepest, reached, number = 0.0, NOTHING, 0
+    for corner in range(CORNERS[solid]):
+        if features[POWERS + corner, 0, 0] > deepest:
+            deepest, reached, number = features[POWERS + corner, 0, 0], CORNER, corner
+    if reached == NOTHING:
+        for edge in range(EDGES[solid]):
+            # An edge that does not pass its line's nearest point is no deeper than its corners.
+            passes = features[STARTS + edge, 0, 0] < 0.0 < features[ENDS + edge, 0, 0]
+            if passes and features[HALF_CHORDS + edge, 0, 0] > deepest:
+                deepest, reached, number = features[HALF_CHORDS + edge, 0, 0], EDGE, edge
+    if reached == NOTHING:
+        for face in range(FACES[solid]):
+            inside = features[HEIGHTS + face, 0, 0] < 0.0
+            for side in range(SIDES[solid]):
+                inside = inside and distance_in_face(features, solid, face, side)[0] > 0.0
+            if inside:
+                reached, number = FACE, face
+    return reached, number
+
+
+@inlined
+def _edge_wedge(features: FloatArray, solid: np.int64, edge: int, radius: float) -> tuple[Overlap, float]:
+    direction = load_vector(features, DIRECTIONS + edge)
+    sides = (
+        precise_cross(load_vector(features, NORMALS + EDGE_FACES[solid, edge, 0]), direction),
+        precise_cross(direction, load_vector(features, NORMALS + EDGE_FACES[solid, edge, 1])),
+    )
+    half_chord = load_number(features, HALF_CHORDS + edge)
+    power = rounded(times(half_chord, half_chord))
+    return edge_overlap(load_vector(features, FEET + edge), power, sides, radius)
+
+
+@inlined
+def _corner_cone(features: FloatArray, solid: np.int64, corner: int, radius: float) -> tuple[Overlap, float]:
+    own = CORNER_EDGES[solid, corner]
+    edges = (
+        _away_from(features, solid, corner, own[0]),
+        _away_from(features, solid, corner, own[1]),
+        _away_from(features, solid, corner, own[2]),
+    )
+    power = rounded(load_number(features, POWERS + corner))
+    return corner_overlap(load_vector(features, POINTS + corner), power, edges, radius)
+
+
+@inlined
+def _away_from(features: FloatArray, solid: np.int64, corner: int, edge: int) -> PreciseVector:
+    """The direction of an edge from one of its ends to the other."""
+    direction = load_vector(features, DIRECTIONS + edge)
+    return direction if EDGE_ENDS[solid, edge, 0] == corner else precise_negative(direction)

@@ -1,0 +1,1 @@
+"""The closed forms: ball, half-space, and what every solid has in common."""
