@@ -16,16 +16,16 @@ from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
 from feelahead.calibration_screen import calibration_lines, calibration_screen
-from operator_side.calibration_procedure import CalibrationProcedure, Step
-from operator_side.calibration_store import calibration_path, place_to_write, write_calibration
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import load_backend
-from operator_side.dualsense.finding import find_controller
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import RELEASED, build_output_report
-from operator_side.dualsense.port import Device, OpenController
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.simulated_calibration import CalibratingHands
+from operator_side.calibration.procedure import CalibrationProcedure, Step
+from operator_side.calibration.store import calibration_path, place_to_write, write_calibration
+from operator_side.dualsense.hid.device import load_backend
+from operator_side.dualsense.hid.finding import find_controller
+from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.simulated_person.calibrating_hands import CalibratingHands
 
 _POLL_S = 0.002
 _SHOW_S = 0.05

@@ -5,10 +5,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from operator_side.calibration_procedure import CalibrationProcedure, Step
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.force_profiles import force_profiles
-from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from operator_side.calibration.procedure import CalibrationProcedure, Step
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.feel.force_profiles import force_profiles
+from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _BAR = 40
 _STEPS = len(Step) - 1

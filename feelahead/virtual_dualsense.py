@@ -10,13 +10,13 @@ import tyro
 from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
-from operator_side.dualsense.effects import AnyEffect
-from operator_side.dualsense.models import Model
-from operator_side.dualsense.simulated import INPUT_REPORT_PERIOD_S, SimulatedDualSense
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
-from operator_side.dualsense.uhid_controller import UhidController, identity
-from operator_side.dualsense.uhid_file import EventFile, UhidFile, offer
+from operator_side.dualsense.effects.official import AnyEffect
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import INPUT_REPORT_PERIOD_S, SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.file import EventFile, UhidFile, offer
 
 PULL_PERIOD_S = 4.0
 """R2 and then L2 go down and up in this time, and the left stick once round."""

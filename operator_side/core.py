@@ -14,12 +14,12 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.session import OWNING, SessionState
 from common.statistics import RunningStatistics
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import RELEASED, OutputReport, build_output_report
-from operator_side.travel_calibration import TravelCalibration
-from operator_side.trigger_motion import OperatorIntent, operator_intent
-from operator_side.trigger_rendering import RenderingSettings, TriggerRendering
-from operator_side.write_bound import WriteBound
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, build_output_report
+from operator_side.feel.rendering import RenderingSettings, TriggerRendering
+from operator_side.feel.write_bound import WriteBound
+from operator_side.hands.intent import OperatorIntent, operator_intent
+from operator_side.hands.travel_calibration import TravelCalibration
 
 STIFFNESS_EXPIRES_S = 0.2
 """Triggers are released this long after the last stiffness that was received."""

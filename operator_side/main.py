@@ -21,19 +21,19 @@ from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side.calibration_store import calibration_path, load_calibration
+from operator_side.calibration.store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
-from operator_side.dualsense.background_writes import BackgroundWrites
-from operator_side.dualsense.connection import Connection
-from operator_side.dualsense.device import HidBackend, load_backend
-from operator_side.dualsense.finding import Finder
-from operator_side.dualsense.port import OpenController
-from operator_side.dualsense.release_guard import ReleaseGuard
-from operator_side.dualsense.search import BackgroundSearch, Ready
-from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.dualsense.hid.background_writes import BackgroundWrites
+from operator_side.dualsense.hid.connection import Connection
+from operator_side.dualsense.hid.device import HidBackend, load_backend
+from operator_side.dualsense.hid.finding import Finder
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.search import BackgroundSearch, Ready
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_operator import SimulatedOperator
-from operator_side.travel_calibration import TravelCalibration
+from operator_side.simulated_person.person import SimulatedOperator
 
 MOTION_PERIOD_S = 1 / 250
 _GUARD_PERIOD_S = 0.5

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 import tyro
 
 from common.command.run_options import RunOptions
-from operator_side.simulated_operator import PersonSettings
-from operator_side.travel_calibration import TravelCalibration
-from operator_side.trigger_rendering import RenderingSettings
+from operator_side.feel.rendering import RenderingSettings
+from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.simulated_person.person import PersonSettings
 
 
 @dataclass(frozen=True)

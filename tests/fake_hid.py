@@ -4,9 +4,9 @@ import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidHandle
-from operator_side.dualsense.feature_report import (
+from operator_side.dualsense.hid.device import HidHandle
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     CALIBRATION_ID,
     FIRMWARE_ID,
@@ -14,8 +14,8 @@ from operator_side.dualsense.feature_report import (
     Firmware,
     build_address,
 )
-from operator_side.dualsense.input_report import build_input_report, build_simple_input_report
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.input_report import build_input_report, build_simple_input_report
+from operator_side.dualsense.reports.transport import Transport
 
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from common.clock import VirtualClock
 from common.errors import DeviceError
-from operator_side.dualsense.uhid import EVENT_LENGTH
+from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
 
 START, STOP, OPEN, CLOSE, OUTPUT, GET_REPORT, SET_REPORT = 2, 3, 4, 5, 6, 9, 13
 FEATURE, OUT = 0, 1

@@ -14,7 +14,7 @@ from typing import Any
 
 from common.clock import MonotonicClock
 from common.command.launch import launch
-from operator_side.dualsense.device import HidHandle
+from operator_side.dualsense.hid.device import HidHandle
 from operator_side.main import command
 from tests.fake_hid import FakeHandle
 

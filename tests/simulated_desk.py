@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 
 from common.protocol.messages import Header, Telemetry, Vector3
-from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button, Stick
-from operator_side.dualsense.effects import TriggerEffect
-from operator_side.dualsense.output_report import OutputReport, build_output_report
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.dualsense.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
-from operator_side.simulated_operator import PersonSettings, Phase, SimulatedOperator
-from operator_side.travel_calibration import TravelCalibration
-from operator_side.trigger_effect import stiffness_to_effect
+from operator_side.dualsense.effects.official import TriggerEffect
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, Stick
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from operator_side.feel.level import stiffness_to_effect
+from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.simulated_person.person import PersonSettings, Phase, SimulatedOperator
 
 TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.bands import STEP_LEVELS, Band, BandSelector, BandSettings
+from operator_side.feel.bands import STEP_LEVELS, Band, BandSelector, BandSettings
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 STIFFNESS = st.floats(0.0, 1.0)

@@ -10,7 +10,7 @@ from feelahead.benchmarks.dualsense_conduct import Conduct
 from feelahead.benchmarks.dualsense_ours import Ours
 from feelahead.benchmarks.dualsense_peer import PyDualSense
 from feelahead.generated_part import BEGIN, END
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 
 BOTH = {Transport.USB: True, Transport.BLUETOOTH: True}
 

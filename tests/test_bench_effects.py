@@ -13,10 +13,10 @@ from feelahead.benchmarks.effect_latency import (
     measure,
 )
 from feelahead.main import command
-from operator_side.dualsense.effects import Feedback
-from operator_side.dualsense.finding import find_controller
-from operator_side.dualsense.output_report import OutputReport, build_output_report
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.effects.official import Feedback
+from operator_side.dualsense.hid.finding import find_controller
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.transport import Transport
 
 
 def test_each_change_is_followed_by_the_first_write_before_the_next() -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from operator_side.button_map import BUTTON_OF, Action, Control, Motion, button_of, control_table
-from operator_side.dualsense.controller_state import Button
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.hands.button_map import BUTTON_OF, Action, Control, Motion, button_of, control_table
 from operator_side.main import command
 from operator_side.settings import OperatorSettings
 

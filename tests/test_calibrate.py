@@ -12,14 +12,14 @@ import feelahead.calibrate
 import operator_side.main
 from common.errors import ConfigurationError, DeviceError
 from feelahead.main import command
-from operator_side.calibration_procedure import CalibrationError
-from operator_side.calibration_store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.calibration.procedure import CalibrationError
+from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.core import OperatorSide
-from operator_side.dualsense import connection
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.input_report import build_input_report
-from operator_side.dualsense.output_report import RELEASED, build_output_report
-from operator_side.travel_calibration import TravelCalibration, TriggerTravel
+from operator_side.dualsense.hid import connection
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.fake_hid import ADDRESS, FakeBackend, FakeHandle
 
 REPORT_S = 0.004

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.calibration_procedure import CalibrationError, CalibrationProcedure, Step
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.travel_calibration import StickRest, TriggerTravel
+from operator_side.calibration.procedure import CalibrationError, CalibrationProcedure, Step
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from tests.calibrating_hands import REPORT_S, Hands, Wear
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=25)

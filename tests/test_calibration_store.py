@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from operator_side.calibration_store import (
+from operator_side.calibration.store import (
     calibration_path,
     load_calibration,
     place_to_write,
     read_calibration,
     write_calibration,
 )
-from operator_side.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 ADDRESS = "aa:bb:cc:00:11:22"

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.contact_detent import DetentSelector, with_detent
-from operator_side.dualsense.effects import MultiPositionFeedback, Off
-from operator_side.force_profiles import force_profiles
+from operator_side.dualsense.effects.official import MultiPositionFeedback, Off
+from operator_side.feel.contact_detent import DetentSelector, with_detent
+from operator_side.feel.force_profiles import force_profiles
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 EFFECTS = force_profiles().effects

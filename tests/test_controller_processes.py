@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from feelahead.benchmarks.stiffness_source import StiffnessSource
-from operator_side.dualsense.effects import Off
-from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble, parse_output_report
+from operator_side.dualsense.effects.official import Off
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble, parse_output_report
 
 pytestmark = [
     pytest.mark.processes,

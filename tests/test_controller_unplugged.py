@@ -6,10 +6,10 @@ import pytest
 
 from common.errors import DeviceError, NoDeviceError
 from feelahead.loopback import Loopback, LoopbackSettings
-from operator_side.dualsense.connection import LOOK_PERIOD_S, Connection, ConnectionState
-from operator_side.dualsense.controller_state import Button
-from operator_side.dualsense.port import OpenController
-from operator_side.dualsense.simulated import SimulatedDualSense
+from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 

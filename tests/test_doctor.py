@@ -25,8 +25,8 @@ from feelahead.doctor.finding import Finding, Verdict, fit_for_demo
 from feelahead.doctor.machine_checks import PORTS, check_ports, check_realtime
 from feelahead.doctor.python_checks import EXTRAS, OLDEST_PYTHON, check_extra, check_python, modules_of
 from feelahead.main import command
-from operator_side.dualsense.device import HidBackend
-from operator_side.dualsense.udev import RULE_FILE, RULES, installing_command
+from operator_side.dualsense.hid.device import HidBackend
+from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
 from tests.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
 
 ROOT = Path(__file__).parents[1]

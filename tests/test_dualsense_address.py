@@ -1,7 +1,7 @@
 import pytest
 
-from operator_side.dualsense.address import checked_address
-from operator_side.dualsense.feature_report import build_address
+from operator_side.dualsense.reports.address import checked_address
+from operator_side.dualsense.reports.feature_report import build_address
 
 
 def test_an_address_is_taken_as_it_is() -> None:

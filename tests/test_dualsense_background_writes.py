@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import pytest
 
 from common.errors import DeviceError
-from operator_side.dualsense.background_writes import STALL_S, BackgroundWrites
-from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.output_report import (
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.hid.background_writes import STALL_S, BackgroundWrites
+from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
     Rumble,

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.checksum import Seed, check, checksum, sealed
+from operator_side.dualsense.reports.checksum import Seed, check, checksum, sealed
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 REPORTS = st.binary(min_size=1, max_size=80)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
-from operator_side.dualsense.connection import (
+from operator_side.dualsense.hid.connection import (
     BEAT_PERIOD_S,
     LOOK_PERIOD_S,
     RETELL_AFTER_S,
@@ -16,7 +16,7 @@ from operator_side.dualsense.connection import (
     ConnectionEvent,
     ConnectionState,
 )
-from operator_side.dualsense.port import OpenController
+from operator_side.dualsense.hid.port import OpenController
 
 TICK_S = 0.004
 

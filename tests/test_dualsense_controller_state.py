@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.attachments import Battery, Connections, TouchPoint
-from operator_side.dualsense.controller_state import Button, ControllerState, TriggerFeedback
+from operator_side.dualsense.reports.attachments import Battery, Connections, TouchPoint
+from operator_side.dualsense.reports.controller_state import Button, ControllerState, TriggerFeedback
 
 
 @pytest.mark.parametrize(

@@ -9,19 +9,19 @@ from typing import Any
 import pytest
 
 from common.errors import ConfigurationError, DeviceError, NoDriverError
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidDualSense, load_backend, write_once
-from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.input_report import build_simple_input_report
-from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
-from operator_side.dualsense.output_report import (
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.hid.device import HidDualSense, load_backend, write_once
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_simple_input_report
+from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
+from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
     Rumble,
     build_output_report,
     parse_output_report,
 )
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 from tests.fake_hid import ADDRESS, BLUETOOTH, CALIBRATION, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
 
 PATH = b"/dev/hidraw3"
@@ -144,7 +144,7 @@ def test_a_bad_report_does_not_hide_the_good_ones_before_it(transport: Transport
 def test_writing_once(monkeypatch: pytest.MonkeyPatch) -> None:
     handle = FakeHandle()
     backend = FakeBackend({0x0CE6: {PATH: handle}})
-    monkeypatch.setattr("operator_side.dualsense.device.load_backend", lambda: backend)
+    monkeypatch.setattr("operator_side.dualsense.hid.device.load_backend", lambda: backend)
     write_once(PATH, b"report")
     assert (handle.written, handle.closed) == ([b"report"], 1)
     handle.plugged_in = False

@@ -10,14 +10,14 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import StiffnessUpdate
 from operator_side.core import OperatorSide
-from operator_side.dualsense.connection import LOOK_PERIOD_S, Connection, ConnectionState
-from operator_side.dualsense.device import HidDualSense, HidHandle
-from operator_side.dualsense.finding import find_controller
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.models import SONY_VENDOR_ID, Model
-from operator_side.dualsense.port import OpenController
-from operator_side.dualsense.simulated import SIMULATED_FIRMWARE, SimulatedDualSense
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
+from operator_side.dualsense.hid.device import HidDualSense, HidHandle
+from operator_side.dualsense.hid.finding import find_controller
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.models import SONY_VENDOR_ID, Model
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE, SimulatedDualSense
 
 PERIOD_S = 0.004
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects import (
+from operator_side.dualsense.effects.official import (
     DEBUG_CODES,
     EFFECT_LENGTH,
     Feedback,

@@ -5,14 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.checksum import Seed, sealed
-from operator_side.dualsense.feature_report import (
+from operator_side.dualsense.reports.checksum import Seed, sealed
+from operator_side.dualsense.reports.feature_report import (
     CalibrationReport,
     Firmware,
     build_address,
     parse_address,
 )
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)

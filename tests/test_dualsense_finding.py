@@ -5,11 +5,11 @@ import threading
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
-from operator_side.dualsense.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
-from operator_side.dualsense.output_report import RELEASED, build_output_report
-from operator_side.dualsense.port import OpenController
-from operator_side.dualsense.search import BackgroundSearch, Find, Ready
-from operator_side.dualsense.udev import RULES
+from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.search import BackgroundSearch, Find, Ready
+from operator_side.dualsense.hid.udev import RULES
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
 from tests.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle
 
 A, B = b"/dev/hidraw3", b"/dev/hidraw4"

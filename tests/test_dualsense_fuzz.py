@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.checksum import Seed, sealed
-from operator_side.dualsense.effects import (
+from operator_side.dualsense.effects.official import (
     DEBUG_CODES,
     AnyEffect,
     Feedback,
@@ -19,11 +18,7 @@ from operator_side.dualsense.effects import (
     Vibration,
     Weapon,
 )
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import OutputReport, build_output_report, parse_output_report
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.unofficial_effects import (
+from operator_side.dualsense.effects.unofficial_effects import (
     Bow,
     Galloping,
     Machine,
@@ -31,6 +26,11 @@ from operator_side.dualsense.unofficial_effects import (
     SimpleVibration,
     SimpleWeapon,
 )
+from operator_side.dualsense.reports.checksum import Seed, sealed
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 COUNT = 100_000
 

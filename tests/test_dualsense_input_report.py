@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.attachments import Battery, BatteryState, Connections, TouchPoint
-from operator_side.dualsense.checksum import Seed, sealed
-from operator_side.dualsense.controller_state import Button, ControllerState, TriggerFeedback
-from operator_side.dualsense.input_report import (
+from operator_side.dualsense.reports.attachments import Battery, BatteryState, Connections, TouchPoint
+from operator_side.dualsense.reports.checksum import Seed, sealed
+from operator_side.dualsense.reports.controller_state import Button, ControllerState, TriggerFeedback
+from operator_side.dualsense.reports.input_report import (
     build_input_report,
     build_simple_input_report,
     is_input_report,
     parse_input_report,
 )
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 COMMON_BLOCKS = st.binary(min_size=63, max_size=63)

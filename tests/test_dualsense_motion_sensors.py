@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.controller_state import AT_REST_M_S2, ControllerState
-from operator_side.dualsense.feature_report import CalibrationReport
-from operator_side.dualsense.input_report import build_input_report, parse_input_report
-from operator_side.dualsense.motion_sensors import NOMINAL_MOTION, MotionCalibration
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.controller_state import AT_REST_M_S2, ControllerState
+from operator_side.dualsense.reports.feature_report import CalibrationReport
+from operator_side.dualsense.reports.input_report import build_input_report, parse_input_report
+from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
+from operator_side.dualsense.reports.transport import Transport
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 G = 9.80665

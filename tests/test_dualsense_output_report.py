@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.checksum import Seed, sealed
-from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off
-from operator_side.dualsense.output_report import (
+from operator_side.dualsense.effects.official import Feedback, MultiPositionFeedback, Off
+from operator_side.dualsense.reports.checksum import Seed, sealed
+from operator_side.dualsense.reports.output_report import (
     RELEASED,
     MuteLed,
     OutputReport,
@@ -19,7 +19,7 @@ from operator_side.dualsense.output_report import (
     parse_output_report,
     transport_of_output,
 )
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)

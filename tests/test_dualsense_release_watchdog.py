@@ -12,8 +12,8 @@ from types import TracebackType
 
 import pytest
 
-from operator_side.dualsense.release_guard import MOST_REPLACEMENTS, ReleaseGuard
-from operator_side.dualsense.release_watchdog import SILENCE_S, LinuxTarget, Watch
+from operator_side.dualsense.hid.release_guard import MOST_REPLACEMENTS, ReleaseGuard
+from operator_side.dualsense.hid.release_watchdog import SILENCE_S, LinuxTarget, Watch
 
 pytestmark = [
     pytest.mark.processes,
@@ -54,7 +54,7 @@ def controller(tmp_path: Path) -> Iterator[FakeController]:
 # An operator side as the watchdog sees it: it says what it is asked to, then waits until it is ended.
 PARENT = """
 import sys
-from operator_side.dualsense.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
 report = bytes(range(48))
 with ReleaseGuard() as guard:
     print(guard.process_id, flush=True)
@@ -260,7 +260,7 @@ def test_a_controller_that_cannot_be_opened_harms_nobody(parent: Parent, tmp_pat
 
 
 def test_it_starts_with_nothing_but_python_itself() -> None:
-    script = Path(__file__).parents[1] / "operator_side/dualsense/release_watchdog.py"
+    script = Path(__file__).parents[1] / "operator_side/dualsense/hid/release_watchdog.py"
     program = f"import runpy, sys; runpy.run_path({str(script)!r}); print('site' in sys.modules, len(sys.modules))"
     said = subprocess.run(
         [sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True, timeout=LIMIT_S

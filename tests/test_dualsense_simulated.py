@@ -5,14 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DeviceError
-from operator_side.dualsense.controller_state import Button, ControllerState, TriggerFeedback
-from operator_side.dualsense.effects import Feedback, MultiPositionFeedback, Off
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
-from operator_side.dualsense.port import Device
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
-from operator_side.trigger_effect import stiffness_to_effect
+from operator_side.dualsense.effects.official import Feedback, MultiPositionFeedback, Off
+from operator_side.dualsense.hid.port import Device
+from operator_side.dualsense.reports.controller_state import Button, ControllerState, TriggerFeedback
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.feel.level import stiffness_to_effect
 
 
 def newest(device: Device, now_s: float) -> ControllerState:

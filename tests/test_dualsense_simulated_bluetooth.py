@@ -3,17 +3,17 @@
 import pytest
 
 from common.errors import DeviceError
-from operator_side.dualsense.attachments import ON_BLUETOOTH, Battery, BatteryState, TouchPoint
-from operator_side.dualsense.controller_state import AT_REST_M_S2, Button, ControllerState
-from operator_side.dualsense.effects import Feedback, Off, Weapon
-from operator_side.dualsense.feature_report import CalibrationReport, Firmware, parse_address
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.models import Model
-from operator_side.dualsense.motion_sensors import MotionCalibration
-from operator_side.dualsense.output_report import MuteLed, OutputReport, Rumble, build_output_report
-from operator_side.dualsense.simulated import SIMULATED_ADDRESS, SIMULATED_FIRMWARE, SimulatedDualSense
-from operator_side.dualsense.transport import Transport, is_simple_report, transport_of_input
-from operator_side.dualsense.unofficial_effects import Bow
+from operator_side.dualsense.effects.official import Feedback, Off, Weapon
+from operator_side.dualsense.effects.unofficial_effects import Bow
+from operator_side.dualsense.reports.attachments import ON_BLUETOOTH, Battery, BatteryState, TouchPoint
+from operator_side.dualsense.reports.controller_state import AT_REST_M_S2, Button, ControllerState
+from operator_side.dualsense.reports.feature_report import CalibrationReport, Firmware, parse_address
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.motion_sensors import MotionCalibration
+from operator_side.dualsense.reports.output_report import MuteLed, OutputReport, Rumble, build_output_report
+from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
+from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS, SIMULATED_FIRMWARE, SimulatedDualSense
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 STIFF = OutputReport(l2=Feedback(3, 6), r2=Weapon(2, 5, 8))

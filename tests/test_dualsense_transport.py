@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.transport import Transport, is_simple_report, transport_of_input
+from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.controller_state import SENSED_TRAVEL, TriggerFeedback
-from operator_side.dualsense.effects import (
+from operator_side.dualsense.effects.official import (
     Feedback,
     MultiPositionFeedback,
     MultiPositionVibration,
@@ -17,7 +16,9 @@ from operator_side.dualsense.effects import (
     Vibration,
     Weapon,
 )
-from operator_side.dualsense.trigger_model import (
+from operator_side.dualsense.effects.unofficial_effects import Bow
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, TriggerFeedback
+from operator_side.dualsense.simulated.trigger_model import (
     FINGER_TIME_CONSTANT_S,
     NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
@@ -26,7 +27,6 @@ from operator_side.dualsense.trigger_model import (
     SimulatedTrigger,
     equilibrium_travel,
 )
-from operator_side.dualsense.unofficial_effects import Bow
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 FORCES = st.floats(0.0, 10.0)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
-from operator_side.dualsense.uhid import (
+from operator_side.dualsense.reports.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
+from operator_side.dualsense.uhid.protocol import (
     BUS_BLUETOOTH,
     BUS_USB,
     EVENT_LENGTH,

@@ -2,11 +2,11 @@
 
 import pytest
 
-from operator_side.dualsense.models import Model
-from operator_side.dualsense.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.uhid import create, destroy, get_report_reply, input_report, set_report_reply
-from operator_side.dualsense.uhid_controller import UhidController, UhidCounts, identity
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.uhid.controller import UhidController, UhidCounts, identity
+from operator_side.dualsense.uhid.protocol import create, destroy, get_report_reply, input_report, set_report_reply
 from tests.fake_kernel import (
     CLOSE,
     OPEN,

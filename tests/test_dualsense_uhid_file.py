@@ -8,9 +8,9 @@ import pytest
 
 from common.clock import VirtualClock
 from common.errors import ConfigurationError, DeviceError
-from operator_side.dualsense.uhid import get_report_reply, input_report
-from operator_side.dualsense.uhid_controller import UhidController, identity
-from operator_side.dualsense.uhid_file import UhidFile, offer
+from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.file import UhidFile, offer
+from operator_side.dualsense.uhid.protocol import get_report_reply, input_report
 from tests.fake_kernel import START, FakeKernel, PlainController, get_report, output, said
 
 CREATE2, DESTROY, INPUT2 = 11, 1, 12

@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects import AnyEffect, decode_effect
-from operator_side.dualsense.output_report import OutputReport, build_output_report, parse_output_report
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.unofficial_effects import (
+from operator_side.dualsense.effects.official import AnyEffect, decode_effect
+from operator_side.dualsense.effects.unofficial_effects import (
     Bow,
     Galloping,
     Machine,
@@ -19,6 +17,8 @@ from operator_side.dualsense.unofficial_effects import (
     SimpleVibration,
     SimpleWeapon,
 )
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.reports.transport import Transport
 
 CODES = (0x01, 0x02, 0x06, 0x22, 0x23, 0x27)
 

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from operator_side.dualsense.effects import MultiPositionFeedback, Off
-from operator_side.force_profiles import MAX_LEVEL, ForceProfiles, force_profiles
+from operator_side.dualsense.effects.official import MultiPositionFeedback, Off
+from operator_side.feel.force_profiles import MAX_LEVEL, ForceProfiles, force_profiles
 
 REACHABLE = range(1, 11)
 

@@ -19,8 +19,8 @@ IO_ROOMS = {
         *(f"common/sockets/{part}.py" for part in ("shell", "authentication", "robot", "operator")),
         "feelahead/benchmarks/link_peers.py",  # times bare ZeroMQ beside ours
     },
-    "hid": {"operator_side/dualsense/device.py"},
-    "hidraw": {"operator_side/dualsense/device.py"},
+    "hid": {"operator_side/dualsense/hid/device.py"},
+    "hidraw": {"operator_side/dualsense/hid/device.py"},
     "mujoco": {
         "robot_side/simulation/arm.py",
         "robot_side/simulation/scene.py",
@@ -34,7 +34,7 @@ CLOCK_READERS = {
     "feelahead/experiments/hostile_input.py",  # drives two real processes
     "feelahead/calibrate.py",  # shows a real controller to a person
     "feelahead/demo.py",  # shows two real processes to a person
-    "operator_side/dualsense/release_watchdog.py",  # a bare file that imports nothing of ours
+    "operator_side/dualsense/hid/release_watchdog.py",  # a bare file that imports nothing of ours
     "robot_side/main.py",  # times its own ticks
     "feelahead/loopback.py",  # likewise
 }

@@ -7,10 +7,10 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
 from common.protocol.session import SessionState
 from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
-from operator_side.dualsense.controller_state import Button
-from operator_side.dualsense.effects import Off
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.travel_calibration import TravelCalibration, TriggerTravel
+from operator_side.dualsense.effects.official import Off
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 
 class Bench:

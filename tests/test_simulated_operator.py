@@ -5,14 +5,14 @@ import math
 import pytest
 
 from common.protocol.messages import Vector3
-from operator_side.dualsense.controller_state import SENSED_TRAVEL, Button
-from operator_side.dualsense.trigger_model import (
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.dualsense.simulated.trigger_model import (
     NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.simulated_operator import FULL_TRIGGER_M_S, PersonSettings
-from operator_side.trigger_effect import stiffness_to_effect
+from operator_side.feel.level import stiffness_to_effect
+from operator_side.simulated_person.person import FULL_TRIGGER_M_S, PersonSettings
 from tests.simulated_desk import (
     CALIBRATION,
     GRASP_M,

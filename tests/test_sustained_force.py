@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.force_profiles import force_profiles
-from operator_side.sustained_force import SustainedForceLimit, SustainedForceSettings
+from operator_side.feel.force_profiles import force_profiles
+from operator_side.feel.sustained_force import SustainedForceLimit, SustainedForceSettings
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 USUAL = SustainedForceSettings()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.travel_calibration import StickRest, TriggerTravel
+from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))

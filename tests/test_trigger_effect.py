@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from operator_side.bands import BandSettings
-from operator_side.dualsense.effects import MultiPositionFeedback, Off
-from operator_side.trigger_effect import LevelSelector, stiffness_to_effect
+from operator_side.dualsense.effects.official import MultiPositionFeedback, Off
+from operator_side.feel.bands import BandSettings
+from operator_side.feel.level import LevelSelector, stiffness_to_effect
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 STIFFNESS = st.floats(0.0, 1.0)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from operator_side.button_map import BUTTON_OF
-from operator_side.dualsense.controller_state import Button, ControllerState
-from operator_side.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.trigger_motion import OperatorIntent, operator_intent
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
+from operator_side.hands.button_map import BUTTON_OF
+from operator_side.hands.intent import OperatorIntent, operator_intent
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 
 def pressing(*buttons: Button) -> OperatorIntent:

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.messages import Header, StiffnessUpdate
-from operator_side.bands import Band, BandSettings
-from operator_side.dualsense.effects import MultiPositionFeedback, Off
-from operator_side.dualsense.output_report import RELEASED, Rumble
-from operator_side.sustained_force import SustainedForceSettings
-from operator_side.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.trigger_rendering import RenderedTrigger, RenderingSettings, RumbleSelector, TriggerRendering
+from operator_side.dualsense.effects.official import MultiPositionFeedback, Off
+from operator_side.dualsense.reports.output_report import RELEASED, Rumble
+from operator_side.feel.bands import Band, BandSettings
+from operator_side.feel.rendering import RenderedTrigger, RenderingSettings, RumbleSelector, TriggerRendering
+from operator_side.feel.sustained_force import SustainedForceSettings
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 USUAL = RenderingSettings()

@@ -21,14 +21,14 @@ from feelahead.virtual_dualsense import (
     pulling,
     virtual_dualsense,
 )
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.feature_report import parse_address
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
-from operator_side.dualsense.uhid_file import UHID_PATH
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.feature_report import parse_address
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.uhid.file import UHID_PATH
 from tests.fake_kernel import START, STOP, FakeKernel, get_report, output, said
 
 INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
@@ -144,7 +144,7 @@ def test_the_command_is_one_of_feelaheads(monkeypatch: pytest.MonkeyPatch, tmp_p
         opened.append(path)
         return _open(tmp_path / "uhid", flags)
 
-    monkeypatch.setattr("operator_side.dualsense.uhid_file.os.open", open_pipe)
+    monkeypatch.setattr("operator_side.dualsense.uhid.file.os.open", open_pipe)
     assert command(["virtual-dualsense", "--duration", "0.05"]) == 0
     assert opened == [UHID_PATH]
 

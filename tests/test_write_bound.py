@@ -11,10 +11,10 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import StiffnessUpdate
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.output_report import RELEASED, OutputReport, Rumble
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.write_bound import MOST_WRITES_PER_S, WriteBound
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.feel.write_bound import MOST_WRITES_PER_S, WriteBound
 
 Fields = dict[str, Any]
 STIFFNESS = st.sampled_from([0.0, 0.1, 0.3, 0.9])

@@ -15,7 +15,7 @@ from feelahead.benchmarks.dualsense_ours import Ours
 from feelahead.benchmarks.dualsense_peer import PyDualSense
 from feelahead.benchmarks.overlap_report import Goal, Table, markdown, show, show_goals
 from feelahead.generated_part import with_generated_part
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.transport import Transport
 
 PROGRAM = "feelahead bench dualsense"
 _WIDE = 120

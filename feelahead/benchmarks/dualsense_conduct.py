@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from operator_side.dualsense.attachments import TouchPoint
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.input_report import build_input_report
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.attachments import TouchPoint
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.transport import Transport
 
 REPORT_PERIOD_S: Final = 0.004
 """About 250 reports a second on USB (SDL)."""

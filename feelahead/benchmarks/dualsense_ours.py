@@ -18,15 +18,15 @@ from feelahead.benchmarks.dualsense_conduct import (
 )
 from feelahead.benchmarks.dualsense_player import CythonBackend, Player
 from operator_side.core import OperatorSide
-from operator_side.dualsense.connection import Connection, ConnectionState
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidDualSense
-from operator_side.dualsense.effects import DEBUG_CODES, Feedback
-from operator_side.dualsense.input_report import build_input_report, parse_input_report
-from operator_side.dualsense.motion_sensors import NOMINAL_MOTION
-from operator_side.dualsense.output_report import OutputReport, build_output_report
-from operator_side.dualsense.port import OpenController
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.effects.official import DEBUG_CODES, Feedback
+from operator_side.dualsense.hid.connection import Connection, ConnectionState
+from operator_side.dualsense.hid.device import HidDualSense
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report, parse_input_report
+from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.transport import Transport
 
 _R2_CODE: Final = 11
 """Of a USB output report: where the code of R2's effect stands."""

@@ -18,10 +18,10 @@ from feelahead.benchmarks.dualsense_conduct import (
     varied_reports,
 )
 from feelahead.benchmarks.dualsense_player import Player, ctypes_binding
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.effects import DEBUG_CODES
-from operator_side.dualsense.input_report import build_input_report
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.effects.official import DEBUG_CODES
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.transport import Transport
 
 
 class PyDualSense:

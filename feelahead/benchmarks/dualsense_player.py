@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from operator_side.dualsense.feature_report import ADDRESS_ID, CALIBRATION_ID, FIRMWARE_ID
+from operator_side.dualsense.reports.feature_report import ADDRESS_ID, CALIBRATION_ID, FIRMWARE_ID
 
 _VENDOR_ID: Final = 0x054C
 _PRODUCT_ID: Final = 0x0CE6

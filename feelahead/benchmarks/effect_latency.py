@@ -25,10 +25,10 @@ from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from feelahead.benchmarks.stiffness_source import StiffnessSource
-from operator_side.dualsense.controller_state import ControllerState
-from operator_side.dualsense.device import HidHandle
-from operator_side.dualsense.input_report import build_input_report
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.hid.device import HidHandle
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.transport import Transport
 from operator_side.main import command as operator_command
 
 PROGRAM = "feelahead bench effects"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from feelahead.doctor.finding import Finding, Verdict
-from operator_side.dualsense.models import PRODUCT_IDS, SONY_VENDOR_ID
-from operator_side.dualsense.udev import RULE_FILE, installing_command
+from operator_side.dualsense.hid.udev import RULE_FILE, installing_command
+from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 
 _UHID: Final = "/dev/uhid"
 

@@ -14,12 +14,12 @@ from common.errors import DeviceError, NoDriverError, RemoteProtocolError
 from feelahead.doctor.controller_checks import ControllerSeen, HidFacts, UhidFacts
 from feelahead.doctor.machine_checks import PORTS
 from feelahead.doctor.python_checks import EXTRAS, modules_of
-from operator_side.dualsense.attachments import Battery
-from operator_side.dualsense.device import HidBackend, HidDualSense, load_backend
-from operator_side.dualsense.feature_report import Firmware
-from operator_side.dualsense.finding import sightings
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.udev import RULE_FOLDERS
+from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
+from operator_side.dualsense.hid.finding import sightings
+from operator_side.dualsense.hid.udev import RULE_FOLDERS
+from operator_side.dualsense.reports.attachments import Battery
+from operator_side.dualsense.reports.feature_report import Firmware
+from operator_side.dualsense.reports.input_report import parse_input_report
 
 _IMPORT_LIMIT_S: Final = 60.0
 _IMPORT: Final = """

@@ -24,8 +24,8 @@ from common.protocol.session import OWNING
 from common.realtime.priority import raise_priority
 from common.sockets.operator import OperatorSockets
 from operator_side.core import OperatorSide
-from operator_side.dualsense.controller_state import Button, ControllerState
-from operator_side.dualsense.input_report import build_input_report
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.main import MOTION_PERIOD_S
 
 PROGRAM = "python -m feelahead.experiments.driver"

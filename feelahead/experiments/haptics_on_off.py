@@ -26,7 +26,7 @@ from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from feelahead.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_operator import PersonSettings
+from operator_side.simulated_person.person import PersonSettings
 from robot_side.settings import RobotSettings
 
 _PROGRAM = "python -m feelahead.experiments.haptics_on_off"

@@ -5,10 +5,10 @@ import subprocess
 import sys
 import threading
 
-from operator_side.dualsense.effects import Feedback
-from operator_side.dualsense.output_report import OutputReport, build_output_report
-from operator_side.dualsense.simulated import SIMULATED_ADDRESS
-from operator_side.dualsense.uhid_controller import identity
+from operator_side.dualsense.effects.official import Feedback
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
+from operator_side.dualsense.uhid.controller import identity
 from tests.kernel.evdev import ABS_RZ, ABS_X, InputDevice
 from tests.kernel.kernel_view import seen_device
 from tests.kernel.plugged import Variant

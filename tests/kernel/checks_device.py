@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from common.errors import DeviceError, NoDeviceError
-from operator_side.dualsense.controller_state import STANDARD_GRAVITY_M_S2, Button, ControllerState
-from operator_side.dualsense.device import HidDualSense, load_backend
-from operator_side.dualsense.effects import (
+from operator_side.dualsense.effects.official import (
     AnyEffect,
     Feedback,
     MultiPositionFeedback,
@@ -17,12 +15,18 @@ from operator_side.dualsense.effects import (
     Vibration,
     Weapon,
 )
-from operator_side.dualsense.finding import find_controller, sightings
-from operator_side.dualsense.input_report import parse_input_report
-from operator_side.dualsense.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S, MotionCalibration
-from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
-from operator_side.dualsense.simulated import SIMULATED_FIRMWARE
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.hid.device import HidDualSense, load_backend
+from operator_side.dualsense.hid.finding import find_controller, sightings
+from operator_side.dualsense.reports.controller_state import STANDARD_GRAVITY_M_S2, Button, ControllerState
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.motion_sensors import (
+    NOMINAL_ACCELERATION_M_S2,
+    NOMINAL_GYRO_RAD_S,
+    MotionCalibration,
+)
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.checks_driver import bound
 from tests.kernel.plugged import ADDRESS, CALIBRATION, Plugged
 from tests.kernel.waiting import require, wait_until

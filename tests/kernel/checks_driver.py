@@ -5,11 +5,11 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from operator_side.dualsense.controller_state import AT_REST_M_S2, STANDARD_GRAVITY_M_S2, Button, Vector3
-from operator_side.dualsense.effects import Feedback, Off
-from operator_side.dualsense.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
-from operator_side.dualsense.output_report import OutputReport, Rumble, build_output_report
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.reports.controller_state import AT_REST_M_S2, STANDARD_GRAVITY_M_S2, Button, Vector3
+from operator_side.dualsense.reports.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.evdev import (
     ABS_HAT0X,
     ABS_HAT0Y,

@@ -4,8 +4,8 @@ import signal
 import time
 from types import TracebackType
 
-from operator_side.dualsense.controller_state import Button
-from operator_side.dualsense.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.kernel.armless_robot import ArmlessRobot
 from tests.kernel.operator_process import Operator
 from tests.kernel.plugged import Plugged

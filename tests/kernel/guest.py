@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from operator_side.dualsense.models import Model
-from operator_side.dualsense.transport import Transport
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.transport import Transport
 from tests.kernel.checks_command import lives
 from tests.kernel.checks_device import DEVICE_CHECKS
 from tests.kernel.checks_driver import DRIVER_CHECKS

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from operator_side.dualsense.uhid import UhidIdentity
+from operator_side.dualsense.uhid.protocol import UhidIdentity
 
 
 class KernelView:

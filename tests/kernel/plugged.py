@@ -8,12 +8,12 @@ from types import TracebackType
 from typing import Final, TypeVar
 
 from common.clock import MonotonicClock
-from operator_side.dualsense.feature_report import CalibrationReport
-from operator_side.dualsense.models import Model
-from operator_side.dualsense.simulated import SimulatedDualSense
-from operator_side.dualsense.transport import Transport
-from operator_side.dualsense.uhid_controller import UhidController, identity
-from operator_side.dualsense.uhid_file import UhidFile, offer
+from operator_side.dualsense.reports.feature_report import CalibrationReport
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.file import UhidFile, offer
 from tests.kernel.waiting import CheckError, wait_until
 
 Value = TypeVar("Value")

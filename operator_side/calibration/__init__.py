@@ -1,0 +1,1 @@
+"""Measuring a controller's triggers, and keeping what was measured."""

@@ -1,0 +1,301 @@
+"""A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Protocol, TypeVar, cast
+
+from common.errors import DeviceError, NoDriverError, RemoteProtocolError
+from operator_side.dualsense.hid.device_messages import INSTALL, gone, no_dualsense, not_opened, silent
+from operator_side.dualsense.reports.feature_report import (
+    ADDRESS_ID,
+    CALIBRATION_ID,
+    FEATURE_LENGTHS,
+    FIRMWARE_ID,
+    Firmware,
+    parse_address,
+)
+from operator_side.dualsense.reports.input_report import is_input_report
+from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
+from operator_side.dualsense.reports.output_report import (
+    RELEASED,
+    OutputReport,
+    build_output_report,
+    parse_output_report,
+)
+from operator_side.dualsense.reports.transport import Transport, transport_of_input
+
+Read = TypeVar("Read")
+
+_READ_LENGTH: Final = 128  # longer than any report, so that each is seen as long as it is
+_MAX_DRAINED: Final = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
+_FIRST_REPORT_MS: Final = 100
+_FIRST_REPORT_ATTEMPTS: Final = 5
+_FEATURE_ATTEMPTS: Final = 3
+"""A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
+_SEQUENCES: Final = 16
+
+
+class HidHandle(Protocol):
+    """What is used of hidapi's `device` objects."""
+
+    def open_path(self, path: bytes) -> None:
+        """Open; OSError when that fails."""
+        ...
+
+    def set_nonblocking(self, flag: int) -> object:
+        """1: `read` returns an empty list rather than wait."""
+        ...
+
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        """One report; empty after the timeout, which 0 leaves to set_nonblocking. OSError when the device is gone."""
+        ...
+
+    def write(self, data: bytes) -> int:
+        """The number of bytes written; -1 when the device is gone."""
+        ...
+
+    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
+        """One feature report, with its id; OSError when the device does not answer."""
+        ...
+
+    def close(self) -> None:
+        """Let the device go."""
+        ...
+
+    def error(self) -> str:
+        """What the last failure was."""
+        ...
+
+
+class HidBackend(Protocol):
+    """What is used of hidapi's modules `hidraw` and `hid`."""
+
+    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
+        """The devices that are there."""
+        ...
+
+    def device(self) -> HidHandle:
+        """A handle that is not open yet."""
+        ...
+
+
+def load_backend() -> HidBackend:
+    """Import hidapi; NoDriverError when it is missing, broken or shadowed by the other package called `hid`.
+
+    hidapi's wheel for Linux has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which
+    goes through libusb and does not. Elsewhere there is only `hid`.
+    """
+    try:
+        if sys.platform == "linux":
+            import hidraw as module  # noqa: PLC0415
+        else:
+            import hid as module  # noqa: PLC0415
+    except Exception as error:  # another package's module may fail as it likes
+        raise NoDriverError(
+            f"hidapi cannot be imported ({type(error).__name__}: {error}): {INSTALL}, after pip uninstall hid if that"
+            " other package is there; or run without a controller: --device simulated"
+        ) from error
+    if not hasattr(module, "device") or not hasattr(module, "enumerate"):
+        place = getattr(module, "__file__", None)
+        raise NoDriverError(
+            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it (for hid:"
+            f" pip uninstall hid), then {INSTALL}"
+        )
+    return cast(HidBackend, module)
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What a controller says of itself; None for what it does not tell."""
+
+    transport: Transport
+    address: str | None
+    """Its Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    firmware: Firmware | None
+    motion: MotionCalibration
+    first_report: bytes
+    """The input report by which the transport was told."""
+
+
+class HidDualSense:
+    """The Device port on a controller that is open, on USB or Bluetooth.
+
+    On Linux it may be read by one thread and written by another; elsewhere one thread does both.
+    """
+
+    def __init__(self, backend: HidBackend, path: bytes) -> None:
+        """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
+
+        On Bluetooth, asking is also what switches it to full reports.
+        """
+        self._reading, self._writing = _open(backend, path)
+        try:
+            self.identity: Final = _ask(self._reading, path)
+            self._reading.set_nonblocking(1)
+        except OSError as error:
+            self._close_handles()
+            raise gone(str(error)) from error
+        except DeviceError:
+            self._close_handles()
+            raise
+        self._closed = False
+        self._sequence = 0
+        self._written = False
+        self._released = True
+        self.bad_reports = 0
+        """Input reports of a wrong id, length or checksum that were met while looking for a good one."""
+        self._told = OutputReport()
+
+    @property
+    def released(self) -> bool:
+        """Nothing that was written holds or shakes, as far as it went out."""
+        return self._released
+
+    def read(self, now_s: float) -> bytes | None:
+        """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
+
+        One that no controller sends is passed over and counted (`bad_reports`) as long as there is a good one; else
+        the newest is returned as it is, and whoever parses it says what is wrong.
+        """
+        del now_s  # a real controller has a clock of its own
+        self._require_open()
+        drained: list[list[int]] = []
+        try:
+            for _ in range(_MAX_DRAINED):
+                report = self._reading.read(_READ_LENGTH)
+                if not report:
+                    break
+                drained.append(report)
+        except OSError as error:
+            raise gone(str(error)) from error
+        for report in reversed(drained):
+            newest = bytes(report)
+            if is_input_report(newest):
+                return newest
+            self.bad_reports += 1
+        return bytes(drained[-1]) if drained else None
+
+    def write(self, report: bytes, now_s: float) -> None:
+        """Send an output report, of whichever transport, in this controller's framing.
+
+        ValueError, and nothing sent, for bytes that parse_output_report refuses: this is the last gate before
+        the controller, and no debug effect code passes it. DeviceError when the controller is gone.
+        """
+        del now_s
+        self._require_open()
+        try:
+            output = parse_output_report(report)
+        except RemoteProtocolError as error:
+            raise ValueError(f"report: {error}") from error
+        self._written, self._released = True, False
+        self._send(output)
+        self._told = output.following(self._told)
+        self._released = self._told.releases
+
+    def close(self) -> None:
+        """Take effects and rumble off if any were written and the controller still answers; let it go."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if self._written:
+                self._send(RELEASED)
+                self._released = True
+        except DeviceError:
+            pass  # it is gone: nothing more can be told to it
+        finally:
+            self._close_handles()
+
+    def _close_handles(self) -> None:
+        self._reading.close()
+        if self._writing is not self._reading:
+            self._writing.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise DeviceError("the controller is closed; open a new one")
+
+    def _send(self, output: OutputReport) -> None:
+        report = build_output_report(output, self.identity.transport, self._sequence)
+        self._sequence = (self._sequence + 1) % _SEQUENCES
+        _write(self._writing, report)
+
+
+def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
+    """Handles to read and to write by: two where a device may be opened twice, else one for both.
+
+    hidapi keeps the text of the last failure with each handle and frees it with every call, so that one handle
+    must not be read and written at once (background_writes.py). Both are opened at once, while the path is
+    certainly still this controller's.
+    """
+    handles: list[HidHandle] = []
+    for _ in range(2 if sys.platform == "linux" else 1):
+        handle = backend.device()
+        try:
+            handle.open_path(path)
+        except OSError as error:
+            for opened in handles:
+                opened.close()
+            raise not_opened(path, handle.error() or str(error)) from error
+        handles.append(handle)
+    return handles[0], handles[-1]
+
+
+def _write(handle: HidHandle, report: bytes) -> None:
+    try:
+        written = handle.write(report)
+    except OSError as error:
+        raise gone(str(error)) from error
+    if written < len(report):
+        raise gone(handle.error() or f"{written} of {len(report)} bytes written")
+
+
+def write_once(path: bytes, report: bytes) -> None:
+    """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
+    handle = load_backend().device()
+    try:
+        handle.open_path(path)
+    except OSError as error:
+        raise not_opened(path, handle.error() or str(error)) from error
+    try:
+        _write(handle, report)
+    finally:
+        handle.close()
+
+
+def _ask(handle: HidHandle, path: bytes) -> Identity:
+    """What the controller is; OSError when it goes away meanwhile."""
+    # Bluetooth starts with short reports: this is what ends them, so it comes before the first one is awaited.
+    _feature(handle, FIRMWARE_ID, bytes)
+    first_report = _first_report(handle, path)
+    try:
+        transport = transport_of_input(first_report)
+    except RemoteProtocolError as error:
+        raise no_dualsense(path, str(error)) from error
+    motion = _feature(handle, CALIBRATION_ID, lambda report: MotionCalibration.parse(report, transport))
+    return Identity(
+        transport=transport,
+        address=_feature(handle, ADDRESS_ID, lambda report: parse_address(report, transport)),
+        firmware=_feature(handle, FIRMWARE_ID, lambda report: Firmware.parse(report, transport)),
+        motion=NOMINAL_MOTION if motion is None else motion,
+        first_report=first_report,
+    )
+
+
+def _first_report(handle: HidHandle, path: bytes) -> bytes:
+    for _ in range(_FIRST_REPORT_ATTEMPTS):
+        report = handle.read(_READ_LENGTH, _FIRST_REPORT_MS)
+        if report:
+            return bytes(report)
+    raise silent(path)
+
+
+def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
+    """One feature, read as `parse` does; None when the controller does not answer, or not rightly."""
+    for _ in range(_FEATURE_ATTEMPTS):
+        try:
+            return parse(bytes(handle.get_feature_report(report_id, FEATURE_LENGTHS[report_id])))
+        except (OSError, RemoteProtocolError):
+            continue
+    return None

@@ -1,0 +1,104 @@
+"""Which of the controllers that are there to use: the one from before, on USB rather than Bluetooth."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import DeviceError, NoDeviceError
+from operator_side.dualsense.hid.device import HidBackend, HidDualSense, Identity
+from operator_side.dualsense.hid.device_messages import none_found
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.reports.transport import Transport
+
+LOOKS_FOR_THE_SAME: Final = 3
+"""So many looks in a row are for the controller from before alone; then another one will do."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A place where the system has a controller."""
+
+    path: bytes
+    model: str
+
+
+def sightings(backend: HidBackend) -> list[Sighting]:
+    """Every place once, in the system's order; nothing is opened."""
+    return list(dict.fromkeys(_listed(backend)))  # one that serves several purposes is listed for each
+
+
+class Finder:
+    """One look after the other, for the controller from before: another is taken only when that does not come back."""
+
+    def __init__(self, backend: HidBackend) -> None:
+        self._backend = backend
+        self._looks = 0
+
+    def __call__(self, preferred: str | None) -> OpenController:
+        """A look: `find_controller`, whose `others` is False for the first looks in a row that find nothing."""
+        self._looks += 1
+        found = find_controller(self._backend, preferred, others=self._looks > LOOKS_FOR_THE_SAME)
+        self._looks = 0
+        return found
+
+
+def find_controller(backend: HidBackend, preferred: str | None = None, *, others: bool = True) -> OpenController:
+    """Open the controller of the address `preferred`, else the first; NoDeviceError and DeviceError say why none.
+
+    A controller that is there on USB and on Bluetooth at once is one: USB is taken, the other way is left alone.
+    With a `preferred` one, another is taken only if `others` allows it and none refuses to be opened, for that may be
+    the one: the system gives permission a moment after a controller appears.
+    """
+    seen = sightings(backend)
+    if not seen:
+        raise none_found()
+    opened: list[tuple[Sighting, HidDualSense]] = []
+    failure: DeviceError | None = None
+    for sighting in seen:
+        try:
+            opened.append((sighting, HidDualSense(backend, sighting.path)))
+        except DeviceError as error:
+            failure = failure or error
+    if failure is not None and not opened:
+        raise failure
+    sighting, chosen = min(opened, key=lambda pair: _rank(pair[1].identity, preferred))
+    is_another = preferred is not None and chosen.identity.address != preferred
+    left_alone = is_another and (failure is not None or not others)
+    for _, other in opened:
+        if left_alone or other is not chosen:
+            other.close()
+    if left_alone:
+        raise failure or NoDeviceError(
+            f"the controller {preferred} is not there, only another: {chosen.identity.address}"
+        )
+    transport = chosen.identity.transport
+    return OpenController(
+        device=chosen,
+        name=described(sighting.model, chosen.identity),
+        address=chosen.identity.address,
+        path=sighting.path,
+        release=build_output_report(RELEASED, transport),
+    )
+
+
+def described(model: str, identity: Identity) -> str:
+    """A controller in a few words."""
+    address = "" if identity.address is None else f" ({identity.address})"
+    return f"{model} on {identity.transport.value}{address}"
+
+
+def _listed(backend: HidBackend) -> Iterator[Sighting]:
+    for product_id, model in PRODUCT_IDS.items():
+        for found in backend.enumerate(SONY_VENDOR_ID, product_id):
+            path = found["path"]
+            if isinstance(path, bytes) and path:
+                yield Sighting(path, model)
+
+
+def _rank(identity: Identity, preferred: str | None) -> tuple[bool, bool]:
+    return (
+        preferred is not None and identity.address != preferred,
+        identity.transport is Transport.BLUETOOTH,
+    )

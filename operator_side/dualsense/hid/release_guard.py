@@ -1,0 +1,154 @@
+"""Our end of the watchdog: start it, tell it which controller to release should we be killed or hang, replace it."""
+
+import contextlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Protocol
+
+_WATCHDOG = "operator_side.dualsense.hid.release_watchdog"
+_END_TIMEOUT_S = 0.5
+MOST_REPLACEMENTS: Final = 3
+"""Whatever ends so many watchdogs will end the next one, too."""
+_LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
+
+
+class Guard(Protocol):
+    """Whoever releases a controller when we cannot."""
+
+    def hold(self, path: bytes, release: bytes) -> None:
+        """From now on, should we die, `release` is to be written to the controller at `path`."""
+        ...
+
+    def let_go(self) -> None:
+        """There is nothing to release any more."""
+        ...
+
+    def beat(self) -> None:
+        """An effect is on, and we live: should no further beat follow in time, we hang."""
+        ...
+
+    def rest(self) -> None:
+        """No effect is on: there are no beats until the next one."""
+        ...
+
+
+class ReleaseGuard:
+    """The watchdog process, from the opening of the context to its end."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._replacements = 0
+        self._held: tuple[bytes, bytes] | None = None
+        self._answers = b""
+        self._given_up = False
+
+    def __enter__(self) -> "ReleaseGuard":
+        self._process = _started()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._process is None:
+            return
+        # It still holds a controller only if that could not be released: then it tries once more.
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        try:
+            self._process.wait(_END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    @property
+    def process_id(self) -> int | None:
+        """The operating system's number for the watchdog; None before it is started."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether there is anybody to release the triggers; False when somebody ended the watchdog."""
+        return self._process is not None and self._process.poll() is None
+
+    def take_notes(self) -> list[str]:
+        """Replace a watchdog that has ended, which takes a few milliseconds; what a person has to know of it, once."""
+        if self._process is None or self._given_up:
+            return []
+        if self.running:
+            return self._refusals()
+        ended, self._process = self._process, None
+        for stream in (ended.stdin, ended.stdout):
+            if stream is not None:
+                stream.close()
+        self._answers = b""
+        if self._replacements < MOST_REPLACEMENTS:
+            self._replacements += 1
+            with contextlib.suppress(OSError):
+                self._process = _started()
+        if self._process is None:
+            self._given_up = True
+            return [f"the watchdog process has ended, and there is no other: {_LEFT_ALONE}"]
+        if self._held is not None:
+            self.hold(*self._held)
+        return ["the watchdog process has ended; another one has taken its place"]
+
+    def hold(self, path: bytes, release: bytes) -> None:
+        """From now on, should we die, `release` is to be written to the controller at `path`."""
+        self._held = (path, release)
+        self._say(f"hold {path.hex()} {release.hex()}")
+
+    def let_go(self) -> None:
+        """There is nothing to release any more."""
+        self._held = None
+        self._say("let-go")
+
+    def beat(self) -> None:
+        """An effect is on, and we live: should no further beat follow in time, we hang."""
+        self._say("beat")
+
+    def rest(self) -> None:
+        """No effect is on: there are no beats until the next one."""
+        self._say("rest")
+
+    def _say(self, line: str) -> None:
+        if self._process is None or self._process.stdin is None:
+            return
+        # Without the watchdog we go on; `running` tells.
+        with contextlib.suppress(OSError):
+            self._process.stdin.write(f"{line}\n".encode("ascii"))
+
+    def _refusals(self) -> list[str]:
+        """What it answered since the last look; nothing is waited for."""
+        if sys.platform == "win32" or self._process is None or self._process.stdout is None:
+            return []
+        self._answers += self._process.stdout.read(4096) or b""
+        *answers, self._answers = self._answers.split(b"\n")
+        return [f"the watchdog process cannot open the controller: {_LEFT_ALONE}"] if b"refused" in answers else []
+
+
+def _started() -> subprocess.Popen[bytes]:
+    process = subprocess.Popen(
+        [sys.executable, *_arguments()],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        bufsize=0,
+        # A Ctrl-C in the terminal must not reach it before us.
+        start_new_session=True,
+    )
+    for stream in (process.stdin, process.stdout):
+        if stream is not None and sys.platform != "win32":
+            os.set_blocking(stream.fileno(), False)  # the loop waits for nobody
+    return process
+
+
+def _arguments() -> list[str]:
+    """How to run the watchdog: as a bare file where it needs nothing but Python itself."""
+    if sys.platform == "linux":
+        return ["-I", "-S", str(Path(__file__).with_name("release_watchdog.py"))]
+    return ["-P", "-m", _WATCHDOG]

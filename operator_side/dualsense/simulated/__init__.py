@@ -1,0 +1,1 @@
+"""A controller made of bytes, with a model of its triggers."""

@@ -1,0 +1,1 @@
+"""Offering a simulated controller to every program on a Linux machine."""

@@ -1,0 +1,128 @@
+"""/dev/uhid as a file, and the loop in which a simulated controller lives on it."""
+
+import contextlib
+import errno
+import os
+import select
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Protocol
+
+from common.clock import Clock
+from common.errors import ConfigurationError, DeviceError
+from common.realtime.pacing import Pacer, wait_for_turn
+from operator_side.dualsense.uhid.controller import UhidController
+from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
+
+UHID_PATH: Final = Path("/dev/uhid")
+
+_IN_A_CONTAINER = "in a container, on its host, and start it with --device=/dev/uhid"
+
+
+class UhidFile:
+    """The open file; closing it lets the device disappear, whichever way the process ends."""
+
+    def __init__(self, path: Path = UHID_PATH) -> None:
+        """Open it; ConfigurationError says in one line what to do where it is missing or not permitted."""
+        self._descriptor: int | None = None
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
+        except FileNotFoundError:
+            raise ConfigurationError(
+                f"no {path}, by which Linux takes virtual controllers: sudo modprobe uhid ({_IN_A_CONTAINER})"
+            ) from None
+        except PermissionError:
+            raise ConfigurationError(
+                f"no permission to open {path}: sudo setfacl -m u:$USER:rw {path}, or as root ({_IN_A_CONTAINER})"
+            ) from None
+        except OSError as error:
+            raise ConfigurationError(
+                f"{path} cannot be opened ({os.strerror(error.errno or 0)}): sudo modprobe uhid ({_IN_A_CONTAINER})"
+            ) from None
+
+    def __enter__(self) -> "UhidFile":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for the kernel to say something; whether it has."""
+        return bool(select.select([self._open_descriptor()], [], [], max(0.0, timeout_s))[0])
+
+    def read(self) -> bytes | None:
+        """One event, or None when there is none."""
+        try:
+            return os.read(self._open_descriptor(), EVENT_LENGTH) or None
+        except BlockingIOError:
+            return None
+
+    def write(self, event: bytes) -> None:
+        """Tell the kernel; DeviceError when it does not have the device."""
+        try:
+            os.write(self._open_descriptor(), event)
+        except OSError as error:
+            reason = os.strerror(error.errno or 0)
+            said = "the kernel has let the controller go" if error.errno == errno.EINVAL else "the kernel refused"
+            raise DeviceError(f"{said} ({reason}); what it says of it: sudo dmesg | grep playstation") from error
+
+    def close(self) -> None:
+        """Close it; safe to call again."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
+
+    def _open_descriptor(self) -> int:
+        if self._descriptor is None:
+            raise DeviceError("/dev/uhid is closed; open it anew")
+        return self._descriptor
+
+
+class EventFile(Protocol):
+    """What the loop uses of it."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for the kernel to say something; whether it has."""
+        ...
+
+    def read(self) -> bytes | None:
+        """One event, or None when there is none."""
+        ...
+
+    def write(self, event: bytes) -> None:
+        """Tell the kernel; DeviceError when it does not have the device."""
+        ...
+
+
+def offer(
+    file: EventFile,
+    controller: UhidController,
+    clock: Clock,
+    period_s: float,
+    going: Callable[[float], bool],
+) -> None:
+    """Plug `controller` in and let it live until `going(now_s)`, asked every `period_s`, says no; unplug it then.
+
+    The kernel is answered as it asks; input reports go out at the deadlines, none made up for.
+    """
+    file.write(controller.plug_in())
+    pacer = Pacer(period_s, clock.now())
+    try:
+        while True:
+            now_s = clock.now()
+            while (event := file.read()) is not None:
+                if (answer := controller.handle(event, now_s)) is not None:
+                    file.write(answer)
+            if pacer.due(now_s):
+                pacer.begin(now_s)
+                if not going(now_s):
+                    break
+                if (report := controller.next_input(now_s)) is not None:
+                    file.write(report)
+            wait_for_turn(pacer, clock, file.wait, spin_s=0.0)
+    finally:
+        with contextlib.suppress(DeviceError):  # the kernel may have let it go before
+            file.write(controller.unplug())

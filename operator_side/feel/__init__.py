@@ -1,0 +1,1 @@
+"""What the fingers get: stiffness becomes trigger effects."""

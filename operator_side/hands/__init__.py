@@ -1,0 +1,1 @@
+"""What the person wants: travel, sticks and buttons become an intent."""

@@ -1,0 +1,71 @@
+"""The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from operator_side.dualsense.reports.controller_state import ControllerState, Stick
+from operator_side.hands.button_map import Action, button_of
+from operator_side.hands.travel_calibration import TravelCalibration
+
+_DEFAULT_CALIBRATION: Final = TravelCalibration()
+
+
+@dataclass(frozen=True)
+class OperatorIntent:
+    """What the operator's hands mean at one moment. Buttons are levels: they are true as long as they are held."""
+
+    l2: float
+    """Calibrated travel, 0 to 1, of the trigger that retreats: L2, unless the sides are swapped."""
+    r2: float
+    """Calibrated travel, 0 to 1, of the trigger that advances."""
+    lateral: Stick
+    """Of the stick that moves across, the left one: right and up positive, within the unit circle."""
+    turning: Stick
+    """Of the stick that turns, the right one."""
+    run: bool
+    arm: bool
+    emergency_stop: bool
+    next_target: bool
+    """One press is one step: whoever counts looks for the change from false to true."""
+    hand_over: bool
+    gripper: Literal[-1, 0, 1]
+    """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
+
+    @property
+    def triggers_released(self) -> bool:
+        """Both triggers are within their dead zones, as arming needs them."""
+        return self.l2 == 0.0 and self.r2 == 0.0
+
+
+def operator_intent(
+    state: ControllerState, calibration: TravelCalibration = _DEFAULT_CALIBRATION, *, swap_sides: bool = False
+) -> OperatorIntent:
+    """Read `state` through the calibration and the button map, with left and right swapped if so asked.
+
+    While the emergency stop is held, every other button counts as not pressed.
+    """
+    held = {action for action, button in button_of(swap_sides=swap_sides).items() if button in state.pressed}
+    if Action.EMERGENCY_STOP in held:
+        held = {Action.EMERGENCY_STOP}
+    gripper: Literal[-1, 0, 1] = 0
+    if (Action.CLOSE_GRIPPER in held) != (Action.OPEN_GRIPPER in held):
+        gripper = 1 if Action.CLOSE_GRIPPER in held else -1
+    l2, r2 = calibration.l2.travel(state.l2), calibration.r2.travel(state.r2)
+    left, right = (
+        calibration.left_stick.deflection(state.left_stick),
+        calibration.right_stick.deflection(state.right_stick),
+    )
+    if swap_sides:
+        l2, r2, left, right = r2, l2, right, left
+    return OperatorIntent(
+        l2=l2,
+        r2=r2,
+        lateral=left,
+        turning=right,
+        run=Action.RUN in held,
+        arm=Action.ARM in held,
+        emergency_stop=Action.EMERGENCY_STOP in held,
+        next_target=Action.NEXT_TARGET in held,
+        hand_over=Action.HAND_OVER in held,
+        gripper=gripper,
+    )

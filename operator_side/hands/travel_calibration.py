@@ -1,0 +1,85 @@
+"""Where one controller's triggers and sticks begin and end: raw travel to calibrated travel."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from operator_side.dualsense.effects.official import ZONE_COUNT
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Stick
+
+LARGEST_REST: Final = 0.3
+"""A stick that rests farther from its centre is broken, or held."""
+LEAST_SPAN: Final = 0.2
+"""Of a trigger's raw travel between released and fully pulled: with less, a few counts would be full speed."""
+_ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class TriggerTravel:
+    """Which part of one trigger's raw travel counts."""
+
+    dead_zone: float = 0.05
+    """A trigger up to this is released."""
+    saturation: float = 0.98
+    """A trigger from this on is fully pulled."""
+
+    def __post_init__(self) -> None:
+        # The second part is false for NaN, too.
+        if not (self.dead_zone >= 0.0 and self.dead_zone + LEAST_SPAN <= self.saturation <= 1.0):
+            raise ValueError(
+                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone, at least"
+                f" {LEAST_SPAN} below saturation, <= 1"
+            )
+
+    def travel(self, raw: float) -> float:
+        """Calibrated travel, 0 to 1, from the raw one; exactly 0 within the dead zone."""
+        return min(max((raw - self.dead_zone) / (self.saturation - self.dead_zone), 0.0), 1.0)
+
+    def raw(self, travel: float) -> float:
+        """The raw travel of a calibrated one, 0 to 1; the end of the dead zone for 0."""
+        return min(self.dead_zone + travel * (self.saturation - self.dead_zone), self.saturation)
+
+    @property
+    def reachable_zones(self) -> int:
+        """How many of the effects' ten zones a full pull enters: what lies beyond is not felt."""
+        return max(1, math.ceil(ZONE_COUNT * SENSED_TRAVEL * self.saturation - _ROUNDING))
+
+
+@dataclass(frozen=True)
+class StickRest:
+    """Where one stick rests."""
+
+    x: float = 0.0
+    """Where it rests, right positive: worn sticks do not come back to the centre."""
+    y: float = 0.0
+    """And up positive."""
+    dead_zone: float = 0.1
+    """A stick within this radius of its rest is at rest."""
+
+    def __post_init__(self) -> None:
+        if not math.hypot(self.x, self.y) <= LARGEST_REST:  # false for NaN, too
+            raise ValueError(f"x = {self.x}, y = {self.y}; valid: within {LARGEST_REST} of the centre")
+        if not 0.0 <= self.dead_zone < 1.0 - math.hypot(self.x, self.y):
+            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1, less how far off it rests")
+
+    def deflection(self, raw: Stick) -> Stick:
+        """The deflection from the rest without the dead zone: its radius ends at 1 in every direction."""
+        x, y = raw[0] - self.x, raw[1] - self.y
+        radius = math.hypot(x, y)
+        if radius <= self.dead_zone:
+            return 0.0, 0.0
+        # So much is left towards the side to which it rests; on the other one it ends early.
+        span = 1.0 - math.hypot(self.x, self.y) - self.dead_zone
+        scale = min((radius - self.dead_zone) / span, 1.0) / radius
+        # Rounding must not leave the range.
+        return min(max(x * scale, -1.0), 1.0), min(max(y * scale, -1.0), 1.0)
+
+
+@dataclass(frozen=True)
+class TravelCalibration:
+    """One controller's triggers and sticks, as they are on it, whatever each is used for."""
+
+    l2: TriggerTravel = field(default_factory=TriggerTravel)
+    r2: TriggerTravel = field(default_factory=TriggerTravel)
+    left_stick: StickRest = field(default_factory=StickRest)
+    right_stick: StickRest = field(default_factory=StickRest)

@@ -1,0 +1,1 @@
+"""A scripted person who pulls, feels and looks."""

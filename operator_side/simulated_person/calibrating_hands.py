@@ -1,0 +1,35 @@
+"""Hands that do what the calibration asks for, on a simulated controller."""
+
+import math
+from typing import Final
+
+from operator_side.calibration.procedure import Step
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+
+_PULL_S: Final = 0.8
+_TURN_S: Final = 1.5
+
+
+class CalibratingHands:
+    """Pulls, lets go, and moves the sticks, as each step wants it."""
+
+    def __init__(self, device: SimulatedDualSense) -> None:
+        self._device = device
+        self._step: Step | None = None
+        self._since_s = 0.0
+
+    def act(self, step: Step, now_s: float) -> None:
+        """Do at `now_s` what `step` asks for."""
+        if step is not self._step:
+            self._step, self._since_s = step, now_s
+        elapsed_s = now_s - self._since_s
+        # Half the time pulled, half let go, the first thing a moment of thought.
+        pulling = elapsed_s % _PULL_S > 0.5 * _PULL_S
+        force_n = NORMAL_FINGER_FORCE_N if pulling else 0.0
+        self._device.set_finger_force(force_n * (step is Step.PULL_L2), force_n * (step is Step.PULL_R2))
+        stick = (0.0, 0.0)
+        if step is Step.STICKS:
+            angle = 2.0 * math.pi * elapsed_s / _TURN_S
+            stick = (math.cos(angle), math.sin(angle))
+        self._device.set_sticks(left=stick, right=stick)
