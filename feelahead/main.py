@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 
 from common.command.command_line import run_command
 from common.errors import ConfigurationError
-from feelahead.bench import bench
-from feelahead.calibrate import calibrate
-from feelahead.demo import demo
-from feelahead.doctor.command import doctor
-from feelahead.keys import keys
-from feelahead.virtual_dualsense import virtual_dualsense
+from feelahead.commands.bench import bench
+from feelahead.commands.calibrate import calibrate
+from feelahead.commands.demo import demo
+from feelahead.commands.doctor.command import doctor
+from feelahead.commands.keys import keys
+from feelahead.commands.virtual_dualsense import virtual_dualsense
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),

@@ -11,8 +11,8 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from feelahead.benchmarks.delay_estimates import COLUMNS, command, goals
-from feelahead.benchmarks.delay_peers import (
+from feelahead.benchmarks.delay.estimates import COLUMNS, command, goals
+from feelahead.benchmarks.delay.peers import (
     PEERS,
     Stamps,
     best_of_eight,
@@ -20,8 +20,8 @@ from feelahead.benchmarks.delay_peers import (
     line_through_least_round_trips,
     mean_of_offsets,
 )
-from feelahead.benchmarks.delay_runs import Outcome, measure, quantile_of_sizes, rms
-from feelahead.benchmarks.delay_traffic import OperatorClock, Scenario, Traffic, Way, scenarios
+from feelahead.benchmarks.delay.runs import Outcome, measure, quantile_of_sizes, rms
+from feelahead.benchmarks.delay.traffic import OperatorClock, Scenario, Traffic, Way, scenarios
 
 
 def stamps(there_s: FloatArray, back_s: FloatArray, ahead_s: float, skew: float = 0.0) -> Stamps:
@@ -133,7 +133,7 @@ def test_bad_arguments_are_one_line(arguments: list[str], complaint: str) -> Non
 
 def test_it_runs_as_a_module_and_refuses_with_code_2() -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "feelahead.benchmarks.delay_estimates", "--runs", "-3"],
+        [sys.executable, "-m", "feelahead.benchmarks.delay.estimates", "--runs", "-3"],
         capture_output=True,
         text=True,
         timeout=60,

@@ -6,10 +6,10 @@ import pytest
 
 import feelahead.main
 from common.errors import ConfigurationError
-from feelahead.benchmarks.dualsense_conduct import Conduct
-from feelahead.benchmarks.dualsense_ours import Ours
-from feelahead.benchmarks.dualsense_peer import PyDualSense
-from feelahead.generated_part import BEGIN, END
+from feelahead.benchmarks.dualsense.conduct import Conduct
+from feelahead.benchmarks.dualsense.ours import Ours
+from feelahead.benchmarks.dualsense.peer import PyDualSense
+from feelahead.documents.generated_part import BEGIN, END
 from operator_side.dualsense.reports.transport import Transport
 
 BOTH = {Transport.USB: True, Transport.BLUETOOTH: True}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.benchmarks.effect_latency import (
+from feelahead.benchmarks.effects.effect_latency import (
     EffectLatencySettings,
     StampingBackend,
     Stamps,

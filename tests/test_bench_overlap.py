@@ -14,18 +14,18 @@ from rich.progress import Progress
 
 import feelahead.main
 from common.errors import ConfigurationError
-from feelahead.benchmarks import overlap_peers
-from feelahead.benchmarks.overlap_accuracy import draw_samples, measure_accuracy
-from feelahead.benchmarks.overlap_approximations import monte_carlo, quadrature, satellite_points, satellites, voxels
-from feelahead.benchmarks.overlap_classes import MAKERS, frozen_classes
-from feelahead.benchmarks.overlap_goals import judge
-from feelahead.benchmarks.overlap_ours import kernel_volumes
-from feelahead.benchmarks.overlap_pairs import Pairs, Solid
-from feelahead.benchmarks.overlap_peers import HeaderPeer, PythonPeer, package_corners
-from feelahead.benchmarks.overlap_report import COLUMNS, Goal, Report, short
-from feelahead.benchmarks.overlap_speed import TRIVIAL, partial_pairs, trivial_pairs
-from feelahead.benchmarks.overlap_stress import count_failures
-from feelahead.benchmarks.overlap_tiny import measure_tiny
+from feelahead.benchmarks.overlap import peers as overlap_peers
+from feelahead.benchmarks.overlap.accuracy import draw_samples, measure_accuracy
+from feelahead.benchmarks.overlap.approximations import monte_carlo, quadrature, satellite_points, satellites, voxels
+from feelahead.benchmarks.overlap.classes import MAKERS, frozen_classes
+from feelahead.benchmarks.overlap.goals import judge
+from feelahead.benchmarks.overlap.ours import kernel_volumes
+from feelahead.benchmarks.overlap.pairs import Pairs, Solid
+from feelahead.benchmarks.overlap.peers import HeaderPeer, PythonPeer, package_corners
+from feelahead.benchmarks.overlap.speed import TRIVIAL, partial_pairs, trivial_pairs
+from feelahead.benchmarks.overlap.stress import count_failures
+from feelahead.benchmarks.overlap.tiny import measure_tiny
+from feelahead.benchmarks.report import COLUMNS, Goal, Report, short
 
 SMALL = ("--quick", "--adversarial", "196", "--truths", "2", "--timed", "100")
 
@@ -101,7 +101,7 @@ def test_bad_input_is_one_line(arguments: list[str], named: str, valid: str) -> 
 
 
 def test_a_missing_package_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.startswith("feelahead.benchmarks.overlap_")]:
+    for name in [name for name in sys.modules if name.startswith("feelahead.benchmarks.overlap")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "mpmath", None)
     with pytest.raises(ConfigurationError, match=r"mpmath.*pip install 'feelahead\[robot,bench\]'"):

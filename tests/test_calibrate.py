@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import feelahead.calibrate
+import feelahead.commands.calibrate
 import operator_side.main
 from common.errors import ConfigurationError, DeviceError
 from feelahead.main import command
@@ -63,10 +63,10 @@ def handle(monkeypatch: pytest.MonkeyPatch) -> PlayedHandle:
             played.waiting = [build_input_report(state)] if (state := played.hands(played.now_s)) else []
             return played.now_s
 
-    monkeypatch.setattr(feelahead.calibrate, "MonotonicClock", Clock)
-    monkeypatch.setattr("feelahead.calibrate.time.sleep", lambda _: None)
+    monkeypatch.setattr(feelahead.commands.calibrate, "MonotonicClock", Clock)
+    monkeypatch.setattr("feelahead.commands.calibrate.time.sleep", lambda _: None)
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": played}})
-    monkeypatch.setattr(feelahead.calibrate, "load_backend", lambda: backend)
+    monkeypatch.setattr(feelahead.commands.calibrate, "load_backend", lambda: backend)
     return played
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from feelahead.benchmarks.stiffness_source import StiffnessSource
+from feelahead.benchmarks.effects.stiffness_source import StiffnessSource
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble, parse_output_report
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
-from feelahead.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.reports.controller_state import Button

@@ -10,8 +10,8 @@ import pytest
 
 from common.command.command_line import given_fields, parse_settings
 from common.errors import ConfigurationError
-from feelahead import demo as module
-from feelahead.demo import DemoSettings, demo
+from feelahead.commands import demo as module
+from feelahead.commands.demo import DemoSettings, demo
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
 

@@ -9,9 +9,9 @@ import pytest
 from rich.console import Console
 
 from common.errors import ConfigurationError
-from feelahead.doctor import command as doctor_command
-from feelahead.doctor import facts
-from feelahead.doctor.controller_checks import (
+from feelahead.commands.doctor import command as doctor_command
+from feelahead.commands.doctor import facts
+from feelahead.commands.doctor.controller_checks import (
     ControllerSeen,
     HidFacts,
     UhidFacts,
@@ -21,9 +21,9 @@ from feelahead.doctor.controller_checks import (
     check_uhid,
     missing_grants,
 )
-from feelahead.doctor.finding import Finding, Verdict, fit_for_demo
-from feelahead.doctor.machine_checks import PORTS, check_ports, check_realtime
-from feelahead.doctor.python_checks import EXTRAS, OLDEST_PYTHON, check_extra, check_python, modules_of
+from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
+from feelahead.commands.doctor.machine_checks import PORTS, check_ports, check_realtime
+from feelahead.commands.doctor.python_checks import EXTRAS, OLDEST_PYTHON, check_extra, check_python, modules_of
 from feelahead.main import command
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command

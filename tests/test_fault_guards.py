@@ -14,9 +14,9 @@ import common.protocol.session
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import AnyMessage
 from common.protocol.session import SessionEvent, SessionState
-from feelahead.experiments import virtual_session_faults as session_faults
-from feelahead.experiments import virtual_stream_faults as stream_faults
-from feelahead.experiments.fault import Outcome
+from feelahead.experiments.faults import virtual_session_faults as session_faults
+from feelahead.experiments.faults import virtual_stream_faults as stream_faults
+from feelahead.experiments.faults.fault import Outcome
 from robot_side.operators.lease import Lease
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission, Safety

@@ -11,7 +11,7 @@ import pytest
 from common.clock import MonotonicClock
 from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
-from feelahead.processes import SideProcess
+from feelahead.both_sides.processes import SideProcess
 from robot_side.main import KEYS_PERIOD_S
 
 pytestmark = pytest.mark.processes

@@ -1,16 +1,16 @@
 """Rows of the fault table that name real processes and signals. Their times belong to the machine: see
-`python -m feelahead.experiments.faults`; here only that the robot is safe.
+`python -m feelahead.experiments.faults.table`; here only that the robot is safe.
 """
 
 from collections.abc import Iterator
 
 import pytest
 
-from feelahead.experiments import real_faults
-from feelahead.experiments.faults import REAL_ROWS, Row, command
-from feelahead.experiments.first_side import either_side_first
-from feelahead.experiments.rig import Rig
-from feelahead.experiments.unplugged import unplugged
+from feelahead.experiments.faults import real_faults
+from feelahead.experiments.faults.first_side import either_side_first
+from feelahead.experiments.faults.rig import Rig
+from feelahead.experiments.faults.table import REAL_ROWS, Row, command
+from feelahead.experiments.faults.unplugged import unplugged
 
 pytestmark = pytest.mark.processes
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from feelahead.experiments.fault import Fault
-from feelahead.experiments.virtual_session_faults import SESSION_FAULTS
-from feelahead.experiments.virtual_stream_faults import STREAM_FAULTS
+from feelahead.experiments.faults.fault import Fault
+from feelahead.experiments.faults.virtual_session_faults import SESSION_FAULTS
+from feelahead.experiments.faults.virtual_stream_faults import STREAM_FAULTS
 
 
 @pytest.mark.parametrize("fault", [*STREAM_FAULTS, *SESSION_FAULTS], ids=lambda fault: fault.run.__name__)

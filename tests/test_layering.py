@@ -17,26 +17,26 @@ MAY_IMPORT = {
 IO_ROOMS = {
     "zmq": {
         *(f"common/sockets/{part}.py" for part in ("shell", "authentication", "robot", "operator")),
-        "feelahead/benchmarks/link_peers.py",  # times bare ZeroMQ beside ours
+        "feelahead/benchmarks/link/peers.py",  # times bare ZeroMQ beside ours
     },
     "hid": {"operator_side/dualsense/hid/device.py"},
     "hidraw": {"operator_side/dualsense/hid/device.py"},
     "mujoco": {
         "robot_side/simulation/arm.py",
         "robot_side/simulation/scene.py",
-        "feelahead/benchmarks/overlap_distances.py",  # times MuJoCo's distances beside our overlaps
+        "feelahead/benchmarks/overlap/distances.py",  # times MuJoCo's distances beside our overlaps
     },
     "viser": {"operator_side/console.py"},
 }
 CLOCK_READERS = {
     "common/clock.py",  # the clock
-    "feelahead/benchmarks/wake_error.py",  # measures a clock's loop
-    "feelahead/experiments/hostile_input.py",  # drives two real processes
-    "feelahead/calibrate.py",  # shows a real controller to a person
-    "feelahead/demo.py",  # shows two real processes to a person
+    "feelahead/benchmarks/link/wake_error.py",  # measures a clock's loop
+    "feelahead/experiments/hostile/run.py",  # drives two real processes
+    "feelahead/commands/calibrate.py",  # shows a real controller to a person
+    "feelahead/commands/demo.py",  # shows two real processes to a person
     "operator_side/dualsense/hid/release_watchdog.py",  # a bare file that imports nothing of ours
     "robot_side/main.py",  # times its own ticks
-    "feelahead/loopback.py",  # likewise
+    "feelahead/both_sides/loopback.py",  # likewise
 }
 
 

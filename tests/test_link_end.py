@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.timing.clock_offset import MAX_SKEW
-from feelahead.benchmarks.delay_traffic import Estimate, Scenario, Traffic, Way
+from feelahead.benchmarks.delay.traffic import Estimate, Scenario, Traffic, Way
 
 CLOCK = "one clock"
 

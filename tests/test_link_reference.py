@@ -8,8 +8,8 @@ import pytest
 
 from common.emulation.profile import LinkProfile
 from common.errors import ConfigurationError
-from feelahead.benchmarks.link_reference import compare, independent_delays, judge, measure_band, table
-from feelahead.benchmarks.link_samples import LinkSample, distance, play, read_link_sample
+from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band, table
+from feelahead.benchmarks.link.samples import LinkSample, distance, play, read_link_sample
 
 RECORDINGS = Path(__file__).parent / "data" / "netem"
 NORMAL = "delay 50ms 10ms distribution normal"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from feelahead.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 

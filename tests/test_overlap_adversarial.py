@@ -5,11 +5,11 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from feelahead.benchmarks.overlap_accuracy import Sample, depths, draw_samples
-from feelahead.benchmarks.overlap_classes import frozen_classes
-from feelahead.benchmarks.overlap_contact import contacts
-from feelahead.benchmarks.overlap_pairs import Pairs
-from feelahead.benchmarks.overlap_stress import (
+from feelahead.benchmarks.overlap.accuracy import Sample, depths, draw_samples
+from feelahead.benchmarks.overlap.classes import frozen_classes
+from feelahead.benchmarks.overlap.contact import contacts
+from feelahead.benchmarks.overlap.pairs import Pairs
+from feelahead.benchmarks.overlap.stress import (
     LARGE_ERROR,
     Counts,
     asymmetry,

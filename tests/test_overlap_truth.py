@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from feelahead.benchmarks.overlap_classes import frozen_classes
-from feelahead.benchmarks.overlap_contact import contacts, exact_contact
-from feelahead.benchmarks.overlap_meshes import torus
-from feelahead.benchmarks.overlap_pairs import Pairs
-from feelahead.benchmarks.overlap_truth import Truth, true_mesh_overlap, true_overlap, true_overlaps
+from feelahead.benchmarks.overlap.classes import frozen_classes
+from feelahead.benchmarks.overlap.contact import contacts, exact_contact
+from feelahead.benchmarks.overlap.meshes import torus
+from feelahead.benchmarks.overlap.pairs import Pairs
+from feelahead.benchmarks.overlap.truth import Truth, true_mesh_overlap, true_overlap, true_overlaps
 from tests.overlap_reference import Polyhedron
 
 CLASSES = frozen_classes(1)

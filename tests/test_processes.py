@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.processes import SideProcess
+from feelahead.both_sides.processes import SideProcess
 
 pytestmark = pytest.mark.processes
 

@@ -5,7 +5,7 @@ import pytest
 
 from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
-from feelahead.experiments.session_bench import Bench
+from feelahead.experiments.faults.session_bench import Bench
 from robot_side.settings import EnlargementOptions, RobotSettings
 
 

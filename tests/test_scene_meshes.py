@@ -316,7 +316,7 @@ def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch
 
 def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     program = (
-        "import feelahead.loopback, robot_side.main\n"
+        "import feelahead.both_sides.loopback, robot_side.main\n"
         "from robot_side.assembly import build_robot_side\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
         "from robot_side.settings import RobotSettings\n"

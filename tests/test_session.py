@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
-from feelahead.generated_part import BEGIN, END, with_generated_part
-from feelahead.session_diagram import DOCUMENT, diagram, generated, table
+from feelahead.documents.generated_part import BEGIN, END, with_generated_part
+from feelahead.documents.session_diagram import DOCUMENT, diagram, generated, table
 
 CHANGING = [row for row in TRANSITIONS if row.after is not row.before]
 WAYS_IN = (SessionEvent.ASKED_WHILE_FREE, SessionEvent.LEASE_PASSED)
@@ -108,7 +108,9 @@ def test_the_reason_is_that_of_the_last_row() -> None:
 
 def test_the_document_shows_the_table_as_it_is() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert with_generated_part(text, generated()) == text, "out of date: python -m feelahead.session_diagram --write"
+    assert with_generated_part(text, generated()) == text, (
+        "out of date: python -m feelahead.documents.session_diagram --write"
+    )
 
 
 def test_a_changed_row_changes_the_document() -> None:
@@ -124,7 +126,7 @@ def test_a_document_without_marks_is_refused() -> None:
 @pytest.mark.parametrize(("flag", "code"), [("--writ", 2), ("--help", 0)])
 def test_the_command_says_what_it_takes(flag: str, code: int) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "feelahead.session_diagram", flag], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "feelahead.documents.session_diagram", flag], capture_output=True, text=True, check=False
     )
     assert done.returncode == code
     assert "--write" in done.stdout + done.stderr

@@ -1,7 +1,7 @@
 import copy
 from typing import Any
 
-from feelahead.summary import merge_summaries
+from feelahead.both_sides.summary import merge_summaries
 
 ROBOT: dict[str, Any] = {
     "ticks": 10_000,

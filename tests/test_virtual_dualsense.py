@@ -11,8 +11,7 @@ import pytest
 
 from common.clock import VirtualClock
 from common.errors import ConfigurationError
-from feelahead.main import command
-from feelahead.virtual_dualsense import (
+from feelahead.commands.virtual_dualsense import (
     DRIVER_PATIENCE_S,
     PULL_PERIOD_S,
     VirtualDualSenseSettings,
@@ -21,6 +20,7 @@ from feelahead.virtual_dualsense import (
     pulling,
     virtual_dualsense,
 )
+from feelahead.main import command
 from operator_side.dualsense.effects.official import Feedback, Off
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.feature_report import parse_address

@@ -24,7 +24,7 @@ from rich.table import Table
 from common.command.command_line import parse_settings, run_command
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
-from feelahead.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import PersonSettings
 from robot_side.settings import RobotSettings

@@ -28,9 +28,9 @@ from rich.table import Table
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings, run_command
 from common.emulation.spec import LinkSpec
-from feelahead.loopback import Loopback, LoopbackSettings
-from feelahead.processes import SideProcess
-from feelahead.summary import merge_summaries
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.summary import merge_summaries
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 

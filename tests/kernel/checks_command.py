@@ -16,7 +16,9 @@ from tests.kernel.waiting import require, wait_until
 
 _START_S = 60.0
 # Not all of `feelahead`, whose other commands an emulated processor would load for long.
-_COMMAND = "import sys; from feelahead.virtual_dualsense import virtual_dualsense as v; sys.exit(v(sys.argv[1:]))"
+_COMMAND = (
+    "import sys; from feelahead.commands.virtual_dualsense import virtual_dualsense as v; sys.exit(v(sys.argv[1:]))"
+)
 
 
 def lives(variant: Variant) -> str:

@@ -1,0 +1,1 @@
+"""Clock offsets and one-way delays against the truth."""

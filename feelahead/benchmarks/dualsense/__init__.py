@@ -1,0 +1,1 @@
+"""The controller's driver beside pydualsense."""

@@ -1,0 +1,1 @@
+"""The emulated link beside netem, and how late a loop wakes."""

@@ -1,0 +1,1 @@
+"""Run time against error of the exact overlaps."""

@@ -1,0 +1,132 @@
+"""Both sides in one process in virtual time: the same cores, bytes and delay lines; no sockets, no sleeps.
+
+Everything happens at the instant when it is due, in order of time, so that the same settings and seed give
+the same numbers on every machine.
+"""
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from common.clock import VirtualClock
+from common.emulation.delay_line import DelayLine, link_summary
+from common.emulation.spec import Stream
+from common.statistics import RunningStatistics
+from feelahead.both_sides.summary import merge_summaries
+from operator_side.core import OperatorSide
+from operator_side.dualsense.hid.connection import Connection
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.search import Ready
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.main import MOTION_PERIOD_S
+from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.person import SimulatedOperator
+from robot_side.assembly import build_robot_side
+from robot_side.core import RobotSide
+from robot_side.figures import tick_microseconds
+from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
+from robot_side.overlap.kernels import warm_up
+from robot_side.settings import RobotSettings
+
+_PEER = b"loopback"
+_VIRTUAL_CLOCK = "virtual"
+
+
+@dataclass(frozen=True)
+class LoopbackSettings:
+    """What each side is set to; the links, seeds and durations of the two need not agree."""
+
+    robot: RobotSettings = field(default_factory=RobotSettings)
+    operator: OperatorSettings = field(default_factory=OperatorSettings)
+
+
+class Loopback:
+    """Two cores, a controller with a person, and the link between them, driven by one virtual clock."""
+
+    def __init__(self, settings: LoopbackSettings) -> None:
+        self.clock = VirtualClock()
+        self.robot: RobotSide = build_robot_side(settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK)
+        # After the scene, which decides what kernels there are.
+        warm_up()
+        self.operator = OperatorSide(
+            2,
+            _VIRTUAL_CLOCK,
+            haptics=settings.operator.haptics,
+            calibration=settings.operator.calibration,
+            rendering=settings.operator.rendering,
+            swap_sides=settings.operator.swap_sides,
+            seed=settings.operator.seed,
+            asymmetry_s=settings.operator.asymmetry_s(),
+        )
+        self.device = SimulatedDualSense()
+        self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
+        self.person = SimulatedOperator(
+            self.device,
+            settings.operator.person,
+            settings.operator.seed,
+            settings.operator.calibration,
+            swap_sides=settings.operator.swap_sides,
+        )
+        self.tick_time = RunningStatistics(settings.robot.seed)
+        there, back = settings.operator.link_spec(), settings.robot.link_spec()
+        self._to_robot: DelayLine[bytes] = DelayLine(there.profile("to_robot"))
+        self._to_operator: dict[Stream, DelayLine[bytes]] = {
+            stream: DelayLine(back.profile("to_operator", stream)) for stream in SENT_STREAMS
+        }
+        self._ticks = 0
+        self._motions = 0
+
+    def run_until(self, end_s: float) -> None:
+        """Let time pass up to `end_s`, on the virtual clock."""
+        while (due_s := self._next_event()) <= end_s:
+            self.clock.advance_to(due_s)
+            self._deliver(due_s)
+            if due_s >= self._motions * MOTION_PERIOD_S:
+                self._motions += 1
+                self._operator_tick(due_s)
+            if due_s >= self._ticks * TICK_PERIOD_S:
+                self._ticks += 1
+                self._robot_tick(due_s)
+            self._deliver(due_s)
+            if (output := self.operator.output_report(due_s)) is not None:
+                self.connection.write(output, due_s)
+        self.clock.advance_to(end_s)
+
+    def summary(self) -> dict[str, Any]:
+        """As the demo's, but for the tick times, which are real and differ from run to run."""
+        merged = merge_summaries(self.robot.summary(), self.operator.summary(), [])
+        merged["duration_s"] = self.clock.now()
+        merged["tick_us"] = tick_microseconds(self.tick_time)
+        merged["link"] = link_summary("to_robot", {"haptics": self._to_robot}) | link_summary(
+            "to_operator", self._to_operator
+        )
+        return merged
+
+    def _next_event(self) -> float:
+        dues = [self._ticks * TICK_PERIOD_S, self._motions * MOTION_PERIOD_S]
+        dues += [due for line in (self._to_robot, *self._to_operator.values()) if (due := line.next_due()) is not None]
+        # A message that was due at once, in the middle of an instant, must not turn the clock back.
+        return max(min(dues), self.clock.now())
+
+    def _deliver(self, now_s: float) -> None:
+        for payload in self._to_robot.pop(now_s):
+            self.robot.receive(_PEER, payload, now_s)
+        for payload in self._to_operator["haptics"].pop(now_s):
+            self.operator.receive(payload, now_s)
+        for payload in self._to_operator["telemetry"].pop(now_s):
+            self.operator.receive_view(payload, now_s)
+
+    def _operator_tick(self, now_s: float) -> None:
+        self.person.tick(now_s, self.operator.screen, self.operator.link.round_trip.mean or 0.0)
+        self.connection.update(now_s)
+        if (report := self.connection.read(now_s)) is not None:
+            self.operator.read_report(report, now_s)
+        for payload in self.operator.motion(now_s):
+            self._to_robot.push(now_s, payload)
+
+    def _robot_tick(self, now_s: float) -> None:
+        start_s = time.perf_counter()
+        outgoing = self.robot.tick(now_s)
+        self.tick_time.add(time.perf_counter() - start_s)
+        for message in outgoing:
+            self._to_operator[message.stream].push(now_s, message.payload)

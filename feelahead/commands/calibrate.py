@@ -1,0 +1,162 @@
+"""`feelahead calibrate`: measure where a controller's triggers and sticks begin and end, and keep it."""
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+from rich.live import Live
+
+from common.clock import Clock, MonotonicClock, VirtualClock
+from common.command.command_line import parse_settings
+from common.command.stop_signal import StopSignal
+from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
+from feelahead.commands.calibration_screen import calibration_lines, calibration_screen
+from operator_side.calibration.procedure import CalibrationProcedure, Step
+from operator_side.calibration.store import calibration_path, place_to_write, write_calibration
+from operator_side.dualsense.hid.device import load_backend
+from operator_side.dualsense.hid.finding import find_controller
+from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.simulated_person.calibrating_hands import CalibratingHands
+
+_POLL_S = 0.002
+_SHOW_S = 0.05
+_SILENT_S = 5.0
+
+
+@dataclass(frozen=True)
+class CalibrateSettings:
+    """Measure one controller's triggers and sticks: half a minute with the controller in your hands.
+
+    It says what to do, and shows what the controller reports. What it finds is kept for that controller, on USB and
+    Bluetooth alike, in your configuration folder, where feelahead-operator looks for it.
+    """
+
+    device: Literal["hid", "simulated"] = "hid"
+    """A real controller, or a simulated one with simulated hands, of which nothing is kept but with --out."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Write it there instead: a new file in a folder that is there, or one that is replaced."""
+
+
+def calibrate(arguments: Sequence[str]) -> int:
+    """Run the calibration; exit code 1 when it was given up, and nothing is stored."""
+    settings = parse_settings(CalibrateSettings, "feelahead calibrate", arguments)
+    if settings.out is not None:
+        place_to_write(settings.out, f"--out {settings.out}")
+    clock: Clock
+    if settings.device == "simulated":
+        clock, simulated = VirtualClock(), SimulatedDualSense()
+        controller = OpenController(simulated, "simulated DualSense", simulated.address)
+        hands: CalibratingHands | None = CalibratingHands(simulated)
+        kept_at = settings.out
+    else:
+        clock, hands = MonotonicClock(), None
+        controller = find_controller(load_backend())
+        kept_at = settings.out
+        if kept_at is None and controller.address is not None:
+            kept_at = calibration_path(controller.address)
+    console = Console()
+    procedure = CalibrationProcedure()
+    with StopSignal() as stop:
+        try:
+            if controller.address is None:
+                raise ConfigurationError(
+                    f"{controller.name} does not tell its address, by which a calibration is kept; valid: a controller"
+                    " that does"
+                )
+            if kept_at is not None:
+                place_to_write(kept_at)  # before the hands have worked for it
+            console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
+            with _Screen(console) as show:
+                done = _measure(controller.device, procedure, clock, hands, stop, show)
+        finally:
+            controller.device.close()
+    if not done or procedure.result is None:
+        sys.stdout.write("given up: nothing was stored\n")
+        return 1
+    sys.stdout.write("\n".join(calibration_lines(procedure.result)) + "\n")
+    if kept_at is None:
+        sys.stdout.write("simulated: nothing was stored (--out FILE.toml stores it)\n")
+        return 0
+    write_calibration(kept_at, controller.address, procedure.result)
+    used = "feelahead-operator uses it from now on"
+    if settings.out is not None:
+        used = f"feelahead-operator looks for it at {calibration_path(controller.address)}"
+    sys.stdout.write(f"stored: {kept_at}; {used}\n")
+    return 0
+
+
+Show = Callable[[CalibrationProcedure, ControllerState, float], None]
+
+
+def _measure(
+    device: Device,
+    procedure: CalibrationProcedure,
+    clock: Clock,
+    hands: CalibratingHands | None,
+    stop: StopSignal,
+    show: Show,
+) -> bool:
+    """Feed the procedure until it is done; False when it was stopped. CalibrationError and DeviceError say why not."""
+    start_s = heard_s = clock.now()
+    # An effect that somebody left on would count as travel that cannot be reached.
+    device.write(build_output_report(RELEASED), start_s)
+    while procedure.step is not Step.DONE:
+        if stop.is_set:
+            return False
+        now_s = clock.now()
+        if hands is not None:
+            hands.act(procedure.step, now_s)
+        if (report := device.read(now_s)) is not None:
+            heard_s = now_s
+            try:
+                state = parse_input_report(report)
+            except RemoteProtocolError:
+                continue
+            procedure.feed(state, now_s)
+            show(procedure, state, now_s)
+        elif now_s - heard_s > _SILENT_S:
+            raise DeviceError(f"the controller has said nothing for {_SILENT_S:.0f} s: plug it in again and start anew")
+        if isinstance(clock, VirtualClock):
+            clock.advance_to(now_s + _POLL_S)
+        else:
+            time.sleep(_POLL_S)
+    return True
+
+
+class _Screen:
+    """Live bars on a terminal; elsewhere one line for each step and complaint."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
+        self._next_s: float | None = None
+        self._said: tuple[Step, str | None] | None = None
+
+    def __enter__(self) -> Show:
+        if self._live is not None:
+            self._live.start()
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def _show(self, procedure: CalibrationProcedure, state: ControllerState, now_s: float) -> None:
+        said = procedure.step, procedure.complaint
+        if self._live is not None:
+            if self._next_s is None or now_s >= self._next_s or said != self._said:
+                self._next_s = now_s + _SHOW_S
+                self._live.update(calibration_screen(procedure, state), refresh=True)
+        elif said != self._said:
+            sys.stdout.write(f"{procedure.complaint or procedure.step.value}\n")
+            sys.stdout.flush()
+        self._said = said

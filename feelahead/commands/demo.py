@@ -1,0 +1,213 @@
+"""`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from common.command.command_line import given_fields, parse_settings
+from common.command.run_options import RunOptions
+from common.command.status import Status, Value
+from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.emulation.figures import report_lines
+from common.emulation.spec import Direction, Stream, unused_clauses
+from feelahead.both_sides.processes import SideFailedError, SideProcess
+from feelahead.both_sides.summary import merge_summaries
+
+_START_TIMEOUT_S = 90.0
+"""The first start compiles the overlap kernels."""
+_LINK_TIMEOUT_S = 30.0
+_SENT: tuple[tuple[Direction, Stream], ...] = (
+    ("to_robot", "haptics"),
+    ("to_operator", "haptics"),
+    ("to_operator", "telemetry"),
+)
+"""What the two sides send to each other."""
+
+
+@dataclass(frozen=True)
+class DemoSettings(RunOptions):
+    """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
+
+    The person arms the arm, pulls R2 to advance towards the target, feels the trigger stiffen as things come
+    near, grasps the target and lifts it. Nothing is needed but this machine.
+
+    Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
+    """
+
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 20.0
+    """How long to run from the moment that the link is up."""
+    probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
+    """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    haptics: bool = True
+    """Whether the triggers are stiffened; without, the same person sees only."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
+    """Any MJCF arm with actuators instead of the built-in one."""
+    site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """The model's site between the fingertips, its z axis along the approach."""
+    realtime: bool = False
+    """Real-time scheduling and locked memory for both sides, where that is permitted."""
+    console: bool = True
+    """The browser console. It is not there yet: the status line is all there is to see."""
+    robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """More settings for the robot side: see feelahead-robot --help."""
+    operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """More settings for the operator side: see feelahead-operator --help."""
+
+
+def demo(arguments: Sequence[str]) -> int:
+    """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
+    settings = parse_settings(DemoSettings, "feelahead demo", arguments)
+    given = given_fields(arguments, DemoSettings)
+    with (
+        tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
+        StopSignal() as stop,
+        Status(settings.status, "feelahead demo") as status,
+    ):
+        for text in unused_clauses(settings.link_spec(), _SENT):
+            status.note(text)
+        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
+        try:
+            errors = _run_both(settings, given, summaries, stop, status)
+        except BrokenPipeError:
+            # Whoever read our status has seen enough; the sides have ended in order.
+            ignore_broken_output()
+            errors = []
+        merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+        if settings.summary is not None:
+            settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
+    for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
+        status.note(line)
+    for error in errors:
+        sys.stderr.write(f"feelahead demo: {error}\n")
+    return 1 if errors else 0
+
+
+def _run_both(
+    settings: DemoSettings, given: Collection[str], summaries: Mapping[str, Path], stop: StopSignal, status: Status
+) -> list[str]:
+    """Start both sides, watch them, and end them; what went wrong."""
+    status.note("starting the robot side (the first start compiles its kernels)")
+    with SideProcess("robot_side", "robot", _robot_arguments(settings, given, summaries["robot"])) as robot:
+        status.event("started", side="robot", process_id=robot.process_id)
+        listening = robot.wait_unless("listening", _START_TIMEOUT_S, stop)
+        if listening is None:
+            return []
+        operator_arguments = _operator_arguments(settings, given, summaries["operator"], listening)
+        with SideProcess("operator_side", "operator", operator_arguments) as operator:
+            status.event("started", side="operator", process_id=operator.process_id)
+            errors = _watch(settings, robot, operator, stop, status)
+            # Both at once: neither is to take the other's end for a fault of the link.
+            operator.interrupt()
+            robot.interrupt()
+            operator.stop()
+            robot.stop()
+            for side in (operator, robot):
+                try:
+                    side.check()
+                except SideFailedError as failure:
+                    if str(failure) not in errors:
+                        errors.append(str(failure))
+    return errors
+
+
+def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
+    arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
+    if settings.robot_config is not None:
+        arguments.append(f"--config={settings.robot_config}")
+    for name in ("model", "site", "probability"):
+        if name in given:
+            arguments.append(f"--{name}={getattr(settings, name)}")
+    return arguments
+
+
+def _operator_arguments(
+    settings: DemoSettings, given: Collection[str], summary: Path, listening: dict[str, Any]
+) -> list[str]:
+    arguments = [*_shared_arguments(settings, given, summary), "--device=simulated"]
+    if settings.operator_config is not None:
+        arguments.append(f"--config={settings.operator_config}")
+    arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
+    if "haptics" in given:
+        arguments.append("--haptics" if settings.haptics else "--no-haptics")
+    return arguments
+
+
+def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
+    """Only what somebody asked for: the sides' own files are to count where nothing was."""
+    arguments = [
+        f"--{name.replace('_', '-')}={getattr(settings, name)}"
+        for name in ("link", "link_model", "link_correlation", "asymmetry", "seed")
+        if name in given
+    ]
+    if "realtime" in given:
+        arguments.append("--realtime" if settings.realtime else "--no-realtime")
+    return [*arguments, f"--summary={summary}"]
+
+
+def _watch(
+    settings: DemoSettings, robot: SideProcess, operator: SideProcess, stop: StopSignal, status: Status
+) -> list[str]:
+    """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
+    start_s = time.monotonic()
+    linked_s: float | None = None
+    values: dict[str, Value] = {}
+    while not stop.is_set:
+        now_s = time.monotonic()
+        for side in (robot, operator):
+            for event in side.events():
+                if event["event"] == "status":
+                    values |= {name: value for name, value in event.items() if name != "event"}
+                elif event["event"] == "note":
+                    status.note(f"{side.name}: {event['text']}")
+            if not side.running:
+                try:
+                    side.check()
+                except SideFailedError as error:
+                    return [str(error)]
+                return [f"the {side.name} side ended early"]
+        if linked_s is None:
+            if values.get("link") == "up":
+                linked_s = now_s
+            elif now_s - start_s > _LINK_TIMEOUT_S:
+                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s"]
+        elif settings.duration is not None and now_s - linked_s >= settings.duration:
+            break
+        status.show(now_s, values)
+        time.sleep(0.02)
+    return []
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """A side's summary; empty when it did not live to write one, which `errors` then says."""
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError):
+        return {}
+    return content
+
+
+def _report(summary: dict[str, Any]) -> list[str]:
+    """The run in a few lines for people."""
+    if not summary.get("ticks"):
+        return ["ended before the first tick"]
+    delays = summary.get("delay_ms", {})
+    shown = [
+        f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"
+        for name, delay in delays.items()
+        if delay.get("mean") is not None and delay.get("sd") is not None
+    ]
+    task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
+    grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
+    return [
+        f"delay: {', '.join(shown) or 'unknown'}",
+        f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
+        f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
+        f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm; contacts with obstacles: {task['obstacle_contacts']}",
+    ]

@@ -1,0 +1,1 @@
+"""Documents of which a command writes a part."""

@@ -1,0 +1,1 @@
+"""Every row of the fault table, in virtual time and with real processes."""

@@ -1,0 +1,35 @@
+"""Either side first: how long after the robot side listens the operator side stands where it should."""
+
+import socket
+
+from feelahead.both_sides.processes import SideProcess
+from feelahead.experiments.faults.fault import Outcome
+from feelahead.experiments.faults.rig import Rig
+
+_LIMIT_S = 1.0
+_PATIENCE_S = 30.0
+
+
+def either_side_first() -> Outcome:
+    """The operator side first, then another one that finds the robot side there."""
+    control, view = _free_ports()
+    endpoints = [f"--connect=tcp://127.0.0.1:{control}", f"--view-connect=tcp://127.0.0.1:{view}"]
+    with (
+        SideProcess("feelahead.experiments.faults.driver", "driver", endpoints) as early,
+        Rig(f"tcp://127.0.0.1:{control}", [f"--view-bind=tcp://127.0.0.1:{view}"]) as rig,
+    ):
+        first = rig.until(early, "session", "disarmed", "ready")
+        first_s = first["time_s"] - rig.listening_s
+        early.stop()
+        rig.wait(1.0)
+        late = rig.driver()
+        began_s = late.wait_for("driver", _PATIENCE_S)["time_s"]
+        second_s = rig.until(late, "session", "disarmed", "ready")["time_s"] - began_s
+        disarmed = rig.figures()["state"] == "disarmed"
+    measured = f"operator side first: {first_s:.2f} s; robot side first: {second_s:.2f} s; disarmed: {disarmed}"
+    return Outcome(disarmed, measured, in_time=max(first_s, second_s) < _LIMIT_S)
+
+
+def _free_ports() -> tuple[int, int]:
+    with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as other:
+        return int(one.getsockname()[1]), int(other.getsockname()[1])

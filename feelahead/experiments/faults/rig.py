@@ -1,0 +1,188 @@
+"""A watched robot side and drivers, each a process of its own on this machine."""
+
+import json
+import os
+import signal
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from common.clock import MonotonicClock
+from common.errors import FeelaheadError
+from common.protocol.session import OWNING
+from feelahead.both_sides.processes import SideProcess
+
+HEALTHY_S = 0.2
+_START_S = 90.0
+_PATIENCE_S = 10.0
+_CRUISE_S = 0.15
+_ATTEMPTS = 5
+_POLL_S = 0.005
+_REVERSAL_S = 0.05
+"""A deceleration so soon after a command was asked for by that command."""
+
+
+class RigError(FeelaheadError):
+    """What was waited for did not come; the text says what."""
+
+
+class Rig:
+    """One robot side, and as many drivers as are asked for; all of them end with the context."""
+
+    def __init__(self, bind: str = "tcp://127.0.0.1:0", flags: Sequence[str] = (), before: Sequence[str] = ()) -> None:
+        """`before` is a command in whose surroundings the robot side is to run."""
+        self.clock = MonotonicClock()
+        self._folder = tempfile.TemporaryDirectory(prefix="feelahead-faults-")
+        self._log = Path(self._folder.name) / "log.jsonl"
+        self._log.touch()
+        self._reader = self._log.open(encoding="utf-8")
+        self._rest = ""
+        self._drivers: list[SideProcess] = []
+        self._started = 0
+        self.owned_s: dict[int, float] = {}
+        """When each driver, by its process, learnt last that it owns the lease."""
+        self._phases: dict[int, dict[str, Any]] = {}
+        self._pause = threading.Event()
+        self.stops: list[str] = []
+        """Why the robot side disarmed, each time that the log was read past it."""
+        arguments = [f"--bind={bind}", f"--log={self._log}", f"--safety.healthy-s={HEALTHY_S}", *flags]
+        self.robot = SideProcess("feelahead.experiments.faults.watched_robot", "robot", arguments, before)
+        try:
+            self.listening = self.robot.wait_for("listening", _START_S)
+        except BaseException:
+            self.close()
+            raise
+        self.listening_s = self.clock.now()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End everything, also what a signal has stopped."""
+        self.end_drivers()
+        _end(self.robot)
+        self._reader.close()
+        self._folder.cleanup()
+
+    def end_drivers(self) -> None:
+        """End all of them, also what a signal has stopped."""
+        for process in self._drivers:
+            _end(process)
+        self._drivers.clear()
+
+    def rounds(self, count: int, advance: Callable[[], None], limit_s: float) -> Iterator[None]:
+        """So many rounds, or as many as begin within `limit_s`; `advance` is called after each."""
+        deadline_s = self.clock.now() + limit_s
+        for _ in range(count):
+            yield
+            advance()
+            if self.clock.now() > deadline_s:
+                return
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass."""
+        self._pause.wait(duration_s)
+
+    def driver(self, control: str | None = None, view: str | None = None, before: Sequence[str] = ()) -> SideProcess:
+        """One more driver, connected to the robot side or to these addresses."""
+        arguments = [
+            f"--connect={control or self.listening['control']}",
+            f"--view-connect={view or self.listening['view']}",
+            f"--healthy-ms={1e3 * HEALTHY_S}",
+        ]
+        # Back and forth, or the arm would run into something in the end.
+        self._started += 1
+        if self._started % 2 == 0:
+            arguments.append("--backward")
+        process = SideProcess("feelahead.experiments.faults.driver", "driver", arguments, before)
+        self._drivers.append(process)
+        return process
+
+    def phase(self, driver: SideProcess) -> dict[str, Any]:
+        """What the driver said last of its hands and its session."""
+        for event in driver.events():
+            if event["event"] == "driver":
+                before = self._phases.get(driver.process_id, {}).get("session")
+                if event["session"] in OWNING and before not in OWNING:
+                    self.owned_s[driver.process_id] = event["time_s"]
+                self._phases[driver.process_id] = event
+        return self._phases.get(driver.process_id, {"phase": "start", "session": "none", "time_s": 0.0})
+
+    def until(self, driver: SideProcess, what: str, *values: str, patience_s: float = _PATIENCE_S) -> dict[str, Any]:
+        """Wait until the driver's `phase` or `session` is one of these; RigError when it takes too long."""
+        deadline_s = self.clock.now() + patience_s
+        while (said := self.phase(driver))[what] not in values:
+            self.robot.check()
+            if self.clock.now() > deadline_s:
+                raise RigError(f"the driver's {what} is {said[what]!r} after {patience_s:g} s; expected: {values}")
+            self.wait(_POLL_S)
+        return said
+
+    def drive(self, driver: SideProcess) -> None:
+        """Have it own, arm and drive, until the arm moves evenly; anew when a busy machine breaks the stream."""
+        self.until(driver, "session", *OWNING)
+        for _ in range(_ATTEMPTS):
+            self.signal(driver, signal.SIGUSR1)
+            self.until(driver, "phase", "drive")
+            self.wait(_CRUISE_S)
+            if self.phase(driver)["phase"] == "drive":
+                return
+        raise RigError(f"the stream broke {_ATTEMPTS} times in {_CRUISE_S:g} s of driving: the machine is too busy")
+
+    def signal(self, process: SideProcess, number: signal.Signals) -> None:
+        """Send it a signal."""
+        os.kill(process.process_id, number)
+
+    def lines(self) -> list[dict[str, Any]]:
+        """What the robot side's log has got since the last call."""
+        *whole, self._rest = (self._rest + self._reader.read()).split("\n")
+        lines = [json.loads(line) for line in whole]
+        self.stops += [line["why"] for line in lines if "stop" in line]
+        return lines
+
+    def until_line(self, key: str, patience_s: float = _PATIENCE_S) -> dict[str, Any]:
+        """The next line of the log with this key; RigError when none comes."""
+        deadline_s = self.clock.now() + patience_s
+        while True:
+            for line in self.lines():
+                if key in line:
+                    return line
+            self.robot.check()
+            if self.clock.now() > deadline_s:
+                raise RigError(f"no {key} in the robot side's log within {patience_s:g} s")
+            self.wait(_POLL_S)
+
+    def figures(self) -> dict[str, Any]:
+        """The robot side's counters from now on."""
+        asked_s = self.clock.now()
+        while (line := self.until_line("figures"))["time"] < asked_s:
+            pass
+        figures: dict[str, Any] = line["figures"]
+        return figures
+
+    def stop_of(self, patience_s: float = 2.0) -> tuple[float | None, float | None]:
+        """When the arm slowed down and when the robot side disarmed, after the newest accepted command, in seconds."""
+        slowed_s = disarmed_s = None
+        deadline_s = self.clock.now() + patience_s
+        while (slowed_s is None or disarmed_s is None) and self.clock.now() < deadline_s:
+            for line in self.lines():
+                if line.get("deceleration") is not None and line["after"] > _REVERSAL_S:
+                    slowed_s = line["after"]
+                elif "stop" in line:
+                    disarmed_s = line["after"]
+            self.wait(_POLL_S)
+        return slowed_s, disarmed_s
+
+
+def _end(process: SideProcess) -> None:
+    if process.running:
+        os.kill(process.process_id, signal.SIGCONT)
+    process.__exit__(None, None, None)

@@ -1,0 +1,174 @@
+"""A robot side in virtual time with operators in our hands; every message arrives at once unless it is kept back."""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.session import SessionState
+from feelahead.experiments.faults.watched_arm import WatchedArm
+from robot_side.arm.port import Arm
+from robot_side.assembly import build_robot_side
+from robot_side.core import RobotSide
+from robot_side.operators.safety import SafetySettings
+from robot_side.settings import RobotSettings
+
+TICK_S = 0.001
+COMMAND_PERIOD_TICKS = 4
+_HELLO_PERIOD_TICKS = 200
+QUICK = RobotSettings(safety=SafetySettings(healthy_s=0.1))
+"""Arms after a tenth of a second, because nobody learns anything from a longer one."""
+CRUISE = 0.4
+"""Travel of R2 at which the built-in arm advances at 0.1 m/s."""
+
+
+class Operator:
+    """One operator's end of the link."""
+
+    def __init__(self, epoch: int, peer: bytes) -> None:
+        self.link = LinkEnd("operator", epoch, "clock")
+        self.peer = peer
+        self.notice: LeaseNotice | None = None
+        self.inbox: list[StiffnessUpdate | Hello | LeaseNotice] = []
+
+    @property
+    def token(self) -> int:
+        """Of the lease, as last heard; 0 before."""
+        return 0 if self.notice is None else self.notice.token
+
+    @property
+    def state(self) -> SessionState:
+        """Where it stands, as last heard."""
+        return SessionState.UNKNOWN if self.notice is None else self.notice.session
+
+    @property
+    def felt(self) -> list[StiffnessUpdate]:
+        """Every stiffness that came."""
+        return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
+
+    def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
+        """Receive one message."""
+        self.inbox.append(message)
+        arrival = self.link.arrived(message, now_s)
+        if isinstance(message, LeaseNotice) and arrival.fresh:
+            self.notice = message
+
+    def command(self, now_s: float, header: Header | None = None, **fields: Any) -> bytes:
+        """A motion command with the triggers released and the run button down, but for `fields`."""
+        content: dict[str, Any] = {"l2": 0.0, "r2": 0.0, "run": True, "token": self.token} | fields
+        return encode(MotionCommand(header or self.link.stamp(now_s), **content))
+
+
+class Bench:
+    """The robot side, what it sent to whom, and what its arm did."""
+
+    def __init__(self, settings: RobotSettings = QUICK) -> None:
+        self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)
+        self.ticks = 0
+        self.operators: dict[bytes, Operator] = {}
+        self.views: list[Telemetry] = []
+        self.applied: dict[int, float] = {}
+        """Sequence numbers of the commands that the arm was to follow, in turn, and how old each was at first."""
+        self.moved_by: set[int] = set()
+        """Their operators' epochs."""
+        self.answer_delay_s = 0.0
+        """How long what the robot side sends is under way."""
+        self._under_way: deque[tuple[float, Operator, StiffnessUpdate | Hello | LeaseNotice]] = deque()
+
+    def _watch(self, arm: Arm) -> Arm:
+        self.arm = WatchedArm(arm, QUICK.safety.gap_s)
+        return self.arm
+
+    @property
+    def now_s(self) -> float:
+        """The virtual time."""
+        return self.ticks * TICK_S
+
+    @property
+    def state(self) -> str:
+        """The robot's."""
+        return self.robot.session.safety.state
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Of the fastest joint, now."""
+        return self.arm.speeds_rad_s[-1][1]
+
+    @property
+    def tool_m(self) -> FloatArray:
+        """(3,) where telemetry shows the tool, 25 ticks from now."""
+        self.tick(25)
+        return np.array(self.views[-1].tool_position_m)
+
+    def operator(self, epoch: int, peer: bytes = b"operator") -> Operator:
+        """Another operator that has not said anything yet; it receives what goes to `peer`."""
+        operator = self.operators[peer] = Operator(epoch, peer)
+        return operator
+
+    def join(self, epoch: int, peer: bytes = b"operator") -> Operator:
+        """Another operator that says Hello, and hears where it stands."""
+        operator = self.operator(epoch, peer)
+        self.say_hello(operator)
+        self.tick()
+        return operator
+
+    def say_hello(self, operator: Operator) -> None:
+        """Its Hello arrives."""
+        self.robot.receive(operator.peer, encode(operator.link.hello(self.now_s)), self.now_s)
+
+    def send(self, operator: Operator, **fields: Any) -> bytes:
+        """Its command arrives; the payload."""
+        payload = operator.command(self.now_s, **fields)
+        self.robot.receive(operator.peer, payload, self.now_s)
+        return payload
+
+    def tick(self, count: int = 1) -> None:
+        """So many milliseconds; what the robot side sends arrives at once."""
+        for _ in range(count):
+            self.ticks += 1
+            for outgoing in self.robot.tick(self.now_s):
+                message = decode(outgoing.payload)
+                if isinstance(message, Telemetry):
+                    self.views.append(message)
+                elif (operator := self.operators.get(outgoing.peer)) is not None and not isinstance(
+                    message, MotionCommand
+                ):
+                    self._under_way.append((self.now_s + self.answer_delay_s, operator, message))
+            while self._under_way and self._under_way[0][0] <= self.now_s:
+                _, receiver, arrived = self._under_way.popleft()
+                receiver.take(arrived, self.now_s)
+            command = self.robot.session.safety.permission(self.now_s).command
+            if command is not None:
+                self.applied.setdefault(command.header.sequence, self.now_s - command.header.sent_s)
+                self.moved_by.add(command.header.epoch)
+
+    def silence(self, duration_s: float) -> None:
+        """Nobody says anything."""
+        self.tick(round(duration_s / TICK_S))
+
+    def drive(self, duration_s: float, operator: Operator, **fields: Any) -> None:
+        """A command each 4 ms, of which the first comes after a tick; those who wait say Hello each 200 ms."""
+        for step in range(round(duration_s / TICK_S)):
+            self.tick()
+            if step % COMMAND_PERIOD_TICKS == 0:
+                self.send(operator, **fields)
+            if step % _HELLO_PERIOD_TICKS == 0:
+                for other in self.operators.values():
+                    if other is not operator and other.state is SessionState.OBSERVING:
+                        self.say_hello(other)
+
+    def arm_it(self, operator: Operator) -> None:
+        """A healthy while with released triggers, then the button; RuntimeError when that does not arm."""
+        self.drive(self.robot.session.safety.settings.healthy_s + 0.05, operator)
+        self.drive(0.02, operator, arm=True)
+        if self.state != "armed":
+            raise RuntimeError(f"the robot side is {self.state}; expected: armed")
+
+    def cruise(self, operator: Operator, duration_s: float = 0.3) -> None:
+        """Arm, and advance at an even speed."""
+        self.arm_it(operator)
+        self.drive(duration_s, operator, r2=CRUISE)

@@ -1,0 +1,116 @@
+"""What a hostile or broken peer may send: a seeded, endless mixture."""
+
+import random
+from collections import Counter
+from collections.abc import Callable
+
+import msgpack
+
+from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, encode
+from common.protocol.messages import Header, Hello, MotionCommand
+from feelahead.experiments.hostile.raw_zmtp import GREETING, RawConnection, frame, message, ready
+
+_STRANGERS = 8
+_HANGING = 128
+"""Connections that never finish their handshake, at any time."""
+
+
+def payload(generator: random.Random) -> bytes:
+    """Bytes that look more or less like a message."""
+    kind = generator.randrange(5)
+    if kind == 0:
+        return generator.randbytes(generator.randrange(MAXIMUM_BYTES))
+    if kind == 1:
+        return bytes(_valid(generator)[: generator.randrange(60)])
+    if kind == 2:
+        spoiled = bytearray(_valid(generator))
+        for _ in range(generator.randint(1, 4)):
+            spoiled[generator.randrange(len(spoiled))] = generator.randrange(256)
+        return bytes(spoiled)
+    if kind == 3:
+        return b"\x91" * generator.randrange(MAXIMUM_BYTES)  # arrays in arrays in arrays
+    odd: float = generator.choice([float("nan"), float("inf"), 1e308, -1.0, 2**64 - 1])
+    content: bytes = msgpack.packb([PROTOCOL_VERSION, ["motion", [1, 2, odd, None, None], odd, odd, [odd, odd]]])
+    return content
+
+
+def _valid(generator: random.Random) -> bytes:
+    header = Header(epoch=generator.getrandbits(53), sequence=generator.getrandbits(40), sent_s=generator.random())
+    if generator.random() < 0.5:
+        return encode(Hello(header, side="operator", clock_domain=""))
+    return encode(MotionCommand(header, l2=1.0, r2=1.0, run=True, arm=True))
+
+
+class Attacker:
+    """Sends one hostile input after the other to a robot side's two ports."""
+
+    def __init__(self, control_port: int, view_port: int, seed: int) -> None:
+        self.sent: Counter[str] = Counter()
+        """Inputs by kind."""
+        self.refused = 0
+        """Those among them that the robot side, or the system, cut short."""
+        self._control_port = control_port
+        self._view_port = view_port
+        self._generator = random.Random(seed)  # noqa: S311  # repeatable, not secret
+        self._strangers: list[RawConnection] = []
+        self._hanging: list[RawConnection] = []
+        kinds: list[tuple[str, int, Callable[[], None]]] = [
+            ("payload", 780, self._send_payload),
+            ("frames", 60, self._send_frames),
+            ("oversize", 20, self._send_oversize),
+            ("garbage", 60, self._connect_with_garbage),
+            ("handshake", 50, self._connect_halfway),
+            ("view", 30, self._disturb_view),
+        ]
+        self._kinds = [(name, send) for name, _, send in kinds]
+        self._weights = [weight for _, weight, _ in kinds]
+
+    def send(self) -> None:
+        """One hostile input."""
+        [(name, send)] = self._generator.choices(self._kinds, self._weights)
+        try:
+            send()
+        except OSError:
+            self.refused += 1
+        self.sent[name] += 1
+
+    def close(self) -> None:
+        """Hang up everywhere."""
+        for connection in (*self._strangers, *self._hanging):
+            connection.close()
+
+    def _stranger(self) -> RawConnection:
+        self._strangers = [connection for connection in self._strangers if connection.open]
+        if len(self._strangers) < _STRANGERS:
+            self._strangers.append(RawConnection.introduced(self._control_port))
+        return self._generator.choice(self._strangers)
+
+    def _send_payload(self) -> None:
+        self._stranger().send(message(payload(self._generator)))
+
+    def _send_frames(self) -> None:
+        count = self._generator.choice([2, 3, 50])
+        self._stranger().send(message(*[self._generator.randbytes(3)] * count))
+
+    def _send_oversize(self) -> None:
+        claimed = self._generator.choice([MAXIMUM_BYTES + 1, 10**6, 2**31, 2**62, 2**64 - 1])
+        self._stranger().send(frame(bytes(100), claimed_bytes=claimed))
+
+    def _connect_with_garbage(self) -> None:
+        garbage = self._generator.randbytes(self._generator.randint(1, 2000))
+        RawConnection(self._control_port, garbage).close()
+
+    def _connect_halfway(self) -> None:
+        whole = GREETING + ready(b"DEALER")
+        connection = RawConnection(self._control_port, whole[: self._generator.randrange(len(whole))])
+        self._hanging.append(connection)
+        if len(self._hanging) > _HANGING:
+            self._hanging.pop(self._generator.randrange(_HANGING)).close()
+
+    def _disturb_view(self) -> None:
+        if self._generator.random() < 0.5:
+            RawConnection(self._view_port, self._generator.randbytes(100)).close()
+            return
+        viewer = RawConnection.introduced(self._view_port, b"SUB")
+        viewer.send(message(b"\x01" + self._generator.randbytes(20)) + frame(b"", claimed_bytes=2**40))
+        viewer.close()
