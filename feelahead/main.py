@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from common.command.command_line import run_command
 from common.errors import ConfigurationError
-from feelahead.commands.bench import bench
+from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.calibrate import calibrate
 from feelahead.commands.demo import demo
 from feelahead.commands.doctor.command import doctor
@@ -19,6 +19,7 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
     "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
+    "try": (try_out, "what happens to people and robots under delay, faults and attacks"),
 }
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from feelahead.benchmarks.delay.estimates import COLUMNS, command, goals
+from feelahead.benchmarks.delay.estimates import COLUMNS, bench_delay, goals
 from feelahead.benchmarks.delay.peers import (
     PEERS,
     Stamps,
@@ -102,7 +102,7 @@ def test_the_command_prints_tables_and_goals_and_writes_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "figures.csv"
-    assert command(["--runs", "2", "--seconds", "2", "--csv", str(file)]) == 0
+    assert bench_delay(["--runs", "2", "--seconds", "2", "--csv", str(file)]) == 0
     shown = capsys.readouterr().out
     for words in ("50 + exp(10) both ways", "lower envelope", "mean of offsets", "violations of the bound: 0"):
         assert words in shown
@@ -126,14 +126,14 @@ def test_the_command_prints_tables_and_goals_and_writes_figures(
 )
 def test_bad_arguments_are_one_line(arguments: list[str], complaint: str) -> None:
     with pytest.raises(ConfigurationError) as error:
-        command(arguments)
+        bench_delay(arguments)
     assert complaint in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_it_runs_as_a_module_and_refuses_with_code_2() -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "feelahead.benchmarks.delay.estimates", "--runs", "-3"],
+        [sys.executable, "-m", "feelahead", "bench", "delay", "--runs", "-3"],
         capture_output=True,
         text=True,
         timeout=60,

@@ -1,5 +1,5 @@
 """Rows of the fault table that name real processes and signals. Their times belong to the machine: see
-`python -m feelahead.experiments.faults.table`; here only that the robot is safe.
+`feelahead try faults`; here only that the robot is safe.
 """
 
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ import pytest
 from feelahead.experiments.faults import real_faults
 from feelahead.experiments.faults.first_side import either_side_first
 from feelahead.experiments.faults.rig import Rig
-from feelahead.experiments.faults.table import REAL_ROWS, Row, command
+from feelahead.experiments.faults.table import REAL_ROWS, Row, try_faults
 from feelahead.experiments.faults.unplugged import unplugged
 
 pytestmark = pytest.mark.processes
@@ -46,4 +46,4 @@ def test_a_pulled_cable_stops_the_arm() -> None:
 
 def test_too_few_repetitions_are_refused() -> None:
     with pytest.raises(ValueError, match="repeats"):
-        command(["--repeats", "0"])
+        try_faults(["--repeats", "0"])

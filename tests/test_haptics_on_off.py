@@ -58,7 +58,7 @@ def test_a_run_is_repeatable_and_differs_by_nothing_but_haptics_at_first() -> No
 def test_the_command_prints_a_table_and_writes_every_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "runs.csv"
     arguments = ["--seeds", "1", "--duration", "0.2", "--workers", "1", "--link", "", "--csv", str(path)]
-    assert haptics_on_off.command(arguments) == 0
+    assert haptics_on_off.try_haptics(arguments) == 0
     assert "haptics off / on" in capsys.readouterr().out
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -70,4 +70,4 @@ def test_the_command_prints_a_table_and_writes_every_run(tmp_path: Path, capsys:
 )
 def test_bad_settings_are_named(arguments: list[str]) -> None:
     with pytest.raises(ConfigurationError, match=arguments[1]):
-        haptics_on_off.command(arguments)
+        haptics_on_off.try_haptics(arguments)

@@ -1,4 +1,4 @@
-"""The soak's own judgement; the soak itself is `python -m feelahead.experiments.soak`."""
+"""The soak's own judgement; the soak itself is `feelahead try soak`."""
 
 import re
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from feelahead.experiments.soak import Sample, command, flat, sample
+from feelahead.experiments.soak import Sample, flat, sample, try_soak
 
 
 def series(*resident_mb: float, descriptors: int = 10) -> list[Sample]:
@@ -31,7 +31,7 @@ def test_a_process_is_looked_at() -> None:
 
 
 def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command(["--minutes", "0.02", "--virtual"]) == 0
+    assert try_soak(["--minutes", "0.02", "--virtual"]) == 0
     said = capsys.readouterr().out
     assert "flat" in said.splitlines()[-1]
     sent = re.search(r"'motion_sent': (\d+)", said)
@@ -45,7 +45,7 @@ def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None
 )
 def test_bad_input_is_one_line(arguments: list[str]) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "feelahead.experiments.soak", *arguments], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "feelahead", "try", "soak", *arguments], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1

@@ -1,6 +1,6 @@
 """The same scripted person with and without haptics, over the same seeds: what the stiffness changes.
 
-    python -m feelahead.experiments.haptics_on_off --link "delay 200ms 10ms distribution normal" --seeds 10
+    feelahead try haptics --link "delay 200ms 10ms distribution normal" --seeds 10
 
 Everything runs in virtual time, so the same command prints the same table. The person is simulated: nothing
 here is a claim about people.
@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
@@ -29,7 +29,7 @@ from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import PersonSettings
 from robot_side.settings import RobotSettings
 
-_PROGRAM = "python -m feelahead.experiments.haptics_on_off"
+_PROGRAM = "feelahead try haptics"
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _average(values: Sequence[float | None], digits: int) -> str:
     return f"{mean(known):.{digits}f}{missing}"
 
 
-def command(arguments: Sequence[str]) -> int:
+def try_haptics(arguments: Sequence[str]) -> int:
     """Compare, print the table and write the CSV."""
     settings = parse_settings(ComparisonSettings, _PROGRAM, arguments)
     outcomes = compare(settings)
@@ -161,7 +161,3 @@ def command(arguments: Sequence[str]) -> int:
             writer.writerow(names)
             writer.writerows([getattr(one, name) for name in names] for one in outcomes)
     return 0
-
-
-if __name__ == "__main__":
-    run_command(_PROGRAM, command)

@@ -1,6 +1,6 @@
 """How soon a revoked operator is out, and what another one loses by it.
 
-    python -m feelahead.experiments.revocation --repeats 20
+    feelahead try revocation --repeats 20
 
 Real sockets with keys on loopback, in one process: the robot side's, looking at its allow-list as often as the process
 does, a victim whose key is revoked at a random moment, and a bystander. Both send and receive at 250 Hz.
@@ -22,7 +22,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import raise_priority
@@ -32,7 +32,7 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from robot_side.main import KEYS_PERIOD_S
 
-_PROGRAM = "python -m feelahead.experiments.revocation"
+_PROGRAM = "feelahead try revocation"
 _PERIOD_S = 0.004
 _START_LIMIT_S = 10.0
 _AFTERWARDS_S = 1.5
@@ -126,7 +126,7 @@ def _longest_gap_s(times_s: Sequence[float]) -> float:
     return max((after - before for before, after in itertools.pairwise(times_s)), default=_AFTERWARDS_S)
 
 
-def command(arguments: Sequence[str]) -> int:
+def try_revocation(arguments: Sequence[str]) -> int:
     """Repeat, and print the table."""
     settings = parse_settings(RevocationSettings, _PROGRAM, arguments)
     generator = random.Random(settings.seed)  # noqa: S311  # repeatable, not secret
@@ -147,7 +147,3 @@ def command(arguments: Sequence[str]) -> int:
         shown.add_row(title, f"{values_ms[len(values_ms) // 2]:.0f}", f"{values_ms[-1]:.0f}", "< 1000")
     Console(width=100 if not sys.stdout.isatty() else None).print(shown)
     return 0
-
-
-if __name__ == "__main__":
-    run_command(_PROGRAM, command)

@@ -1,7 +1,7 @@
 """Both sides for minutes: does anything grow?
 
-    python -m feelahead.experiments.soak --minutes 10 --virtual
-    python -m feelahead.experiments.soak --minutes 2
+    feelahead try soak --minutes 10 --virtual
+    feelahead try soak --minutes 2
 
 Resident memory and open descriptors at the start, in the middle and at the end; messages and errors. Virtual: both
 cores in this process, as fast as they go. Real: feelahead-robot and feelahead-operator with a simulated person, over
@@ -26,7 +26,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from common.emulation.spec import LinkSpec
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.processes import SideProcess
@@ -34,7 +34,7 @@ from feelahead.both_sides.summary import merge_summaries
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
-PROGRAM = "python -m feelahead.experiments.soak"
+PROGRAM = "feelahead try soak"
 _SETTLED = 0.1
 """The first tenth of the run fills what is bounded: it counts as the start from then on."""
 _FLAT_KB = 10 * 1024
@@ -155,7 +155,7 @@ def table(samples: dict[str, list[Sample]]) -> Table:
     return shown
 
 
-def command(arguments: Sequence[str]) -> int:
+def try_soak(arguments: Sequence[str]) -> int:
     """Soak, and print what was seen; exit code 1 when something grew or failed."""
     settings = parse_settings(SoakSettings, PROGRAM, arguments)
     run = run_virtual if settings.virtual else run_real
@@ -169,7 +169,3 @@ def command(arguments: Sequence[str]) -> int:
     console.print(f"stops {summary['stops']}, errors {summary['errors']}", highlight=False)
     console.print("flat" if is_flat else "NOT FLAT", highlight=False)
     return 0 if is_flat and not summary["errors"] else 1
-
-
-if __name__ == "__main__":
-    run_command(PROGRAM, command)

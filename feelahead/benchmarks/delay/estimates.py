@@ -1,4 +1,4 @@
-"""`python -m feelahead.benchmarks.delay.estimates`: clock offsets and one-way delays against the truth."""
+"""`feelahead bench delay`: clock offsets and one-way delays against the truth."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.clock import MonotonicClock
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
 from feelahead.benchmarks.delay.runs import GOAL_S, Outcome, measure, quantile_of_sizes, rms
 from feelahead.benchmarks.delay.traffic import Scenario, scenarios
 from feelahead.benchmarks.report import Goal, Table, show, show_goals
 
-PROGRAM = "python -m feelahead.benchmarks.delay.estimates"
+PROGRAM = "feelahead bench delay"
 _WIDE = 150
 _OTHERS_SHARE = 20
 COLUMNS = ("link", "skew_ppm", "runs", "estimator", "quantity", "value", "unit")
@@ -37,7 +37,7 @@ class DelayEstimatesSettings:
 
     A thousand runs take about four minutes on a core of their own.
 
-    Try: python -m feelahead.benchmarks.delay.estimates --runs 50
+    Try: feelahead bench delay --runs 50
     """
 
     runs: Annotated[int, tyro.conf.arg(metavar="N")] = 1000
@@ -60,7 +60,7 @@ class DelayEstimatesSettings:
             raise ValueError(f"--csv {self.csv}: valid: a file in a folder that is there")
 
 
-def command(arguments: Sequence[str]) -> int:
+def bench_delay(arguments: Sequence[str]) -> int:
     """Run the benchmark; exit code 0 whether or not the goals are met."""
     settings = parse_settings(DelayEstimatesSettings, PROGRAM, arguments)
     console = Console() if Console().is_terminal else Console(width=_WIDE)
@@ -190,7 +190,3 @@ def _rows(outcome: Outcome) -> Iterator[tuple[str, str, int, str, str, float, st
     for name, errors_s in outcome.peer_errors_s.items():
         yield (*head, name, "offset error rms", 1e3 * rms(errors_s), "ms")
         yield (*head, name, "offset error max", 1e3 * quantile_of_sizes(errors_s, 1.0), "ms")
-
-
-if __name__ == "__main__":
-    run_command(PROGRAM, command)

@@ -1,6 +1,6 @@
 """How late a 1 kHz loop wakes, by how it waits and by what the system was asked for.
 
-    python -m feelahead.benchmarks.link.wake_error --seconds 5
+    feelahead bench wake --seconds 5
 
 Each row is a loop of its own in a fresh process, with the sockets that the robot side waits on and no message
 arriving. The rows take turns, so that what else the machine does falls on all of them.
@@ -21,12 +21,12 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common.clock import MonotonicClock
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from common.realtime.pacing import SPIN_S, Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
 from common.sockets.robot import RobotSockets
 
-_PROGRAM = "python -m feelahead.benchmarks.link.wake_error"
+_PROGRAM = "feelahead bench wake"
 _PERIOD_S = 1e-3
 _WAYS = {
     "sleep": (0.0, False, False),
@@ -75,7 +75,7 @@ def watch(way: str, seconds: float) -> tuple[list[float], int, float]:
         return errors_s, pacer.overruns, (time.process_time() - began_cpu_s) / (clock.now() - began_s)
 
 
-def command(arguments: Sequence[str]) -> int:
+def bench_wake(arguments: Sequence[str]) -> int:
     """Measure and print the table."""
     settings = parse_settings(WakeSettings, _PROGRAM, arguments)
     found: dict[str, list[tuple[list[float], int, float]]] = {way: [] for way in _WAYS}
@@ -100,7 +100,3 @@ def command(arguments: Sequence[str]) -> int:
         shown.add_row(way, *quantiles, str(sum(overruns for _, overruns, _ in outcomes)), f"{share:.0%}")
     Console(width=100 if not sys.stdout.isatty() else None).print(shown)
     return 0
-
-
-if __name__ == "__main__":
-    run_command(_PROGRAM, command)

@@ -1,7 +1,7 @@
 """The table of faults, tried out: what the robot must do, the number to hold, what was measured.
 
-    python -m feelahead.experiments.faults.table
-    python -m feelahead.experiments.faults.table --repeats 100 --only real
+    feelahead try faults
+    feelahead try faults --repeats 100 --only real
 
 First the rows that virtual time decides, exactly; then real processes with kill -9, SIGSTOP, cut connections and
 strangers, whose times are this machine's: run it on an idle one. Ten minutes with 100 repetitions.
@@ -20,7 +20,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from common.command.command_line import parse_settings
-from common.command.launch import launch
 from feelahead.experiments.faults import real_faults
 from feelahead.experiments.faults.fault import Fault, Outcome
 from feelahead.experiments.faults.first_side import either_side_first
@@ -31,7 +30,7 @@ from feelahead.experiments.faults.virtual_session_faults import SESSION_FAULTS
 from feelahead.experiments.faults.virtual_stream_faults import STREAM_FAULTS
 from robot_side.overlap.kernels import warm_up
 
-PROGRAM = "python -m feelahead.experiments.faults.table"
+PROGRAM = "feelahead try faults"
 _DECELERATION = "begins by T + 5 ms (p99), T + 20 ms (max); T = 100 ms"
 Row = tuple[str, str, str, Callable[[Rig, int, Callable[[], None]], Outcome], float]
 
@@ -71,7 +70,7 @@ REAL_ROWS: tuple[Row, ...] = (
 _PULLED_SHARE = 0.1
 
 
-def command(arguments: Sequence[str]) -> int:
+def try_faults(arguments: Sequence[str]) -> int:
     """Print the table; exit code 1 when the robot was unsafe in any row."""
     settings = parse_settings(FaultSettings, PROGRAM, arguments)
     console = Console(width=None if sys.stdout.isatty() else 160)
@@ -135,7 +134,3 @@ def _try_real(repeats: int, progress: Progress, add: Callable[[str, str, str, Ou
     except RigError as error:
         outcome = Outcome(False, str(error), tried=False)
     add("cable pulled (network namespaces)", "the same as kill -9; the same once it is back", _DECELERATION, outcome)
-
-
-if __name__ == "__main__":
-    launch(PROGRAM, lambda: command)

@@ -1,6 +1,6 @@
 """A robot side that is driven by an operator while strangers send it a hundred thousand hostile inputs.
 
-    python -m feelahead.experiments.hostile.run --count 100000
+    feelahead try hostile --count 100000
 
 Two real processes on loopback without keys, where strangers get furthest. Quiet and hostile stretches alternate, so
 that what else happens on the machine falls on both; each figure is the median over the status messages (five a
@@ -22,13 +22,13 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from common.command.command_line import parse_settings, run_command
+from common.command.command_line import parse_settings
 from feelahead.both_sides.processes import SideProcess
 from feelahead.commands.demo import read_summary
 from feelahead.experiments.hostile.hostile_inputs import Attacker
 from feelahead.experiments.hostile.raw_zmtp import port_of
 
-_PROGRAM = "python -m feelahead.experiments.hostile.run"
+_PROGRAM = "feelahead try hostile"
 _START_TIMEOUT_S = 90.0
 _FIGURES = ("tick_us", "tick_p99_us", "late_us")
 _GOAL = 1.10
@@ -168,13 +168,9 @@ def report(outcome: Outcome) -> Table:
     return shown
 
 
-def command(arguments: Sequence[str]) -> int:
+def try_hostile_input(arguments: Sequence[str]) -> int:
     """Measure and print the table."""
     settings = parse_settings(HostileSettings, _PROGRAM, arguments)
     outcome = measure(settings)
     Console(width=140 if not sys.stdout.isatty() else None).print(report(outcome))
     return 0
-
-
-if __name__ == "__main__":
-    run_command(_PROGRAM, command)

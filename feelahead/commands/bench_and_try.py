@@ -1,0 +1,126 @@
+"""`feelahead bench NAME` and `feelahead try NAME`: what measures the project, imported only when asked for."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import NamedTuple
+
+from common.errors import ConfigurationError
+
+
+class Entry(NamedTuple):
+    """One thing to run."""
+
+    module: str
+    function: str
+    what: str
+    """What it measures, for `--help`."""
+    remedy: str = "pip install feelahead"
+    """What brings the packages that it needs."""
+
+
+@dataclass(frozen=True)
+class Menu:
+    """One command whose first argument names what to run."""
+
+    name: str
+    kind: str
+    entries: dict[str, Entry]
+
+    def __call__(self, arguments: Sequence[str]) -> int:
+        """Run what the first argument names."""
+        if not arguments or arguments[0] in ("-h", "--help", "--list"):
+            lines = [f"  {name:<12}{entry.what}" for name, entry in self.entries.items()]
+            sys.stdout.write(
+                f"usage: feelahead {self.name} NAME [OPTIONS]\n\n" + "\n".join(lines) + "\n\nEach has its own --help.\n"
+            )
+            return 0
+        name, *rest = arguments
+        if name not in self.entries:
+            raise ConfigurationError(f"{self.name} {name!r}: no such {self.kind}; valid: {', '.join(self.entries)}")
+        entry = self.entries[name]
+        try:
+            result: int = getattr(import_module(entry.module), entry.function)(rest)
+        except ModuleNotFoundError as error:
+            raise ConfigurationError(f"{self.name} {name}: {error.name} is not installed; {entry.remedy}") from error
+        return result
+
+
+_BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
+
+bench = Menu(
+    "bench",
+    "benchmark",
+    {
+        "overlap": Entry(
+            "feelahead.benchmarks.overlap.bench",
+            "bench_overlap",
+            "run time against error of the exact overlaps and of what is used in their place",
+            "pip install 'feelahead[robot,bench]'",
+        ),
+        "link": Entry(
+            "feelahead.benchmarks.link.bench",
+            "bench_link",
+            "the emulated link beside what was asked, and beside recordings of the kernel's netem",
+        ),
+        "delay": Entry(
+            "feelahead.benchmarks.delay.estimates",
+            "bench_delay",
+            "clock offsets and one-way delays, as estimated from ordinary traffic, beside the truth",
+        ),
+        "wake": Entry(
+            "feelahead.benchmarks.link.wake_error",
+            "bench_wake",
+            "how late a 1 kHz loop wakes, by how it waits and by what the system was asked for",
+        ),
+        "dualsense": Entry(
+            "feelahead.benchmarks.dualsense.bench",
+            "bench_dualsense",
+            "our driver of the controller beside pydualsense, on the same simulated reports",
+            "pip install 'feelahead[operator,bench]'",
+        ),
+        "effects": Entry(
+            "feelahead.benchmarks.effects.effect_latency",
+            "bench_effects",
+            "how long it takes from a change of stiffness until the controller is told",
+        ),
+    },
+)
+
+try_out = Menu(
+    "try",
+    "experiment",
+    {
+        "haptics": Entry(
+            "feelahead.experiments.haptics_on_off",
+            "try_haptics",
+            "the same simulated person with and without haptics, over the same seeds",
+            _BOTH_SIDES,
+        ),
+        "faults": Entry(
+            "feelahead.experiments.faults.table",
+            "try_faults",
+            "every fault of the table: what the robot does when a side, the link or a clock fails",
+            _BOTH_SIDES,
+        ),
+        "hostile": Entry(
+            "feelahead.experiments.hostile.run",
+            "try_hostile_input",
+            "hostile input at a real robot side's port, and what it costs the tick",
+            _BOTH_SIDES,
+        ),
+        "revocation": Entry(
+            "feelahead.experiments.revocation",
+            "try_revocation",
+            "how soon a revoked key is out, and what the others notice",
+            _BOTH_SIDES,
+        ),
+        "soak": Entry(
+            "feelahead.experiments.soak",
+            "try_soak",
+            "long runs: whether memory, descriptors and delays stay flat",
+            _BOTH_SIDES,
+        ),
+    },
+)
