@@ -1,6 +1,6 @@
 """Everything here rests on names that Numba does not promise to keep; nothing else in feelahead does.
 
-Tried with the versions that pyproject.toml pins. To try another one: widen the pin, run tests/test_overlap_compile.py
+Tried with the versions that pyproject.toml pins. To try another one: widen the pin, run tests/robot_side/compiled
 on an empty cache, and see that cold compilation takes no longer.
 """
 

@@ -1,8 +1,11 @@
 """Nearest points of (point, primitive) pairs in contiguous arrays: what a 1 kHz tick calls.
 
-Pair i is point point_index[i] with primitive primitive_index[i]. Its row of `distance` (p,), `direction` (p, 3)
-and `deepening` (p, 3) gets what `nearest_point` says about them; the deepening vector of a point outside is the
-direction. Nothing is validated here. Arrays are float64 and int64, C-contiguous, lengths in m.
+Pair i is point point_index[i] with primitive primitive_index[i]. Its row of `distance` (p,) gets the signed distance,
+positive outside and negative inside; that of `direction` (p, 3) the unit vector along which this falls fastest: towards
+the nearest point from outside, away from it from inside, the same on both sides of a face. Inside, the direction jumps
+where two ways out are equally short; `deepening` (p, 3) is its continuous relative, a mean over the ways out that has
+length 1 at a face and 0 in the middle of a plate. Outside it is the direction.
+Nothing is validated here. Arrays are float64 and int64, C-contiguous, lengths in m.
 """
 
 import math

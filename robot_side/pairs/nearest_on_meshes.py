@@ -1,4 +1,4 @@
-"""The nearest point of a placed mesh's surface, as `nearest_point` tells it of the other primitives.
+"""The nearest point of a placed mesh's surface, as `nearest_kernels` has it for the other primitives.
 
 Only a scene with meshes imports this module, and so compiles the mesh kernels.
 

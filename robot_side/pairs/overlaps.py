@@ -23,7 +23,7 @@ from robot_side.pairs.candidates import CandidatePairs
 
 @dataclass(frozen=True)
 class NearestSurfaces:
-    """Where each candidate pair's primitive is, seen from the sphere's centre (see `nearest_point`)."""
+    """Where each candidate pair's primitive is, seen from the sphere's centre (see `nearest_kernels`)."""
 
     signed_distance_m: FloatArray
     """(p,) from the centre to the surface, negative inside"""

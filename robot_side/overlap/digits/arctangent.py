@@ -12,7 +12,7 @@ TANGENT_OF_EIGHTH = math.sqrt(2.0) - 1.0
 """tan(π/8)"""
 
 # (arctan(x)/x - 1)/x² as a polynomial in x² over [0, tan²(π/8)], highest power first: the Chebyshev fit of degree
-# 10, which tests/test_overlap_arctangent.py works out again with mpmath.
+# 10, which tests/robot_side/overlap/test_arctangent.py works out again with mpmath.
 COEFFICIENTS = (
     -0.01917688711906226,
     0.03923165829558719,

@@ -1,0 +1,144 @@
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from common.command.command_line import load_toml, parse_settings
+from common.command.run_options import RunOptions
+from common.errors import ConfigurationError
+from tests.helpers.repository import ROOT
+
+
+@dataclass(frozen=True)
+class Inner:
+    sd_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not self.sd_m >= 0.0:
+            raise ValueError(f"sd_m = {self.sd_m}; valid: 0 or more")
+
+
+@dataclass(frozen=True)
+class Options(RunOptions):
+    """What a test runs."""
+
+    probability: float = 0.99
+    camera: Inner = field(default_factory=Inner)
+
+
+def parse(*arguments: str) -> Options:
+    return parse_settings(Options, "prog", arguments)
+
+
+def test_flags_win_over_the_file_which_wins_over_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "options.toml"
+    path.write_text("probability = 0.5\nseed = 3\n[camera]\nsd_m = 0.2\n")
+    options = parse("--config", str(path), "--seed", "4")
+    assert (options.probability, options.seed, options.camera.sd_m) == (0.5, 4, 0.2)
+    assert parse(f"--config={path}", "--camera.sd-m", "0.3").camera.sd_m == 0.3
+    assert parse().probability == 0.99
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--nonsense", "1"], "--nonsense"),
+        (["--seed", "x"], "--seed"),
+        (["--seed", "-1"], "-1"),
+        (["--camera.sd-m", "-2"], "sd_m = -2"),
+        (["--duration", "0"], "0.0"),
+        (["--duration"], "--duration"),
+        (["--link", "delay -5ms"], "-5ms"),
+        (["--link", "delay"], "delay"),
+        (["--link", "dealy 5ms"], "dealy"),
+        (["--link-model", "pigeon"], "pigeon"),
+        (["--config"], "--config"),
+        (["--config", "missing.toml"], "missing.toml"),
+        (["--summary", "no/such/folder/out.json"], "no/such/folder"),
+    ],
+)
+def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        parse(*arguments)
+    text = str(caught.value)
+    assert named in text
+    assert "\n" not in text
+    assert "│" not in text
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("probability = ", "no valid TOML"),
+        ("probability = 'x'", "probability"),
+        ("probabilty = 0.9", "probabilty"),
+        ("[camera]\nsd = 1.0", "camera.sd"),
+        ("[camera]\nsd_m = -1.0", "sd_m = -1.0"),
+        ("camera = 3", "camera"),
+        ("seed = -4", "-4"),
+        ("seed = 'a\nb'", "no valid TOML"),
+        (f"probability = 1{400 * '0'}", "more than 64 bits"),
+        (f"seed = 1{5000 * '0'}", "more than 64 bits"),
+        (f"seed = 0x{5000 * 'f'}", "more than 64 bits"),
+        (f"seed = {4500 * '['}", "nested too deeply"),
+        (f"camera{4500 * '.a'} = 1", "nested too deeply"),
+        (9000 * "a" + " = 1", "unknown key"),
+        (f"[{9000 * 'a'}]\n[{9000 * 'a'}]", "no valid TOML"),
+        ("#" * 1_000_001, "more than 1000000 bytes"),
+    ],
+)
+def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, content: str, named: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError) as caught:
+        load_toml(path, Options)
+    text = str(caught.value)
+    assert named in text
+    assert "bad.toml" in text
+    assert "\n" not in text
+    assert "sys." not in text
+    assert len(text) < 1000
+
+
+def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path) -> None:
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match=r"pipe\.toml: is no regular file"):
+        parse("--config", str(path))
+
+
+def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        parse("--help")
+    assert stop.value.code == 0
+    assert "--probability" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_the_line_is_the_same_where_no_box_can_be_drawn(encoding: str) -> None:
+    code = (
+        "from tests.common.command.test_command_line import parse\n"
+        "from common.errors import ConfigurationError\n"
+        "for arguments in (['--duration', 'x'], ['--nonsense', '1'], ['--seed', 'y'], ['--link-model', 'pigeon']):\n"
+        "    try: parse(*arguments)\n"
+        "    except ConfigurationError as error: print(error)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "LC_ALL": "C"},
+        cwd=ROOT,
+    )
+    lines = ended.stdout.splitlines()
+    assert lines == [
+        "--duration: 'x'; valid: a number",
+        "Unrecognized options: --nonsense, 1 (valid flags and values: prog --help)",
+        "--seed: invalid literal for int() with base 10: 'y'; valid: a whole number",
+        "invalid choice 'pigeon' for argument '--link-model'. Expected one of ('datagram', 'stream'). "
+        "(valid flags and values: prog --help)",
+    ]

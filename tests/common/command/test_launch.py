@@ -1,0 +1,127 @@
+"""The first moments of a command: signals, encodings, versions and what is not installed."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests.helpers.repository import ROOT
+
+MODULES = ("robot_side", "operator_side", "feelahead")
+
+
+def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, **environment},
+    )
+
+
+# Stops in the middle of the imports, so that the signal always finds them, however fast the machine is.
+SLOW_IMPORT = """
+import sys, time
+sys.argv = ["command"]
+from common.command.launch import launch
+def load():
+    print("importing", flush=True)
+    time.sleep(60)
+launch("command", load)
+"""
+SLOW_START = """
+import sys, time
+sys.argv = ["command"]
+from common.command.launch import launch
+def command(arguments):
+    print("building", flush=True)
+    time.sleep(60)
+launch("command", lambda: command)
+"""
+
+# Past the command's own care, as a signal between two statements would be.
+SLOW_END = """
+import sys, time
+sys.argv = ["command"]
+import common.command.command_line
+from common.command.launch import launch
+def run_command(program, command):
+    print("ending", flush=True)
+    time.sleep(60)
+common.command.command_line.run_command = run_command
+launch("command", lambda: None)
+"""
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("code", [SLOW_IMPORT, SLOW_START, SLOW_END])
+def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Signals) -> None:
+    with start("-c", code) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() in ("importing\n", "building\n", "ending\n")
+        process.send_signal(number)
+        _, complaint = process.communicate(timeout=20)
+    assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("module", MODULES)
+def test_every_command_says_its_version(module: str) -> None:
+    with start("-m", module, "--version") as process:
+        said, complaint = process.communicate(timeout=20)
+    assert (process.returncode, complaint) == (0, "")
+    assert said.split()[1].count(".") == 2
+
+
+WITHOUT_MUJOCO = """
+import sys
+sys.modules["mujoco"] = None
+sys.argv = ["feelahead-robot"]
+from robot_side.__main__ import main
+main()
+"""
+
+
+@pytest.mark.processes
+def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
+    with start("-c", WITHOUT_MUJOCO) as process:
+        _, complaint = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert complaint == (
+        "feelahead-robot: mujoco is not installed on this machine; valid: pip install 'feelahead[robot]'\n"
+    )
+
+
+def test_a_module_of_ours_that_is_missing_is_a_fault_and_not_an_installation() -> None:
+    code = "import sys\nfrom common.command.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
+    with start("-c", code) as process:
+        _, complaint = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "ModuleNotFoundError" in complaint
+
+
+@pytest.mark.processes
+def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
+    code = (
+        "from common.command.launch import launch\n"
+        "launch('x', lambda: lambda arguments: print('5 \\u00b1 1 \\u00b5s') or 0)"
+    )
+    with start("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") as process:
+        said, complaint = process.communicate(timeout=20)
+    assert (process.returncode, said, complaint) == (0, "5 ? 1 ?s\n", "")
+
+
+@pytest.mark.processes
+def test_a_reader_that_goes_away_is_no_fault() -> None:
+    code = "from common.command.command_line import run_command\nrun_command('x', lambda _: print('a' * 100_000) or 0)"
+    with start("-c", code) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.wait(20) == 0
+        assert process.stderr.read() == ""

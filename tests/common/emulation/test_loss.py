@@ -1,0 +1,126 @@
+"""Losses and delays of a line beside what theory or the kernel's netem says of them."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from common.emulation.loss import GilbertElliott, StateLoss
+from tests.helpers.link_runs import Run, bursts, lag_one
+
+# Loss
+
+
+def test_random_loss_is_independent() -> None:
+    lost = Run("loss 10%", 50_000).lost
+    assert np.mean(lost) == pytest.approx(0.10, abs=0.005)
+    assert np.mean(bursts(lost)) == pytest.approx(1.0 / 0.9, abs=0.02)
+
+
+def test_netems_correlation_makes_losses_all_but_vanish() -> None:
+    # The kernel's netem, measured: loss 10% 50% lost 0.10 %.
+    assert np.mean(Run("loss 10% 50%", 200_000).lost) == pytest.approx(0.0010, abs=0.0005)
+
+
+def test_proper_correlation_keeps_the_share_and_makes_bursts() -> None:
+    lost = Run("loss 10% 50%", 200_000, correlation="proper").lost
+    assert np.mean(lost) == pytest.approx(0.10, abs=0.004)
+    # P(both below the 10 % quantile) of two normals with correlation 1/2 is 0.0324 (integrated numerically).
+    assert np.mean(bursts(lost)) == pytest.approx(1.0 / (1.0 - 0.324), abs=0.05)
+
+
+def test_gilbert_elliott_loses_in_bursts_of_the_length_asked_for() -> None:
+    lost = Run("loss gemodel 1% 25%", 400_000).lost
+    assert np.mean(lost) == pytest.approx(0.01 / 0.26, abs=0.003)
+    assert np.mean(bursts(lost)) == pytest.approx(4.0, abs=0.25)
+    lengths = np.array(bursts(lost))
+    assert np.mean(lengths > 4) == pytest.approx(0.75**4, abs=0.03)
+
+
+def test_gilbert_elliott_with_losses_in_both_states() -> None:
+    lost = Run("loss gemodel 2% 10% 60% 1%", 200_000).lost
+    expected = (0.10 * 0.01 + 0.02 * 0.60) / 0.12
+    assert GilbertElliott(0.02, 0.10, 0.60, 0.01).share() == pytest.approx(expected)
+    assert np.mean(lost) == pytest.approx(expected, abs=0.006)
+
+
+def test_one_probability_alone_is_independent_loss() -> None:
+    for spec in ("loss state 5%", "loss gemodel 5%"):
+        lost = Run(spec, 100_000).lost
+        assert np.mean(lost) == pytest.approx(0.05, abs=0.004)
+        assert np.mean(bursts(lost)) == pytest.approx(1.0 / 0.95, abs=0.02)
+
+
+def test_state_loss_has_the_chains_shares_and_bursts() -> None:
+    p13, p31, p32, p23, p14 = 0.02, 0.10, 0.20, 0.40, 0.01
+    lost = Run("loss state 2% 10% 20% 40% 1%", 400_000).lost
+    # Balance: as often into a state as out of it.
+    weights = np.array([1.0, p13 * p32 / (p31 * p23), p13 / p31, p14])
+    expected = weights[2:].sum() / weights.sum()
+    assert StateLoss(p13, p31, p32, p23, p14).share() == pytest.approx(expected)
+    assert np.mean(lost) == pytest.approx(expected, abs=0.005)
+    # A run of losses begins in state 3 (from 1 or 2) or is a single one in state 4, which only state 1 follows.
+    begun_in_3 = weights[0] * p13 + weights[1] * p23
+    begun_in_4 = weights[0] * p14
+    length = (begun_in_3 / (p31 + p32) + begun_in_4) / (begun_in_3 + begun_in_4)
+    assert np.mean(bursts(lost)) == pytest.approx(length, abs=0.06)
+
+
+def test_shares_of_chains_that_never_return() -> None:
+    assert StateLoss(0.1, 0.0).share() == pytest.approx(1.0)
+    assert StateLoss(0.0, 0.5).share() == 0.0
+    assert GilbertElliott(0.1, 0.0).share() == pytest.approx(1.0)
+
+
+def test_loss_of_all_and_of_none() -> None:
+    assert all(Run("loss 100%", 500).lost)
+    assert not any(Run("loss 0%", 500).lost)
+
+
+# Delay
+
+
+@pytest.mark.parametrize(
+    ("shape", "mean_ms", "sd_ms"),
+    [
+        ("uniform", 50.0, 10.0 / math.sqrt(3.0)),
+        ("normal", 50.0, 10.0),
+        ("pareto", 49.67, 8.20),
+        ("paretonormal", 49.75, 8.34),
+        ("exponential", 60.0, 10.0),
+    ],
+)
+@pytest.mark.parametrize("correlation", ["", "40% "])
+def test_delays_have_the_moments_of_their_shape(shape: str, mean_ms: float, sd_ms: float, correlation: str) -> None:
+    # netem's correlation leaves delays as they are.
+    delays_s = Run(f"delay 50ms 10ms {correlation}distribution {shape}", 40_000, seed=5).delays_s
+    assert 1e3 * delays_s.mean() == pytest.approx(mean_ms, abs=0.2)
+    assert 1e3 * delays_s.std() == pytest.approx(sd_ms, abs=0.2)
+    assert lag_one(delays_s) == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
+def test_properly_correlated_delays_keep_their_shape(shape: str) -> None:
+    spec = f"delay 50ms 10ms 80% distribution {shape}"
+    correlated = Run(spec, 60_000, seed=2, correlation="proper").delays_s
+    independent = Run(spec, 60_000, seed=2, correlation="netem").delays_s
+    assert correlated.mean() == pytest.approx(independent.mean(), abs=0.4e-3)
+    assert np.quantile(correlated, [0.1, 0.5, 0.9]) == pytest.approx(
+        np.quantile(independent, [0.1, 0.5, 0.9]), abs=7e-4
+    )
+    # Of the normal numbers beneath it is 0.8; of uniform ranks 6/π asin(0.4) = 0.786.
+    ranks = correlated.argsort().argsort()
+    assert lag_one(ranks) == pytest.approx(6.0 / math.pi * math.asin(0.4), abs=0.02)
+
+
+def test_exponential_delays_are_exponential() -> None:
+    delays_s = Run("delay 50ms 10ms distribution exponential", 5000, seed=3).delays_s
+    assert delays_s.min() >= 0.050
+    assert kstest(delays_s - 0.050, "expon", args=(0.0, 0.010)).pvalue > 0.01
+
+
+def test_a_jitter_above_the_delay_sends_some_at_once() -> None:
+    delays_s = Run("delay 5ms 10ms", 10_000, seed=2).delays_s
+    assert delays_s.min() == 0.0
+    assert np.mean(delays_s == 0.0) == pytest.approx(0.25, abs=0.015)

@@ -1,0 +1,350 @@
+"""Each other mechanism of a line beside what theory or the kernel's netem says of it."""
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.emulation.clauses import LinkModel, Outage
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import LinkProfile
+from tests.helpers.link_runs import PERIOD_S, Run
+
+repeatable = settings(derandomize=True, deadline=None)
+
+
+# Duplicates, corruption, reordering
+
+
+def test_duplicates_arrive_apart() -> None:
+    run = Run("delay 50ms 10ms duplicate 10%", 20_000)
+    copies = len(run.deliveries) - 20_000
+    assert copies / 20_000 == pytest.approx(0.10, abs=0.01)
+    assert run.line.figures.duplicated == copies
+    assert not any(run.lost)
+    assert run.line.summary()["achieved"]["duplicate_share"] == pytest.approx(copies / (20_000 + copies))
+
+
+def test_a_duplicate_is_lost_by_itself() -> None:
+    # netem: doubled and lost at once leaves one; else the copy may be lost, too.
+    run = Run("loss 50% duplicate 50%", 40_000)
+    arrived = np.bincount([number for _, number in run.deliveries], minlength=40_000)
+    assert np.mean(arrived == 0) == pytest.approx(0.25, abs=0.01)
+    assert np.mean(arrived == 1) == pytest.approx(0.25 + 0.25 + 0.125, abs=0.01)
+    assert np.mean(arrived == 2) == pytest.approx(0.125, abs=0.01)
+
+
+def test_corruption_turns_over_one_bit() -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse("corrupt 20%"))
+    whole = bytes(range(50))
+    altered = 0
+    places = set()
+    for number in range(5000):
+        line.push(float(number), whole)
+        [received] = line.pop(float(number))
+        difference = int.from_bytes(received, "big") ^ int.from_bytes(whole, "big")
+        assert len(received) == len(whole)
+        assert difference.bit_count() <= 1
+        altered += difference != 0
+        places.add(difference)
+    assert altered / 5000 == pytest.approx(0.20, abs=0.02)
+    assert line.figures.corrupted == altered
+    assert len(places) > 300
+
+
+def test_corruption_reaches_into_items_by_the_function_given() -> None:
+    line: DelayLine[tuple[int, bytes]] = DelayLine(
+        LinkProfile.parse("corrupt 100%"), corrupt=lambda item, flip: (item[0], flip(item[1]))
+    )
+    line.push(0.0, (7, b"\x00\x00"))
+    [(number, payload)] = line.pop(0.0)
+    assert number == 7
+    assert sum(byte.bit_count() for byte in payload) == 1
+
+
+def test_items_that_cannot_be_corrupted_are_refused() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse("corrupt 1%"))
+    with pytest.raises(ValueError, match="item is not bytes"):
+        line.push(0.0, 1)
+    assert line.figures.sent == 0
+
+
+def test_reordering_sends_a_share_at_once() -> None:
+    run = Run("delay 10ms reorder 25%", 20_000)
+    assert np.mean(run.delays_s == 0.0) == pytest.approx(0.25, abs=0.01)
+    # What is sent at once overtakes the ten before it, so that all delayed ones arrive late but for rare runs.
+    assert run.line.summary()["achieved"]["late_share"] == pytest.approx(0.75 * (1.0 - 0.75**9), abs=0.02)
+
+
+def test_netems_correlation_makes_reordering_rare() -> None:
+    # The kernel's netem, measured: reorder 25% 50% reordered 7.3 %.
+    delays_s = Run("delay 10ms reorder 25% 50%", 100_000).delays_s
+    assert np.mean(delays_s == 0.0) == pytest.approx(0.073, abs=0.006)
+    proper_s = Run("delay 10ms reorder 25% 50%", 100_000, correlation="proper").delays_s
+    assert np.mean(proper_s == 0.0) == pytest.approx(0.25, abs=0.01)
+
+
+def test_a_gap_leaves_so_many_in_order() -> None:
+    delays_s = Run("delay 10ms reorder 100% gap 5", 100).delays_s
+    assert [number for number, delay_s in enumerate(delays_s) if delay_s == 0.0] == list(range(4, 100, 5))
+    half = Run("delay 10ms reorder 50% gap 5", 20_000).delays_s
+    gaps = np.diff(np.flatnonzero(half == 0.0))
+    assert gaps.min() >= 5
+    # After the gap, each trial succeeds with a half: one in six on average.
+    assert gaps.mean() == pytest.approx(6.0, abs=0.1)
+
+
+# Rate, limit, slots, outages
+
+
+def test_a_rate_serves_one_message_after_the_other() -> None:
+    # 100 bytes at 400 kbit/s take 2 ms, and come every millisecond.
+    run = Run("rate 400kbit", 50)
+    assert [due_s for due_s, _ in run.deliveries] == pytest.approx([2e-3 * (number + 1) for number in range(50)])
+    assert run.line.summary()["achieved"]["rate_bit_s"] == pytest.approx(400e3)
+
+
+def test_a_rate_comes_after_the_delay() -> None:
+    run = Run("delay 50ms 10ms distribution normal rate 10mbit", 5000, size_bytes=142)
+    due_s = [due_s for due_s, _ in run.deliveries]
+    assert [number for _, number in run.deliveries] == list(range(5000))
+    assert np.diff(due_s).min() >= 142 * 8 / 10e6 - 1e-12
+    assert run.line.figures.late == 0
+
+
+def test_overheads_and_cells_lengthen_the_transmission() -> None:
+    rate = LinkProfile.parse("rate 1mbit 8 48 5").rate
+    assert rate is not None
+    # 100 + 8 bytes fill three cells of 48, each of which travels as 53.
+    assert rate.transmission_s(100) == pytest.approx(3 * 53 * 8 / 1e6)
+    smaller = LinkProfile.parse("rate 1mbit -200").rate
+    assert smaller is not None
+    assert smaller.transmission_s(100) == 0.0
+
+
+def test_a_rate_needs_a_size() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse("rate 1mbit"))
+    with pytest.raises(ValueError, match="size_bytes is missing"):
+        line.push(0.0, 1)
+    with pytest.raises(ValueError, match="size_bytes = -1"):
+        line.push(0.0, 1, -1)
+    by_length: DelayLine[bytes] = DelayLine(LinkProfile.parse("rate 1mbit"))
+    by_length.push(0.0, b"x" * 125)
+    assert by_length.next_due() == pytest.approx(1e-3)
+
+
+def test_the_limit_drops_from_the_tail() -> None:
+    run = Run("rate 400kbit limit 3", 300)
+    # Half as much leaves as comes; the queue of three stays full.
+    assert run.line.figures.dropped == pytest.approx(150, abs=4)
+    assert [number for _, number in run.deliveries][:3] == [0, 1, 2]
+    assert max(run.delays_s) <= 4 * 2e-3 + 1e-9 if not run.line.figures.dropped else True
+    waits_s = [due_s - run.sent_s[number] for due_s, number in run.deliveries]
+    assert max(waits_s) <= 3 * 2e-3 + 1e-9
+
+
+def test_messages_leave_in_slots_alone() -> None:
+    run = Run("delay 1ms 1ms slot 20ms", 2000)
+    times_s = sorted({due_s for due_s, _ in run.deliveries})
+    assert np.diff(times_s) == pytest.approx(0.020)
+    waits_s = np.array([due_s - run.sent_s[number] for due_s, number in run.deliveries])
+    assert waits_s.mean() == pytest.approx(0.001 + 0.010, abs=0.5e-3)
+    assert waits_s.min() >= 0.0
+
+
+def test_slots_of_random_length() -> None:
+    times_s = sorted({due_s for due_s, _ in Run("slot 10ms 30ms", 20_000).deliveries})
+    gaps_s = np.diff(times_s)
+    assert gaps_s.min() >= 0.010
+    # Without anything waiting, slots begin anew with the next message, up to a period later.
+    assert gaps_s.max() <= 0.030 + PERIOD_S
+    assert gaps_s.mean() == pytest.approx(0.020, abs=0.5e-3)
+
+
+def test_a_slot_has_room_for_so_many_messages() -> None:
+    run = Run("slot 10ms packets 4", 2000)
+    times_s, counts = np.unique([due_s for due_s, _ in run.deliveries], return_counts=True)
+    # 10 messages come in the time of 4: all slots are full, and the rest waits for the next.
+    assert set(counts[:-1]) == {4}
+    assert np.diff(times_s) == pytest.approx(0.010)
+    assert [number for _, number in run.deliveries] == [number for number, lost in enumerate(run.lost) if not lost]
+
+
+def test_a_slot_ends_with_the_message_that_fills_its_bytes() -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse("slot 10ms bytes 250"))
+    for size_bytes in (100, 100, 100, 100):
+        line.push(0.0, bytes(size_bytes))
+    # As in netem, a slot with a byte left takes a whole message.
+    assert [len(line.pop(now_s)) for now_s in (0.0101, 0.0201)] == [3, 1]
+
+
+@pytest.mark.parametrize("spec", ["delay 500ms 400ms", "delay 5s 4s"])
+@pytest.mark.parametrize("period_s", [0.05, 0.2])
+def test_short_slots_far_ahead_add_no_more_than_themselves(spec: str, period_s: float) -> None:
+    delays_s = []
+    for profile in (spec, f"{spec} slot 0.1ms"):
+        line: DelayLine[int] = DelayLine(LinkProfile.parse(profile))
+        for number in range(1000):
+            line.push(period_s * number, number)
+        left_s: dict[int, float] = {}
+        while (due_s := line.next_due()) is not None:
+            left_s |= dict.fromkeys(line.pop(due_s), due_s)
+        delays_s.append(np.array([left_s[number] - period_s * number for number in range(1000)]))
+    added_s = delays_s[1] - delays_s[0]
+    assert added_s.min() >= -1e-9
+    assert added_s.max() <= 0.1e-3 + 1e-9
+
+
+def test_gaps_of_slots_follow_a_distribution() -> None:
+    run = Run("slot distribution normal 20ms 2ms", 40_000)
+    gaps_s = np.diff(sorted({due_s for due_s, _ in run.deliveries}))
+    # A slot begins anew with the next message when nothing waits: half a period later on average.
+    assert gaps_s.mean() == pytest.approx(0.020 + 0.5 * PERIOD_S, abs=0.2e-3)
+    assert gaps_s.std() == pytest.approx(0.002, abs=0.2e-3)
+
+
+def test_an_outage_loses_datagrams() -> None:
+    run = Run("delay 5ms outage 0.2s at 0.5s every 1s", 3000)
+    gone = [number for number, lost in enumerate(run.lost) if lost]
+    assert gone == [*range(500, 700), *range(1500, 1700), *range(2500, 2700)]
+    assert run.line.figures.outage == 600
+
+
+def test_an_outage_holds_a_stream_back() -> None:
+    run = Run("delay 5ms outage 200ms at 500ms", 1000, model="stream")
+    assert not any(run.lost)
+    assert run.delays_s[:500] == pytest.approx(0.005)
+    assert run.delays_s[500:700] == pytest.approx(0.005 + 0.2 - PERIOD_S * np.arange(200))
+    assert run.delays_s[700:] == pytest.approx(0.005)
+    assert run.line.figures.held == 200
+
+
+def test_outages_count_from_the_start_given() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse("outage 1s at 1s"), start_s=100.0)
+    for now_s in (100.5, 101.5, 102.0):
+        line.push(now_s, 0)
+    assert line.figures.outage == 1
+    assert Outage(1.0, 5.0, 10.0).end_s(26.0 - 1e-9) == pytest.approx(26.0)
+    assert Outage(1.0, 5.0, 10.0).end_s(26.0) is None
+    assert Outage(1.0, 5.0).end_s(4.9) is None
+
+
+# The stream model
+
+
+def test_a_stream_sends_what_was_lost_again() -> None:
+    run = Run("delay 50ms loss 1% retransmit 62.5ms", 20_000, model="stream")
+    assert not any(run.lost)
+    assert [number for _, number in run.deliveries] == list(range(20_000))
+    assert run.line.figures.retransmitted == pytest.approx(202, abs=45)
+    # Once lost: everything behind it waits until it is there.
+    assert np.quantile(run.delays_s, 0.05) == pytest.approx(0.050)
+    assert set(np.round(run.delays_s, 6)) <= set(np.round(np.arange(50, 176, 0.5) / 1e3, 6))
+
+
+def test_what_is_sent_again_may_be_lost_again() -> None:
+    run = Run("delay 5ms loss 30% retransmit 10ms", 20_000, model="stream")
+    # Each sending fails with 0.3, so that 0.3 + 0.3² + ... = 3 / 7 of a message are repeated on average.
+    assert run.line.figures.retransmitted / 20_000 == pytest.approx(3.0 / 7.0, abs=0.03)
+
+
+def test_a_stream_recovers_within_a_round_trip_and_a_quarter() -> None:
+    profile = LinkProfile.parse("delay 50ms loss 1%", model="stream")
+    assert profile.recovery_s() == pytest.approx(1.25 * 0.100)
+    assert LinkProfile.parse("loss 1%", model="stream").recovery_s() == 1e-3
+    assert LinkProfile.parse("delay 50ms retransmit 1s", model="stream").recovery_s() == 1.0
+
+
+def test_a_stream_shows_no_duplicates_and_checks_for_corruption() -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse("delay 9ms 9ms duplicate 50% corrupt 10%", 1, "stream"))
+    received = []
+    for number in range(2000):
+        line.push(number * PERIOD_S, number.to_bytes(2, "big"))
+        received += line.pop(number * PERIOD_S)
+    received += line.pop(10.0)
+    assert [int.from_bytes(item, "big") for item in received] == list(range(2000))
+    assert line.figures.corrupted == pytest.approx(200, abs=45)
+
+
+# What holds for every line
+
+CLAUSES = (
+    "",
+    "delay 5ms",
+    "delay 9ms 9ms distribution normal",
+    "delay 3ms 9ms 30% reorder 20% gap 3",
+    "loss 20% 10%",
+    "loss state 10% 40% 20% 50% 5%",
+    "loss gemodel 10% 30%",
+    "duplicate 30%",
+    "corrupt 20%",
+    "rate 500kbit 10",
+    "limit 4",
+    "slot 2ms 5ms",
+    "slot 5ms packets 3 bytes 300",
+    "slot distribution pareto 5ms 1ms packets 9",
+    "outage 10ms at 5ms every 30ms",
+)
+
+
+def profiles(model: LinkModel) -> Iterator[str]:
+    for one, other in itertools.combinations(CLAUSES, 2):
+        if one.split()[:1] != other.split()[:1]:
+            yield f"{one} {other} retransmit 7ms" if model == "stream" else f"{one} {other}"
+
+
+@repeatable
+@given(
+    st.lists(st.floats(0.0, 0.01), min_size=1, max_size=60),
+    st.sampled_from(["datagram", "stream"]),
+    st.data(),
+    st.integers(0, 9),
+    st.sampled_from(["netem", "proper"]),
+    st.lists(st.booleans(), min_size=60, max_size=60),
+)
+def test_nothing_appears_or_vanishes_uncounted(
+    gaps_s: list[float], model: LinkModel, data: st.DataObject, seed: int, correlation: str, pops: list[bool]
+) -> None:
+    spec = data.draw(st.sampled_from(list(profiles(model))))
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse(spec, seed, model, correlation))  # type: ignore[arg-type]
+    now_s, popped = 100.0, []
+    for number, (gap_s, pop) in enumerate(zip(gaps_s, pops, strict=False)):
+        now_s += gap_s
+        line.push(now_s, number.to_bytes(1, "big") * 20)
+        if pop:
+            due_s = line.next_due()
+            if due_s is not None and due_s > now_s:
+                assert line.pop(math.nextafter(min(due_s, now_s), -math.inf)) == []
+            popped += line.pop(now_s)
+            next_s = line.next_due()
+            assert next_s is None or next_s > now_s
+        figures = line.figures
+        gone = figures.lost + figures.outage + figures.dropped
+        assert figures.sent + figures.duplicated == len(popped) + gone + line.waiting
+    while (due_s := line.next_due()) is not None:
+        arrived = line.pop(due_s)
+        assert arrived
+        popped += arrived
+    assert line.waiting == 0
+    if model == "stream":
+        first_bytes = [item[0] for item in popped]
+        assert first_bytes == sorted(set(first_bytes))
+        assert line.figures.lost == line.figures.outage == 0
+
+
+@pytest.mark.parametrize("model", ["datagram", "stream"])
+def test_the_same_seed_gives_the_same_deliveries(model: LinkModel) -> None:
+    spec = "delay 20ms 9ms 20% distribution normal loss 5% 20% duplicate 5% reorder 5% rate 9mbit slot 1ms 3ms"
+    first = Run(spec, 1500, 4, model).deliveries
+    assert Run(spec, 1500, 4, model).deliveries == first
+    assert Run(spec, 1500, 5, model).deliveries != first
+
+
+def test_adding_a_mechanism_leaves_the_others_draws_alone() -> None:
+    plain = Run("delay 20ms 9ms", 500, 4)
+    lossy = Run("delay 20ms 9ms loss 0% duplicate 0%", 500, 4)
+    assert lossy.deliveries == plain.deliveries

@@ -1,0 +1,158 @@
+"""What the sockets make of addresses: which are refused, in what words, and what follows from the given ones."""
+
+import re
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from common.errors import ConfigurationError
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
+from tests.helpers.socket_talk import (
+    EPHEMERAL,
+    greet,
+    publish_until_seen,
+)
+
+
+@pytest.fixture
+def robot() -> Iterator[RobotSockets]:
+    with RobotSockets(EPHEMERAL) as opened:
+        yield opened
+
+
+def test_reports_the_ports_that_the_system_chose(robot: RobotSockets) -> None:
+    with RobotSockets("tcp://127.0.0.1:*") as another:
+        endpoints = [robot.control_endpoint, robot.view_endpoint, another.control_endpoint, another.view_endpoint]
+    assert len(set(endpoints)) == 4
+    assert all(re.fullmatch(r"tcp://127\.0\.0\.1:[1-9]\d*", endpoint) for endpoint in endpoints)
+
+
+def port_of(endpoint: str) -> int:
+    return int(endpoint.rsplit(":", 1)[1])
+
+
+def test_the_view_follows_the_control_port() -> None:
+    for _ in range(20):
+        with RobotSockets(EPHEMERAL) as probe:
+            control = probe.control_endpoint
+        try:
+            robot = RobotSockets(control)
+        except ConfigurationError:
+            continue  # another program has one of the two ports
+        with robot, OperatorSockets(control) as operator:
+            assert port_of(robot.view_endpoint) == port_of(control) + 1
+            publish_until_seen(robot, operator, b"telemetry")
+            return
+    pytest.fail("no two ports in a row are free")
+
+
+def test_the_view_can_have_an_address_of_its_own() -> None:
+    with RobotSockets(EPHEMERAL, "tcp://localhost:0") as robot:
+        assert robot.view_endpoint.startswith("tcp://127.0.0.1:")
+        assert robot.view_endpoint != robot.control_endpoint
+
+
+def refusal(make: Callable[[], object]) -> str:
+    with pytest.raises(ConfigurationError) as caught:
+        make()
+    text = str(caught.value)
+    assert "\n" not in text
+    assert "valid: " in text
+    return text
+
+
+MALFORMED = [
+    "",
+    "tcp//x",
+    "127.0.0.1:5555",
+    "ipc:///tmp/control",
+    "udp://127.0.0.1:5555",
+    "tcp://127.0.0.1",
+    "tcp://:5555",
+    "tcp://127.0.0.1:5555/path",
+    "tcp://127.0.0.1:",
+    "tcp://127.0.0.1:http",
+    "tcp://127.0.0.1:-1",
+    "tcp://127.0.0.1:65536",
+    "tcp://127.0.0.1:+80",
+    "tcp://127.0.0.1:٥٥٥٥",
+    "tcp://10.0.0.1;127.0.0.1:5555",
+]
+
+
+@pytest.mark.parametrize("address", MALFORMED)
+def test_refuses_malformed_addresses(address: str) -> None:
+    flags: dict[str, Callable[[], object]] = {
+        "--bind": lambda: RobotSockets(address),
+        "--view-bind": lambda: RobotSockets(EPHEMERAL, address),
+        "--connect": lambda: OperatorSockets(address),
+        "--view-connect": lambda: OperatorSockets("tcp://127.0.0.1:5555", address),
+    }
+    for flag, make in flags.items():
+        text = refusal(make)
+        assert text.startswith(f"{flag}: ")
+        assert repr(address) in text
+
+
+@pytest.mark.parametrize("address", ["tcp://*:5555", "tcp://127.0.0.1:0", "tcp://127.0.0.1:*"])
+def test_refuses_to_connect_to_anything(address: str) -> None:
+    assert repr(address) in refusal(lambda: OperatorSockets(address))
+
+
+def test_refuses_hosts_that_cannot_be_resolved() -> None:
+    # The top-level domain is reserved for names that never resolve (RFC 6761).
+    for make in (RobotSockets, OperatorSockets):
+        text = refusal(lambda make=make: make("tcp://robot.invalid:5555"))  # type: ignore[misc]
+        assert "'robot.invalid'" in text
+        assert "cannot be resolved" in text
+
+
+def test_says_which_port_is_in_use(robot: RobotSockets) -> None:
+    for flag, make in (
+        ("--bind", lambda: RobotSockets(robot.control_endpoint)),
+        ("--view-bind", lambda: RobotSockets(EPHEMERAL, robot.control_endpoint)),
+    ):
+        text = refusal(make)
+        assert text.startswith(f"{flag}: cannot bind {robot.control_endpoint}: the port is in use")
+        suggested = re.findall(r"tcp://127\.0\.0\.1:(\d+)", text)[-1]
+        assert 0 < int(suggested) <= 65535
+        assert int(suggested) != port_of(robot.control_endpoint)
+
+
+def test_a_refused_view_frees_the_control_port(robot: RobotSockets) -> None:
+    with RobotSockets(EPHEMERAL) as probe:
+        control = probe.control_endpoint
+    refusal(lambda: RobotSockets(control, robot.view_endpoint))
+    with RobotSockets(control, EPHEMERAL) as second:
+        assert second.control_endpoint == control
+
+
+def test_refuses_an_address_of_another_machine() -> None:
+    # Reserved for documentation (RFC 5737), hence nobody's.
+    text = refusal(lambda: RobotSockets("tcp://192.0.2.1:5555", insecure=True))
+    assert text.startswith("--bind: cannot bind tcp://192.0.2.1:5555")
+
+
+@pytest.mark.parametrize("address", ["tcp://0.0.0.0:0", "tcp://*:0", "tcp://192.0.2.1:5555"])
+def test_refuses_to_listen_on_the_network_without_keys(address: str) -> None:
+    for flag, make in (
+        ("--bind", lambda: RobotSockets(address)),
+        ("--view-bind", lambda: RobotSockets(EPHEMERAL, address)),
+    ):
+        text = refusal(make)
+        assert text.startswith(f"{flag}: {address!r}")
+        assert "keys" in text
+        assert "--insecure" in text
+
+
+def test_listens_on_the_network_when_told_so() -> None:
+    with RobotSockets("tcp://*:0", insecure=True) as robot:
+        control, view = (f"tcp://127.0.0.1:{port_of(end)}" for end in (robot.control_endpoint, robot.view_endpoint))
+        with OperatorSockets(control, view) as operator:
+            greet(robot, operator)
+
+
+def test_the_last_port_leaves_no_room_for_the_view() -> None:
+    for make in (lambda: RobotSockets("tcp://127.0.0.1:65535"), lambda: OperatorSockets("tcp://127.0.0.1:65535")):
+        assert "'tcp://127.0.0.1:65535' leaves no port after it" in refusal(make)

@@ -1,0 +1,212 @@
+"""Strangers at the open port, by raw TCP: whatever they do, the operator is heard and nothing piles up."""
+
+import contextlib
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.sockets import robot as robot_sockets
+from common.sockets import shell
+from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
+from common.sockets.shell import CONTROL_LIMIT_BYTES
+from feelahead.experiments.hostile.hostile_inputs import Attacker
+from feelahead.experiments.hostile.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS
+
+
+@pytest.fixture
+def robot() -> Iterator[RobotSockets]:
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
+        yield opened
+
+
+@pytest.fixture
+def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
+        assert is_heard(robot, opened)
+        yield opened
+
+
+def is_heard(robot: RobotSockets, operator: OperatorSockets) -> bool:
+    """Whether a message of the operator arrives and one goes back, whatever else is received meanwhile."""
+    for _ in range(ROUNDS):
+        operator.send(b"operator")
+        robot.wait(0.01)
+        for peer, payload in robot.receive():
+            if payload == b"operator":
+                robot.send(peer, b"answer")
+        if operator.wait(0.01) and b"answer" in operator.receive():
+            return True
+    return False
+
+
+def stranger(robot: RobotSockets) -> RawConnection:
+    return RawConnection.introduced(port_of(robot.control_endpoint))
+
+
+def drain(robot: RobotSockets) -> list[bytes]:
+    received: list[bytes] = []
+    while robot.wait(0.1):
+        received += [payload for _, payload in robot.receive()]
+    return received
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def until_descriptors_are(count: int, robot: RobotSockets) -> bool:
+    for _ in range(ROUNDS):
+        if descriptors() <= count:
+            return True
+        robot.wait(0.01)
+        robot.receive()
+    return False
+
+
+def test_the_raw_client_is_understood(robot: RobotSockets) -> None:
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(b"good"))
+        assert drain(robot) == [b"good"]
+
+
+def test_two_thousand_hostile_inputs_leave_the_operator_heard_and_no_descriptor_behind(
+    robot: RobotSockets, operator: OperatorSockets
+) -> None:
+    before = descriptors()
+    attacker = Attacker(port_of(robot.control_endpoint), port_of(robot.view_endpoint), seed=0)
+    for number in range(2000):
+        attacker.send()
+        if number % 20 == 0:
+            robot.receive()
+        if number % 200 == 0:
+            assert is_heard(robot, operator)
+    attacker.close()
+    assert is_heard(robot, operator)
+    assert until_descriptors_are(before, robot)
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_handshakes_cut_off_at_every_byte(robot: RobotSockets, operator: OperatorSockets, closes: bool) -> None:
+    whole = GREETING + ready(b"DEALER")
+    hanging = []
+    for length in range(len(whole)):
+        connection = RawConnection(port_of(robot.control_endpoint), whole[:length])
+        if closes:
+            connection.close()
+        else:
+            hanging.append(connection)
+    assert is_heard(robot, operator)
+    for connection in hanging:
+        connection.close()
+
+
+def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shell, "HANDSHAKE_LIMIT_S", 0.2)
+    with RobotSockets(EPHEMERAL) as robot:
+        slow = [RawConnection(port_of(robot.control_endpoint), GREETING[:length]) for length in (0, 1, 10, 63, 64)]
+        assert all(connection.ended() for connection in slow)
+
+
+def test_five_hundred_connections_at_once_keep_nobody_out(robot: RobotSockets, operator: OperatorSockets) -> None:
+    before = descriptors()
+    crowd = [RawConnection(port_of(robot.control_endpoint)) for _ in range(500)]
+    assert is_heard(robot, operator)
+    for connection in crowd:
+        connection.close()
+    assert until_descriptors_are(before, robot)
+
+
+@pytest.mark.parametrize("claimed", [CONTROL_LIMIT_BYTES + 1, 10**6, 2**31, 2**62, 2**63, 2**64 - 1])
+def test_a_frame_that_claims_too_much_ends_its_connection_alone(
+    robot: RobotSockets, operator: OperatorSockets, claimed: int
+) -> None:
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(frame(bytes(100), claimed_bytes=claimed))
+        assert connection.ended()
+    assert is_heard(robot, operator)
+
+
+def test_the_largest_message_that_is_allowed_arrives_and_the_next_larger_does_not(robot: RobotSockets) -> None:
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(bytes(CONTROL_LIMIT_BYTES)))
+        assert drain(robot) == [bytes(CONTROL_LIMIT_BYTES)]
+        connection.send(message(bytes(CONTROL_LIMIT_BYTES + 1)))
+        assert drain(robot) == []
+        assert connection.ended()
+
+
+@pytest.mark.parametrize("frames", [2, 3, 100, 20_000])
+def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
+    robot: RobotSockets, operator: OperatorSockets, frames: int
+) -> None:
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(*[b"x"] * frames) + message(b"last"))
+        steps = 0
+        for _ in range(ROUNDS):
+            robot.wait(0.05)
+            steps += 1
+            if b"last" in [payload for _, payload in robot.receive()]:
+                break
+        assert robot.rejected == 1
+        assert steps >= frames // 128  # 64 messages of two frames in each call
+        assert is_heard(robot, operator)
+
+
+def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
+    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
+    received = 0
+    with contextlib.closing(stranger(robot)) as connection:
+        for _ in range(ROUNDS):
+            connection.send(message(b"flood") * 10)
+            received += [payload for _, payload in robot.receive()].count(b"flood")
+            if not connection.open:
+                break
+        assert connection.ended()
+    assert robot.flooding > 0
+    assert received <= 400  # the limit of two seconds, as one may begin in between
+    assert is_heard(robot, operator)
+
+
+def test_random_bytes_after_a_proper_handshake(robot: RobotSockets, operator: OperatorSockets) -> None:
+    generator = random.Random(1)  # noqa: S311
+    for _ in range(200):
+        with contextlib.closing(stranger(robot)) as connection:
+            connection.send(generator.randbytes(generator.randint(1, 300)))
+    assert is_heard(robot, operator)
+
+
+def test_the_view_port_takes_nothing_large_and_survives_garbage(robot: RobotSockets, operator: OperatorSockets) -> None:
+    generator = random.Random(2)  # noqa: S311
+    port = port_of(robot.view_endpoint)
+    for _ in range(100):
+        RawConnection(port, generator.randbytes(100)).close()
+    greedy = RawConnection.introduced(port, b"SUB")
+    greedy.send(frame(b"\x01", claimed_bytes=2**40))
+    assert greedy.ended()
+    for _ in range(ROUNDS):
+        robot.publish(b"telemetry", b"state")
+        if operator.wait(0.01) and operator.receive_view():
+            return
+    pytest.fail("the viewer sees nothing any more")
+
+
+def test_with_keys_no_raw_peer_of_any_version_gets_a_byte_to_the_codec(tmp_path: Path) -> None:
+    generator = random.Random(3)  # noqa: S311
+    keys = RobotKeys(make_key_pair()[1], AllowList(KeyFolder(tmp_path)))
+    with RobotSockets(EPHEMERAL, keys=keys) as robot:
+        port = port_of(robot.control_endpoint)
+        for _ in range(100):
+            RawConnection(port, generator.randbytes(200)).close()
+            # Old peers introduce themselves by a short frame, without a mechanism.
+            RawConnection(port, b"\x01\x00" + frame(b"payload")).close()
+            RawConnection(port, GREETING + ready(b"DEALER") + message(b"payload")).close()
+        assert drain(robot) == []
+        assert robot.rejected == 0

@@ -1,0 +1,302 @@
+"""Real sockets on loopback. Nothing here sleeps: every wait is for a message, or for a bounded time at most."""
+
+from collections.abc import Iterator
+
+import pytest
+import zmq
+
+from common.sockets import shell
+from common.sockets.operator import OperatorSockets
+from common.sockets.robot import RobotSockets
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
+from tests.helpers.socket_talk import (
+    EPHEMERAL,
+    PATIENT_S,
+    ROUNDS,
+    drain_until,
+    greet,
+    publish_until_seen,
+    receive_one,
+    send_until_connected,
+)
+
+
+@pytest.fixture
+def robot() -> Iterator[RobotSockets]:
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
+        yield opened
+
+
+@pytest.fixture
+def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
+        yield opened
+
+
+# Control
+
+
+def test_control_goes_both_ways(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    assert robot.send(peer, b"stiffness")
+    assert operator.wait(10.0)
+    assert operator.receive() == [b"stiffness"]
+    assert (robot.dropped, robot.rejected, operator.rejected) == (0, 0, 0)
+
+
+def test_operators_are_told_apart(robot: RobotSockets, operator: OperatorSockets) -> None:
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint) as second:
+        first_peer, second_peer = greet(robot, operator), greet(robot, second)
+        assert first_peer != second_peer
+        assert robot.send(second_peer, b"for the second")
+        assert second.wait(10.0)
+        assert second.receive() == [b"for the second"]
+        assert operator.receive() == []
+
+
+def test_empty_payloads_are_messages(robot: RobotSockets, operator: OperatorSockets) -> None:
+    send_until_connected(operator, b"")
+    assert receive_one(robot)[1] == b""
+
+
+def test_an_unknown_peer_is_counted(robot: RobotSockets) -> None:
+    assert not robot.send(b"nobody", b"stiffness")
+    assert robot.dropped == 1
+
+
+def test_a_peer_that_left_is_counted(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    operator.close()
+    for _ in range(ROUNDS):
+        if not robot.send(peer, b"stiffness"):
+            break
+        robot.wait(0.01)
+    assert robot.dropped == 1
+
+
+def test_nothing_is_kept_for_a_robot_that_is_not_there() -> None:
+    with RobotSockets(EPHEMERAL) as robot:
+        control, view = robot.control_endpoint, robot.view_endpoint
+    with OperatorSockets(control, view) as operator:
+        assert [operator.send(b"stale") for _ in range(3)] == [False] * 3
+        assert operator.dropped == 3
+        with RobotSockets(control, view) as late:
+            send_until_connected(operator, b"fresh")
+            assert receive_one(late)[1] == b"fresh"
+
+
+def test_a_restarted_robot_is_found_again() -> None:
+    with RobotSockets(EPHEMERAL) as robot:
+        control, view = robot.control_endpoint, robot.view_endpoint
+        operator = OperatorSockets(control, view)
+        greet(robot, operator)
+    with operator, RobotSockets(control, view) as restarted:
+        greeted = False
+        for _ in range(ROUNDS):
+            operator.send(b"again")
+            if restarted.wait(0.01):
+                greeted = restarted.receive()[0][1] == b"again"
+                break
+        assert greeted
+
+
+def test_a_flood_never_blocks_and_what_was_taken_arrives(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    taken = [number for number in range(20_000) if robot.send(peer, b"%d" % number)]
+    assert len(taken) + robot.dropped == 20_000
+    assert robot.dropped > 0
+    received = drain_until(operator.receive, operator.wait, b"%d" % taken[-1])
+    assert received == [b"%d" % number for number in taken]
+
+
+def test_a_short_burst_passes_whole(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    for number in range(10):
+        assert robot.send(peer, b"%d" % number)
+    received = drain_until(operator.receive, operator.wait, b"9")
+    assert received == [b"%d" % number for number in range(10)]
+
+
+def test_one_call_receives_a_bounded_number(
+    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    greet(robot, operator)
+    monkeypatch.setattr(shell, "MESSAGES_PER_RECEIVE", 3)
+    for number in range(8):
+        send_until_connected(operator, b"%d" % number)
+    batches: list[list[bytes]] = []
+
+    def receive() -> list[bytes]:
+        batches.append([payload for _, payload in robot.receive()])
+        return batches[-1]
+
+    assert drain_until(receive, robot.wait, b"7") == [b"%d" % number for number in range(8)]
+    assert max(len(batch) for batch in batches) <= 3
+
+
+# Bad messages
+
+
+@pytest.fixture
+def stranger() -> Iterator["zmq.Socket[bytes]"]:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    dealer = context.socket(zmq.DEALER)
+    dealer.setsockopt(zmq.SNDTIMEO, 10_000)
+    yield dealer
+    context.destroy(linger=0)
+
+
+@pytest.mark.parametrize("frames", [[b"", b"request"], [b"a", b"b", b"c"]])
+def test_messages_of_several_frames_are_rejected(
+    robot: RobotSockets, stranger: "zmq.Socket[bytes]", frames: list[bytes]
+) -> None:
+    stranger.connect(robot.control_endpoint)
+    stranger.send_multipart(frames)
+    stranger.send(b"good")
+    received = drain_until(lambda: [payload for _, payload in robot.receive()], robot.wait, b"good")
+    assert received == [b"good"]
+    assert robot.rejected == 1
+
+
+def test_an_oversized_message_does_not_arrive_and_harms_nobody(
+    robot: RobotSockets, operator: OperatorSockets, stranger: "zmq.Socket[bytes]"
+) -> None:
+    stranger.connect(robot.control_endpoint)
+    stranger.send(bytes(CONTROL_LIMIT_BYTES + 1))
+    greet(robot, operator)
+    # The robot side ends the stranger's connection; what is sent before the stranger notices is lost with it.
+    for _ in range(ROUNDS):
+        stranger.send(b"after")
+        if robot.wait(0.05):
+            break
+    assert {payload for _, payload in robot.receive()} == {b"after"}
+
+
+def test_garbage_from_a_raw_connection_harms_nobody(robot: RobotSockets, operator: OperatorSockets) -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    try:
+        raw = context.socket(zmq.STREAM)
+        raw.connect(robot.control_endpoint)
+        assert raw.poll(10_000)
+        connection = raw.recv_multipart()[0]
+        raw.send_multipart([connection, bytes(range(256)) * 16])
+        greet(robot, operator)
+    finally:
+        context.destroy(linger=0)
+
+
+def test_refuses_to_send_more_than_the_other_side_accepts(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    for send in (operator.send, lambda payload: robot.send(peer, payload)):
+        with pytest.raises(ValueError, match=f"{CONTROL_LIMIT_BYTES + 1} bytes; valid: up to {CONTROL_LIMIT_BYTES}"):
+            send(bytes(CONTROL_LIMIT_BYTES + 1))
+        assert send(bytes(CONTROL_LIMIT_BYTES))
+    with pytest.raises(ValueError, match=f"valid: up to {VIEW_LIMIT_BYTES}"):
+        robot.publish(b"video", bytes(VIEW_LIMIT_BYTES + 1))
+
+
+# View
+
+
+def test_view_delivers_topics_and_payloads(robot: RobotSockets, operator: OperatorSockets) -> None:
+    publish_until_seen(robot, operator, b"telemetry")
+    robot.publish(b"video", b"frame")
+    seen = drain_until(lambda: [b"|".join(pair) for pair in operator.receive_view()], operator.wait, b"video|frame")
+    assert set(seen) == {b"telemetry|probe", b"video|frame"}
+
+
+def test_only_the_topics_asked_for_arrive(robot: RobotSockets) -> None:
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, topics=[b"telemetry"]) as operator:
+        for _ in range(ROUNDS):
+            robot.publish(b"video", b"frame")
+            robot.publish(b"telemetry", b"state")
+            if operator.wait(0.01):
+                break
+        assert {topic for topic, _ in operator.receive_view()} == {b"telemetry"}
+
+
+def test_a_slow_viewer_loses_frames_alone(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint) as slow:
+        publish_until_seen(robot, slow, b"video")
+        publish_until_seen(robot, operator, b"video")
+        operator.receive_view()
+        for number in range(400):
+            robot.publish(b"video", bytes(100_000))
+            assert robot.send(peer, b"%d" % number)
+            assert drain_until(operator.receive, operator.wait, b"%d" % number) == [b"%d" % number]
+            operator.receive_view()
+        slow_frames = 0
+        while slow.wait(0.3):
+            slow_frames += len(slow.receive_view())
+    assert 0 < slow_frames < 400
+    assert robot.dropped == 0
+
+
+# Waiting
+
+
+def test_waiting_for_nothing_ends(robot: RobotSockets, operator: OperatorSockets) -> None:
+    assert not robot.wait(0.0)
+    assert not robot.wait(0.002)
+    assert not operator.wait(0.0)
+
+
+def test_waiting_without_limit_ends_with_a_message(robot: RobotSockets, operator: OperatorSockets) -> None:
+    send_until_connected(operator, b"hello")
+    assert robot.wait(None)
+    assert robot.wait(0.0)
+    assert len(robot.receive()) == 1
+    assert not robot.wait(0.0)
+
+
+def test_the_operator_wakes_on_either_socket(robot: RobotSockets, operator: OperatorSockets) -> None:
+    publish_until_seen(robot, operator, b"telemetry")
+    drain_until(lambda: [topic for topic, _ in operator.receive_view()], operator.wait, b"telemetry")
+    while operator.wait(0.1):
+        operator.receive_view()
+    robot.publish(b"telemetry", b"state")
+    assert operator.wait(10.0)
+    assert operator.receive() == []
+    assert operator.receive_view() == [(b"telemetry", b"state")]
+    peer = greet(robot, operator)
+    robot.send(peer, b"stiffness")
+    assert operator.wait(10.0)
+    assert operator.receive_view() == []
+    assert operator.receive() == [b"stiffness"]
+
+
+def test_no_wake_is_lost_between_sends_and_receives(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    for number in range(2000):
+        assert robot.send(peer, b"%d" % number)
+        assert operator.wait(10.0)
+        assert operator.receive() == [b"%d" % number]
+        assert operator.send(b"%d" % number)
+        assert receive_one(robot) == (peer, b"%d" % number)
+
+
+@pytest.mark.parametrize("timeout_s", [-0.001, float("nan")])
+def test_refuses_impossible_timeouts(robot: RobotSockets, timeout_s: float) -> None:
+    with pytest.raises(ValueError, match="timeout_s = "):
+        robot.wait(timeout_s)
+
+
+# Settings and closing
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, 0.02, 61.0, float("nan")])
+def test_refuses_heartbeats_that_cannot_work(timeout_s: float) -> None:
+    with pytest.raises(ValueError, match="heartbeat_timeout_s = "):
+        RobotSockets(EPHEMERAL, heartbeat_timeout_s=timeout_s)
+    with pytest.raises(ValueError, match="heartbeat_timeout_s = "):
+        OperatorSockets("tcp://127.0.0.1:5555", heartbeat_timeout_s=timeout_s)
+
+
+def test_closing_twice_and_with_unsent_messages_ends(robot: RobotSockets, operator: OperatorSockets) -> None:
+    peer = greet(robot, operator)
+    for _ in range(5000):
+        robot.send(peer, bytes(1000))
+    for end in (robot, operator):
+        end.close()
+        end.close()

@@ -1,0 +1,223 @@
+"""`feelahead calibrate`, and the operator side that uses what it has stored."""
+
+import math
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import feelahead.commands.calibrate
+import operator_side.main
+from common.errors import ConfigurationError, DeviceError
+from feelahead.main import command
+from operator_side.calibration.procedure import CalibrationError
+from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.core import OperatorSide
+from operator_side.dualsense.hid import connection
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
+
+REPORT_S = 0.004
+MEASURED = TravelCalibration(l2=TriggerTravel(0.1, 0.7))
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    return tmp_path
+
+
+def willing_hands(now_s: float) -> ControllerState:
+    """Rest, pulls of L2 that end at 0.9, pulls of R2, a turn of the sticks, rest: by the clock."""
+    pulled = math.sin(math.pi * now_s) ** 2
+    if 2.0 <= now_s < 5.0:
+        return ControllerState(l2=0.9 * pulled)
+    if 5.0 <= now_s < 8.0:
+        return ControllerState(r2=pulled)
+    if 8.0 <= now_s < 9.0:
+        around = (math.cos(2.0 * math.pi * now_s), math.sin(2.0 * math.pi * now_s))
+        return ControllerState(left_stick=around, right_stick=around)
+    return ControllerState()
+
+
+class PlayedHandle(FakeHandle):
+    """A real controller, as far as hidapi can tell, whose state follows a clock of its own."""
+
+    def play(self, hands: Callable[[float], ControllerState | None]) -> None:
+        self.hands, self.now_s = hands, 0.0
+
+
+@pytest.fixture
+def handle(monkeypatch: pytest.MonkeyPatch) -> PlayedHandle:
+    played = PlayedHandle()
+    played.play(willing_hands)
+
+    class Clock:
+        def now(self) -> float:
+            played.now_s += REPORT_S
+            played.waiting = [build_input_report(state)] if (state := played.hands(played.now_s)) else []
+            return played.now_s
+
+    monkeypatch.setattr(feelahead.commands.calibrate, "MonotonicClock", Clock)
+    monkeypatch.setattr("feelahead.commands.calibrate.time.sleep", lambda _: None)
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": played}})
+    monkeypatch.setattr(feelahead.commands.calibrate, "load_backend", lambda: backend)
+    return played
+
+
+def test_a_real_controller_is_measured_and_kept_by_its_address(
+    handle: PlayedHandle, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["calibrate"]) == 0
+    stored = load_calibration(ADDRESS)
+    assert stored is not None
+    assert stored.l2.saturation == pytest.approx(0.87, abs=0.01)
+    assert stored.r2.saturation == pytest.approx(0.97, abs=0.01)
+    said = capsys.readouterr().out
+    assert "Pull L2 all the way and let go, three times." in said
+    assert str(calibration_path(ADDRESS)) in said
+    assert "a full pull reaches 7 of 10 zones, in which 57 of 81 levels differ" in said
+    # Nothing pushed against the fingers, and nothing is left on.
+    assert set(handle.written) == {build_output_report(RELEASED)}
+    assert handle.closed == handle.times_opened > 0
+
+
+def test_a_simulated_controller_is_kept_only_where_asked_for(
+    tmp_path: Path, own_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["calibrate", "--device", "simulated"]) == 0
+    assert "nothing was stored" in capsys.readouterr().out
+    assert list(own_folder.iterdir()) == []
+    out = tmp_path / "mine.toml"
+    assert command(["calibrate", "--device", "simulated", "--out", str(out)]) == 0
+    _, calibration = read_calibration(out)
+    assert calibration.r2 == TriggerTravel(0.03, 0.97)
+    assert f"stored: {out}" in capsys.readouterr().out
+
+
+def test_hands_that_do_not_pull_are_told_why_and_nothing_is_stored(handle: PlayedHandle, own_folder: Path) -> None:
+    handle.play(lambda _: ControllerState())
+    with pytest.raises(CalibrationError, match="Pull L2"):
+        command(["calibrate"])
+    assert list(own_folder.iterdir()) == []
+    assert handle.closed == handle.times_opened > 0
+
+
+def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
+    handle.play(lambda now_s: ControllerState() if now_s < 1.0 else None)
+    with pytest.raises(DeviceError, match="said nothing for 5 s"):
+        command(["calibrate"])
+    assert handle.closed == handle.times_opened > 0
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="is a folder"):
+        command(["calibrate", "--out", str(tmp_path)])
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [("/dev/null", "is no regular file"), ("new/mine.toml", "there is no folder"), ("pipe", "is no regular file")],
+)
+def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_measured(
+    out: str, said: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    with pytest.raises(ConfigurationError, match=f"--out {out}: {said}"):
+        command(["calibrate", "--out", out])
+    assert handle.now_s == 0.0
+    assert [file.name for file in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_a_pipe_where_it_is_kept_is_refused_before_anything_is_measured(handle: PlayedHandle) -> None:
+    path = calibration_path(ADDRESS)
+    path.parent.mkdir(parents=True)
+    os.mkfifo(path)
+    with pytest.raises(ConfigurationError, match="is no regular file"):
+        command(["calibrate"])
+    assert handle.now_s == 0.0
+    assert handle.closed == handle.times_opened > 0
+    assert path.is_fifo()
+
+
+# The operator side
+
+
+@pytest.fixture
+def operator(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[TravelCalibration]]:
+    """Runs the operator side for a moment; what it read its controller through."""
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
+    monkeypatch.setattr(operator_side.main, "load_backend", lambda: backend)
+    taken: list[TravelCalibration] = []
+    monkeypatch.setattr(OperatorSide, "calibrate", lambda _, calibration: taken.append(calibration))
+
+    def run(*arguments: str) -> list[TravelCalibration]:
+        options = ["--connect", "tcp://127.0.0.1:9", "--duration", "0.5", "--no-haptics", *arguments]
+        operator_side.main.command(options)
+        return taken
+
+    return run
+
+
+def test_the_operator_side_uses_what_is_stored_for_its_controller(
+    operator: Callable[..., list[TravelCalibration]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert operator() == [TravelCalibration()]
+    assert "feelahead calibrate" in capsys.readouterr().out
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    assert operator()[1:] == [MEASURED]
+    assert str(calibration_path(ADDRESS)) in capsys.readouterr().out
+
+
+def test_what_is_given_comes_before_what_is_stored(operator: Callable[..., list[TravelCalibration]]) -> None:
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    assert operator("--calibration.l2.saturation", "0.9") == []
+
+
+def test_a_broken_file_ends_the_operator_side_in_one_line(operator: Callable[..., list[TravelCalibration]]) -> None:
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    calibration_path(ADDRESS).write_text("version = 7")
+    with pytest.raises(ConfigurationError, match="feelahead calibrate") as caught:
+        operator()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    handle = FakeHandle()
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": handle}})
+    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    taken: list[TravelCalibration] = []
+
+    def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
+        """Each time that it is found, something else is stored and it is unplugged; the third time is the last."""
+        taken.append(calibration)
+        if len(taken) == 1:
+            calibration_path(ADDRESS).write_text("version = 7")
+        elif len(taken) == 2:
+            write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+        else:
+            signal.raise_signal(signal.SIGTERM)
+        handle.plugged_in = False
+
+    def controller_lost(_: OperatorSide, now_s: float) -> None:
+        del now_s
+        handle.plugged_in = True
+
+    monkeypatch.setattr(OperatorSide, "calibrate", calibrate)
+    monkeypatch.setattr(OperatorSide, "controller_lost", controller_lost)
+    monkeypatch.setattr(connection, "LOOK_PERIOD_S", 0.01)
+    options = ["--connect", "tcp://127.0.0.1:9", "--duration", "60", "--no-haptics"]
+    assert operator_side.main.command(options, backend) == 0
+    assert taken == [MEASURED, TravelCalibration(), MEASURED]
+    said = capsys.readouterr().out
+    assert said.count(f"{calibration_path(ADDRESS)}: ") == 1
+    assert "its travel is read by the defaults" in said
+    assert said.count(f"its travel calibration: {calibration_path(ADDRESS)}") == 2

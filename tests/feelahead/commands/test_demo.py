@@ -1,0 +1,115 @@
+"""What the demo passes on to the two sides, and what it says when something ends early."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from common.command.command_line import given_fields, parse_settings
+from common.errors import ConfigurationError
+from feelahead.commands import demo as module
+from feelahead.commands.demo import DemoSettings, demo
+from tests.helpers.repository import ROOT
+
+LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
+
+
+def passed_on(*arguments: str) -> tuple[list[str], list[str]]:
+    settings = parse_settings(DemoSettings, "demo", arguments)
+    given = given_fields(arguments, DemoSettings)
+    path = Path("summary.json")
+    robot = module._robot_arguments(settings, given, path)
+    return robot, module._operator_arguments(settings, given, path, LISTENING)
+
+
+def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> None:
+    config = tmp_path / "robot.toml"
+    config.write_text("seed = 3\nprobability = 0.5\n")
+    robot, operator = passed_on("--robot-config", str(config))
+    assert robot == ["--summary=summary.json", "--bind=tcp://127.0.0.1:0", f"--config={config}"]
+    assert not [flag for flag in operator if flag.startswith(("--seed", "--link", "--haptics", "--no-haptics"))]
+
+
+def test_what_was_said_is_passed_on_even_where_it_is_the_default() -> None:
+    robot, operator = passed_on("--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime")
+    assert {"--seed=0", "--link=delay 5ms", "--probability=0.99", "--realtime"} <= set(robot)
+    assert {"--seed=0", "--link=delay 5ms", "--haptics", "--realtime"} <= set(operator)
+    assert "--no-haptics" in passed_on("--no-haptics")[1]
+
+
+def test_the_demos_own_file_counts_as_said(tmp_path: Path) -> None:
+    config = tmp_path / "demo.toml"
+    config.write_text('link = "delay 5ms"\nhaptics = false\n')
+    robot, operator = passed_on("--config", str(config))
+    assert "--link=delay 5ms" in robot
+    assert "--no-haptics" in operator
+
+
+@pytest.mark.parametrize("mode", ["line", "json", "none"])
+def test_errors_go_to_standard_error_in_every_mode(
+    mode: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_run_both", lambda *_: ["the robot side ended early"])
+    assert demo(["--status", mode]) == 1
+    assert capsys.readouterr().err == "feelahead demo: the robot side ended early\n"
+
+
+def test_a_side_that_refuses_its_settings_is_bad_input() -> None:
+    with pytest.raises(ConfigurationError, match="probability"):
+        demo(["--probability", "2", "--status", "none"])
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "feelahead", "demo", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+
+
+@pytest.mark.processes
+def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
+    with start("--duration", "60", "--status", "json") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert json.loads(process.stdout.readline())["event"] == "note"
+        process.stdout.close()
+        complaint = process.stderr.read()
+        code = process.wait(timeout=120)
+    assert (code, complaint) == (0, "")
+
+
+@pytest.mark.processes
+def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) -> None:
+    with start("--duration", "60", "--status", "json", "--summary", str(tmp_path / "out.json")) as process:
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["event"] == "note"
+        assert json.loads(process.stdout.readline()) | {"process_id": 0} == {
+            "event": "started",
+            "side": "robot",
+            "process_id": 0,
+        }
+        process.send_signal(signal.SIGINT)
+        _, complaint = process.communicate(timeout=20)
+    assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+def test_the_summary_has_each_loops_pace_and_what_strangers_did(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    with start("--duration", "2", "--status", "none", "--realtime", "--summary", str(path)) as process:
+        _, complaint = process.communicate(timeout=120)
+    assert (process.returncode, complaint) == (0, "")
+    summary = json.loads(path.read_text())
+    for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
+        assert paced["overruns"] >= 0
+        assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
+    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "malformed": 0, "unread": 0}
+    # Every deadline was met by a tick or counted as an overrun.
+    ticks = summary["ticks"] + summary["overruns"]
+    assert ticks == pytest.approx(summary["duration_s"] * 1000, abs=100)

@@ -1,0 +1,160 @@
+"""`feelahead virtual-dualsense` towards a kernel in virtual time, and where there is none."""
+
+import os
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from common.clock import VirtualClock
+from common.errors import ConfigurationError
+from feelahead.commands.virtual_dualsense import (
+    DRIVER_PATIENCE_S,
+    PULL_PERIOD_S,
+    VirtualDualSenseSettings,
+    described,
+    live,
+    pulling,
+    virtual_dualsense,
+)
+from feelahead.main import command
+from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.feature_report import parse_address
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from operator_side.dualsense.uhid.file import UHID_PATH
+from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
+
+INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
+
+
+def lived(
+    kernel: FakeKernel, settings: VirtualDualSenseSettings, stopped: Callable[[], bool] = lambda: False
+) -> list[str]:
+    """What a controller says in its life."""
+    lines: list[str] = []
+    live(settings, kernel, kernel.clock, stopped, lines.append)
+    return lines
+
+
+def sent_states(kernel: FakeKernel) -> list[ControllerState]:
+    """The input reports, without the 6 bytes in front of each."""
+    return [parse_input_report(event[6:]) for _, event in kernel.heard_of(INPUT2)]
+
+
+@pytest.mark.parametrize(
+    ("transport", "edge", "first"),
+    [
+        ("usb", False, "Sony Interactive Entertainment DualSense Wireless Controller on USB"),
+        ("bluetooth", True, "DualSense Edge Wireless Controller on Bluetooth"),
+    ],
+)
+def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None:
+    by = Transport.USB if transport == "usb" else Transport.BLUETOOTH
+    told = [
+        OutputReport(l2=Feedback(position=3, strength=6), lightbar=(0, 0, 64)),
+        OutputReport(l2=Feedback(position=3, strength=6), r2=Off()),  # nothing new
+        OutputReport(l2=Off(), r2=Feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
+    ]
+    events = [(0.0, get_report(1, 0x09)), (0.01, said(START))]
+    events += [(0.02, output(build_output_report(one, by))) for one in told]
+    kernel = FakeKernel(VirtualClock(), deque([*events, (0.05, said(STOP))]))
+    settings = VirtualDualSenseSettings(transport=transport, edge=edge, duration=0.1)  # type: ignore[arg-type]
+    lines = lived(kernel, settings)
+    address = parse_address(kernel.heard_of(GET_REPORT_REPLY)[0][1][12:], by)
+    assert lines == [
+        f"plugging in: {first}, {address}",
+        "a driver has taken it",
+        "L2: Feedback, position 3, strength 6",
+        "lightbar: red 0, green 0, blue 64",
+        "L2: Off",
+        "R2: Feedback, position 0, strength 8",
+        "rumble: left 100%, right 0%",
+        "its driver has let it go",
+        "unplugged: 10 reports sent, 3 taken, 0 refused",
+    ]
+    assert kernel.heard[-1][1][0] == DESTROY
+
+
+def test_it_ends_when_it_is_asked_to() -> None:
+    kernel = FakeKernel(VirtualClock())
+    lived(kernel, VirtualDualSenseSettings(), stopped=lambda: kernel.clock.now() >= 3.0)
+    assert kernel.clock.now() == pytest.approx(3.0, abs=0.01)
+
+
+def test_without_a_driver_it_says_so_once() -> None:
+    kernel = FakeKernel(VirtualClock())
+    lines = lived(kernel, VirtualDualSenseSettings(duration=2 * DRIVER_PATIENCE_S))
+    assert lines[1:] == [
+        "no driver has taken it so far: sudo modprobe hid-playstation",
+        "unplugged: 0 reports sent, 0 taken, 0 refused",
+    ]
+
+
+def test_pulling_hands_are_seen_to_move() -> None:
+    kernel = FakeKernel(VirtualClock(), deque([(0.0, said(START))]))
+    lived(kernel, VirtualDualSenseSettings(duration=PULL_PERIOD_S, hands="pulling"))
+    states = sent_states(kernel)
+    assert len(states) == pytest.approx(PULL_PERIOD_S * 250, abs=2)
+    for axis in (0, 1):
+        moved = [state.left_stick[axis] for state in states]
+        assert (min(moved), max(moved)) == pytest.approx((-0.8, 0.8), abs=0.01)
+    assert max(state.l2 for state in states) == max(state.r2 for state in states) == 1.0
+    middle = len(states) // 2
+    assert all(state.l2 == 0.0 for state in states[:middle])
+    assert all(state.r2 == 0.0 for state in states[middle + 50 :])
+
+
+@pytest.mark.parametrize(
+    ("quarters", "expected"),
+    [
+        (0, [0.0, 0.0, 0.8, 0.0]),
+        (1, [0.0, NORMAL_FINGER_FORCE_N, 0.0, 0.8]),
+        (3, [NORMAL_FINGER_FORCE_N, 0.0, 0.0, -0.8]),
+    ],
+)
+def test_hands_that_pull(quarters: int, expected: list[float]) -> None:
+    l2_n, r2_n, stick = pulling(quarters * PULL_PERIOD_S / 4)
+    assert [l2_n, r2_n, *stick] == pytest.approx(expected)
+
+
+def test_effects_in_words() -> None:
+    assert described(Off()) == "Off"
+    assert described(Feedback(position=9, strength=1)) == "Feedback, position 9, strength 1"
+
+
+@pytest.mark.parametrize("duration", ["0", "-1", "1e6", "nan"])
+def test_an_impossible_duration_is_refused(duration: str) -> None:
+    with pytest.raises(ConfigurationError, match=r"--duration .*: valid: above 0"):
+        virtual_dualsense(["--duration", duration])
+
+
+def test_the_command_is_one_of_feelaheads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A pipe in the kernel's place gives back what is written to it, which nobody here understands."""
+    os.mkfifo(tmp_path / "uhid")
+    opened: list[Path] = []
+
+    def open_pipe(path: Path, flags: int, _open: Callable[[Path, int], int] = os.open) -> int:
+        opened.append(path)
+        return _open(tmp_path / "uhid", flags)
+
+    monkeypatch.setattr("operator_side.dualsense.uhid.file.os.open", open_pipe)
+    assert command(["virtual-dualsense", "--duration", "0.05"]) == 0
+    assert opened == [UHID_PATH]
+
+
+@pytest.mark.skipif(UHID_PATH.exists(), reason="this machine has /dev/uhid")
+def test_without_uhid_it_says_in_one_line_what_to_do() -> None:
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "feelahead", "virtual-dualsense"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    [line] = done.stderr.splitlines()
+    assert line.startswith("feelahead: no /dev/uhid")
+    assert "sudo modprobe uhid" in line

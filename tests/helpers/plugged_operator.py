@@ -1,0 +1,76 @@
+"""feelahead-operator on a controller made of two files: a program for tests/operator_side/test_controller_processes.py.
+
+    python plugged_operator.py FOLDER [feelahead-operator's flags]
+
+FOLDER/hidraw3 is a FIFO that gets what is written to the controller. While FOLDER/plugged exists, the controller is
+plugged in; FOLDER/broken makes reading it fail as no driver should. While FOLDER/hangs exists, no write returns.
+"""
+
+import os
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+from common.clock import MonotonicClock
+from common.command.launch import launch
+from operator_side.dualsense.hid.device import HidHandle
+from operator_side.main import command
+from tests.helpers.fake_hid import FakeHandle
+
+FOLDER = Path(sys.argv.pop(1))
+CONTROLLER = FOLDER / "hidraw3"
+REPORT_PERIOD_S = 0.004
+
+
+class PluggedHandle(FakeHandle):
+    """A controller that is there while a file is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._file = -1
+        self._clock = MonotonicClock()
+        self._reported_s = self._clock.now()
+
+    def open_path(self, path: bytes) -> None:
+        self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        self._look()
+        now_s = self._clock.now()
+        if timeout_ms == 0 and now_s - self._reported_s < REPORT_PERIOD_S:
+            return []
+        self._reported_s = now_s
+        return list(self.report()[:max_length])
+
+    def write(self, data: bytes) -> int:
+        self._look()
+        while (FOLDER / "hangs").exists():
+            threading.Event().wait(0.01)
+        return os.write(self._file, data) if self.plugged_in else -1
+
+    def close(self) -> None:
+        os.close(self._file)
+
+    def _look(self) -> None:
+        self.plugged_in = (FOLDER / "plugged").exists()
+        if (FOLDER / "broken").exists():
+            raise RuntimeError("as no driver should")
+        if not self.plugged_in:
+            raise OSError("read error")
+
+
+class PluggedBackend:
+    """The system's controllers: one or none."""
+
+    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
+        del vendor_id
+        there = product_id == 0x0CE6 and (FOLDER / "plugged").exists()
+        return [{"path": os.fsencode(CONTROLLER)}] if there else []
+
+    def device(self) -> HidHandle:
+        return PluggedHandle()
+
+
+if __name__ == "__main__":
+    launch("feelahead-operator", lambda: lambda arguments: command(arguments, PluggedBackend()))

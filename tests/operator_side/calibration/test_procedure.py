@@ -1,0 +1,138 @@
+"""What a calibration measures, and what it refuses."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from operator_side.calibration.procedure import CalibrationError, CalibrationProcedure, Step
+from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.hands.travel_calibration import StickRest, TriggerTravel
+from tests.helpers.calibrating_hands import REPORT_S, Hands, Wear
+
+REPEATABLE = settings(derandomize=True, deadline=None, max_examples=25)
+ENDS = st.tuples(st.floats(0.0, 0.2), st.floats(0.7, 1.0))
+PLACES = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
+
+
+def test_a_new_controller() -> None:
+    result = Hands(Wear()).run().result
+    assert result is not None
+    assert result.l2 == result.r2 == TriggerTravel(0.03, 0.97)
+    assert result.left_stick == result.right_stick == StickRest(0.0, 0.0, 0.05)
+
+
+def test_a_worn_controller() -> None:
+    wear = Wear(l2=(0.1, 0.9), r2=(0.0, 0.8), left=((0.04, -0.02), (0.08, -0.02)), noise=0.01)
+    result = Hands(wear).run().result
+    assert result is not None
+    assert result.l2.dead_zone == pytest.approx(0.13, abs=0.002)
+    assert result.l2.saturation == pytest.approx(0.87, abs=0.012)
+    assert result.r2.saturation == pytest.approx(0.77, abs=0.012)
+    assert (result.left_stick.x, result.left_stick.y) == pytest.approx((0.06, -0.02), abs=2e-3)
+    assert 0.06 < result.left_stick.dead_zone < 0.07
+
+
+@given(ENDS, ENDS, PLACES, PLACES, st.floats(0.0, 0.014), st.integers(0, 2**32 - 1))
+@REPEATABLE
+def test_the_result_makes_rest_zero_and_a_full_pull_one(
+    l2: tuple[float, float],
+    r2: tuple[float, float],
+    before: tuple[float, float],
+    after: tuple[float, float],
+    noise: float,
+    seed: int,
+) -> None:
+    wear = Wear(l2, r2, (before, after), (after, before), noise)
+    result = Hands(wear, seed=seed).run().result
+    assert result is not None
+    for trigger, (rest, end) in ((result.l2, l2), (result.r2, r2)):
+        assert trigger.travel(min(1.0, rest + noise)) == 0.0
+        assert trigger.travel(max(0.0, end - noise)) == 1.0
+    for stick in (result.left_stick, result.right_stick):
+        for x, y in (before, after):
+            assert stick.deflection((x, y)) == (0.0, 0.0)
+        assert math.hypot(*stick.deflection((1.0, 0.0))) == pytest.approx(1.0)
+
+
+def test_the_steps_come_in_order_and_tell_what_to_do() -> None:
+    hands = Hands(Wear())
+    steps = [hands.procedure.step]
+    while hands.procedure.step is not Step.DONE:
+        hands.run(hands.now_s + 0.1)
+        assert 0.0 <= hands.procedure.progress <= 1.0
+        if hands.procedure.step is not steps[-1]:
+            steps.append(hands.procedure.step)
+    assert steps == list(Step)
+    assert hands.complaints == []
+    hands.procedure.feed(ControllerState(l2=1.0), hands.now_s)
+    assert hands.procedure.step is Step.DONE
+
+
+def test_pulls_that_disagree_are_asked_for_again_and_then_refused() -> None:
+    hands = Hands(Wear(), lambda _, number: 0.7 if number == 1 else 1.0)
+    assert hands.run().result is not None
+    assert any("0.70" in complaint and "three times again" in complaint for complaint in hands.complaints)
+    with pytest.raises(CalibrationError, match=r"the pulls of R2 ended at .*0\.70.*3 times"):
+        Hands(Wear(), lambda trigger, number: 0.7 if trigger == "r2" and number % 2 else 1.0).run()
+
+
+def test_half_pulls_are_refused() -> None:
+    with pytest.raises(CalibrationError, match=r"the pulls of L2 ended at 0\.45, 0\.45, 0\.45; valid: 0\.5"):
+        Hands(Wear(), lambda *_: 0.45).run()
+
+
+def test_a_trigger_with_hardly_any_travel_is_refused() -> None:
+    # The most rest and the least pull that count by themselves.
+    with pytest.raises(CalibrationError, match=r"L2 rests at 0\.25 and ends at 0\.50: there is too little travel"):
+        Hands(Wear(l2=(0.25, 0.5))).run()
+
+
+def test_the_wrong_trigger_is_pointed_out_and_does_not_count() -> None:
+    hands = Hands(Wear())
+    while hands.procedure.step is not Step.PULL_L2:
+        hands.run(hands.now_s + REPORT_S)
+    for r2 in (0.0, 0.5, 1.0, 0.5, 0.0):
+        hands.procedure.feed(ControllerState(r2=r2), hands.now_s)
+    assert hands.procedure.complaint == "that is R2; let go of it and pull L2"
+    assert hands.procedure.progress == 0.0
+
+
+def test_a_hand_on_the_stick_is_no_rest() -> None:
+    procedure, complaints = CalibrationProcedure(), set()
+    for tick in range(1000):
+        procedure.feed(ControllerState(left_stick=(0.3 * math.sin(0.03 * tick), 0.0)), tick * REPORT_S)
+        complaints.add(procedure.complaint)
+    assert procedure.step is Step.REST
+    assert "the left stick is being moved" in complaints
+
+
+def test_what_never_rests_is_refused() -> None:
+    procedure = CalibrationProcedure()
+
+    def shake() -> None:
+        for tick in range(1000):
+            procedure.feed(ControllerState(l2=0.4 * (tick % 2)), tick * 0.1)
+
+    with pytest.raises(CalibrationError, match=r"after 60 s this was not done: Put the controller down.*L2 is being"):
+        shake()
+
+
+@pytest.mark.parametrize(
+    ("wear", "why"),
+    [
+        (Wear(l2=(0.3, 1.0)), r"L2 rests at 0\.30"),
+        (Wear(r2=(0.26, 1.0)), r"R2 rests at 0\.26"),
+        (Wear(right=((0.4, 0.0), (0.4, 0.0))), "the right stick rests at"),
+        (Wear(left=((-0.3, 0.0), (0.3, 0.0))), "the left stick rested at"),
+    ],
+)
+def test_what_is_broken_is_refused_with_its_reason(wear: Wear, why: str) -> None:
+    with pytest.raises(CalibrationError, match=why):
+        Hands(wear).run()
+
+
+def test_nobody_pulls() -> None:
+    with pytest.raises(CalibrationError, match="not done: Pull L2"):
+        Hands(Wear(), lambda *_: 0.0).run()

@@ -1,0 +1,204 @@
+"""Which controller is taken when there are several ways to one, or several."""
+
+import threading
+
+import pytest
+
+from common.errors import DeviceError, NoDeviceError
+from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
+from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.search import BackgroundSearch, Find, Ready
+from operator_side.dualsense.hid.udev import RULES
+from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle
+
+A, B = b"/dev/hidraw3", b"/dev/hidraw4"
+OTHER = "11:22:33:44:55:66"
+LIMIT_S = 20.0
+
+
+@pytest.mark.parametrize(("product_id", "model"), [(0x0CE6, "DualSense"), (0x0DF2, "DualSense Edge")])
+@pytest.mark.parametrize("transport", [USB, BLUETOOTH])
+def test_either_model_is_found_on_either_transport(product_id: int, model: str, transport: object) -> None:
+    handle = FakeHandle(USB if transport is USB else BLUETOOTH)
+    found = find_controller(FakeBackend({product_id: {A: handle}}))
+    assert found.name == f"{model} on {handle.transport.value} ({ADDRESS})"
+    assert (found.address, found.path) == (ADDRESS, A)
+    assert found.release == build_output_report(RELEASED, handle.transport)
+    assert handle.written == []
+
+
+def test_there_is_none() -> None:
+    with pytest.raises(NoDeviceError, match=r"no DualSense .*054C:0CE6.*0DF2.*USB cable.*Bluetooth.*--device"):
+        find_controller(FakeBackend({}))
+
+
+@pytest.mark.parametrize("paths", [(A, B), (B, A)])
+def test_one_controller_on_both_is_taken_on_usb(paths: tuple[bytes, bytes]) -> None:
+    wireless, wired = FakeHandle(BLUETOOTH), FakeHandle(USB)
+    found = find_controller(FakeBackend({0x0CE6: dict(zip(paths, (wireless, wired), strict=True))}))
+    assert found.name.startswith("DualSense on USB")
+    assert (wireless.closed, wired.closed) == (wireless.times_opened, 0)
+    assert wireless.written == []
+
+
+def test_the_one_from_before_comes_first_even_on_bluetooth() -> None:
+    same, other = FakeHandle(BLUETOOTH), FakeHandle(USB, OTHER)
+    found = find_controller(FakeBackend({0x0CE6: {A: other, B: same}}), ADDRESS)
+    assert found.address == ADDRESS
+    assert find_controller(FakeBackend({0x0CE6: {A: other}}), ADDRESS).address == OTHER
+
+
+def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> None:
+    same, other = FakeHandle(), FakeHandle(USB, OTHER)
+    backend = FakeBackend({0x0CE6: {B: other}})
+    look = Finder(backend)
+    for _ in range(2):  # whoever was found is looked for as often again
+        for _ in range(LOOKS_FOR_THE_SAME):
+            with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only another: {OTHER}"):
+                look(ADDRESS)
+            assert other.closed == other.times_opened
+        found = look(ADDRESS)
+        assert found.address == OTHER
+        found.device.close()
+    with pytest.raises(NoDeviceError):
+        look(ADDRESS)
+    backend.found[0x0CE6][A] = same
+    assert look(ADDRESS).address == ADDRESS
+    assert other.closed == other.times_opened
+
+
+def test_the_first_one_is_taken_at_once() -> None:
+    assert Finder(FakeBackend({0x0CE6: {A: FakeHandle()}}))(None).address == ADDRESS
+
+
+def test_no_other_is_taken_while_one_refuses_that_may_be_the_one_from_before() -> None:
+    same, other = FakeHandle(opens=False, reason="Permission denied"), FakeHandle(USB, OTHER)
+    look = Finder(FakeBackend({0x0CE6: {A: same, B: other}}))
+    for _ in range(2 * LOOKS_FOR_THE_SAME):
+        with pytest.raises(DeviceError, match="no permission to open the controller at /dev/hidraw3"):
+            look(ADDRESS)
+        assert other.closed == other.times_opened
+    same.opens = True
+    assert look(ADDRESS).address == ADDRESS
+
+
+def test_one_that_cannot_be_opened_does_not_hide_another() -> None:
+    backend = FakeBackend({0x0CE6: {A: FakeHandle(opens=False, reason="Permission denied"), B: FakeHandle()}})
+    assert find_controller(backend).path == B
+    del backend.found[0x0CE6][B]
+    with pytest.raises(DeviceError, match="no permission to open the controller at /dev/hidraw3"):
+        find_controller(backend)
+
+
+def test_a_place_that_is_listed_for_each_of_its_uses_is_one() -> None:
+    class Repeating(FakeBackend):
+        def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, object]]:
+            return super().enumerate(vendor_id, product_id) * 3
+
+    assert sightings(Repeating({0x0CE6: {A: FakeHandle()}})) == [Sighting(A, "DualSense")]
+
+
+def test_the_rule_names_every_model_on_usb_and_bluetooth() -> None:
+    grant = 'MODE="0660", TAG+="uaccess"'
+    for product in ("0ce6", "0df2"):
+        assert f'KERNEL=="hidraw*", ATTRS{{idVendor}}=="054c", ATTRS{{idProduct}}=="{product}", {grant}' in RULES
+        assert f'KERNEL=="hidraw*", KERNELS=="*054C:{product.upper()}*", {grant}' in RULES
+    assert len(RULES) == 4
+
+
+# The search in a thread
+
+
+class Looks:
+    """A find function that waits until the test lets it go on."""
+
+    def __init__(self, result: OpenController | Exception) -> None:
+        self.result = result
+        self.asked: list[str | None] = []
+        self.go_on = threading.Event()
+        self.done = threading.Event()
+
+    def find(self, preferred: str | None) -> OpenController:
+        self.asked.append(preferred)
+        assert self.go_on.wait(LIMIT_S)
+        try:
+            if isinstance(self.result, OpenController):
+                return self.result
+            raise self.result
+        finally:
+            self.done.set()
+
+
+def finished(search: BackgroundSearch, looks: Looks) -> OpenController | DeviceError | None:
+    looks.go_on.set()
+    for thread in threading.enumerate():
+        if thread.name == "controller search":
+            thread.join(LIMIT_S)
+    return search.take()
+
+
+def usable() -> tuple[FakeHandle, Find]:
+    handle = FakeHandle()
+    return handle, lambda preferred: find_controller(FakeBackend({0x0CE6: {A: handle}}), preferred)
+
+
+def test_a_look_waits_for_nobody_and_is_one_at_a_time() -> None:
+    looks = Looks(NoDeviceError("none"))
+    search = BackgroundSearch(looks.find)
+    assert search.take() is None
+    search.begin("aa")
+    search.begin("bb")
+    assert search.take() is None
+    assert isinstance(finished(search, looks), NoDeviceError)
+    assert looks.asked == ["aa"]
+    assert search.take() is None
+
+
+def test_what_is_found_is_handed_over_once() -> None:
+    handle, find = usable()
+    looks = Looks(find(None))
+    search = BackgroundSearch(looks.find)
+    search.begin(None)
+    assert finished(search, looks) is looks.result
+    assert search.take() is None
+    search.close()
+    assert handle.closed == 0
+
+
+def test_what_else_goes_wrong_is_not_lost() -> None:
+    looks = Looks(RuntimeError("in the thread"))
+    search = BackgroundSearch(looks.find)
+    search.begin(None)
+    with pytest.raises(RuntimeError, match="in the thread"):
+        finished(search, looks)
+
+
+def test_what_is_found_too_late_is_let_go() -> None:
+    handle, find = usable()
+    looks = Looks(find(None))
+    search = BackgroundSearch(looks.find)
+    search.begin(None)
+    search.close()
+    finished(search, looks)
+    assert handle.closed == handle.times_opened > 0
+    search.begin(None)
+    assert looks.asked == [None]
+
+
+def test_what_was_found_and_not_taken_is_let_go() -> None:
+    handle, find = usable()
+    search = BackgroundSearch(find)
+    search.begin(None)
+    search.close()
+    assert handle.closed == handle.times_opened > 0
+    assert handle.written == []
+
+
+def test_what_is_there_already_is_found_once() -> None:
+    controller = usable()[1](None)
+    search = Ready(controller)
+    search.begin(None)
+    assert search.take() is controller
+    assert search.take() is None
+    search.close()

@@ -1,0 +1,344 @@
+"""The watchdog as a real process, with a FIFO in the place of the controller's device node."""
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+import pytest
+
+from operator_side.dualsense.hid.release_guard import MOST_REPLACEMENTS, ReleaseGuard
+from operator_side.dualsense.hid.release_watchdog import SILENCE_S, LinuxTarget, Watch
+from tests.helpers.repository import ROOT
+
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it needs a controller that hidapi finds"),
+]
+LIMIT_S = 20.0
+REPORT = bytes(range(48))
+
+
+class FakeController:
+    """A device node that remembers what is written to it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = os.fsencode(path)
+        os.mkfifo(path)
+        self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+
+    def written(self, within_s: float) -> bytes:
+        """What has been written, after waiting for the first of it; nothing after so long."""
+        readable, _, _ = select.select([self._file], [], [], within_s)
+        return os.read(self._file, 65536) if readable else b""
+
+    def __enter__(self) -> "FakeController":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+
+@pytest.fixture
+def controller(tmp_path: Path) -> Iterator[FakeController]:
+    with FakeController(tmp_path / "hidraw3") as made:
+        yield made
+
+
+# An operator side as the watchdog sees it: it says what it is asked to, then waits until it is ended.
+PARENT = """
+import sys
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+report = bytes(range(48))
+with ReleaseGuard() as guard:
+    print(guard.process_id, flush=True)
+    for line in sys.stdin:
+        action, _, path = line.strip().partition(" ")
+        if action == "hold":
+            guard.hold(path.encode(), report)
+        elif action == "let-go":
+            guard.let_go()
+        elif action == "beat":
+            guard.beat()
+        elif action == "beat-and-rest":
+            guard.beat()
+            guard.rest()
+        elif action == "leave":
+            break
+        print("done", flush=True)
+"""
+
+
+class Parent:
+    """A real process with a watchdog."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", PARENT],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+            start_new_session=True,
+        )
+        self.process_id = self._process.pid
+        self.watchdog_id = int(self._answer())
+
+    def say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        assert self._answer() == "done"
+
+    def leave(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write("leave\n")
+        assert self._process.wait(LIMIT_S) == 0
+
+    def kill(self) -> None:
+        os.kill(self.process_id, signal.SIGKILL)
+        self._process.wait(LIMIT_S)
+
+    def _answer(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().strip()
+
+    def __enter__(self) -> "Parent":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+@pytest.fixture
+def parent() -> Iterator[Parent]:
+    with Parent() as started:
+        yield started
+
+
+def wait_for_end(process_id: int) -> None:
+    """Until a process that is no child of ours is gone, or is nothing but an entry that its parent has not read."""
+    try:
+        watched = os.pidfd_open(process_id)
+    except ProcessLookupError:
+        return
+    try:
+        assert select.select([watched], [], [], LIMIT_S)[0], "the watchdog is an orphan"
+    finally:
+        os.close(watched)
+
+
+def test_a_killed_operator_leaves_a_released_controller_and_no_orphan(
+    parent: Parent, controller: FakeController
+) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_nothing_is_written_while_the_parent_lives_and_nothing_is_on(
+    parent: Parent, controller: FakeController
+) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        os.kill(parent.watchdog_id, number)
+    assert controller.written(0.3) == b""
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+
+
+def test_when_the_beats_cease_it_releases_once_for_each_silence(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    for _ in range(2):
+        parent.say("beat")
+        assert controller.written(LIMIT_S) == REPORT
+        assert controller.written(3 * SILENCE_S) == b""
+    parent.kill()
+    assert controller.written(LIMIT_S) == REPORT
+
+
+def test_at_rest_no_beat_is_missed(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    parent.say("beat-and-rest")
+    assert controller.written(3 * SILENCE_S) == b""
+
+
+def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
+    with FakeController(tmp_path / "hidraw3") as controller, (tmp_path / "answers").open("wb", 0) as answers:
+        watched = Watch(answers.fileno())
+        hold = f"hold {controller.path.hex()} {REPORT.hex()}".encode()
+        watched.follow(b"beat", 1.0)  # of whatever was held before
+        watched.follow(hold, 1.0)
+        assert watched.patience_s(1.0) is None
+        watched.follow(b"beat", 2.0)
+        assert watched.patience_s(2.05) == pytest.approx(SILENCE_S - 0.05)
+        assert watched.patience_s(3.0) == 0.0
+        watched.follow(b"nonsense", 3.0)
+        watched.follow(b"rest", 3.0)
+        assert watched.patience_s(3.0) is None
+        watched.follow(b"beat", 4.0)
+        watched.release()
+        assert (controller.written(0.0), watched.patience_s(4.0)) == (REPORT, None)
+        watched.follow(b"beat", 5.0)
+        watched.follow(b"let-go", 5.0)
+        watched.release()
+        assert (controller.written(0.0), watched.patience_s(5.0)) == (b"", None)
+        watched.follow(b"hold " + bytes(tmp_path / "nothing").hex().encode() + b" 00", 6.0)
+        assert (tmp_path / "answers").read_bytes() == b"held\nrefused\n"
+
+
+@pytest.mark.parametrize("last_words", [[], ["hold {path}", "let-go"]])
+def test_nothing_is_written_when_nothing_is_held(
+    parent: Parent, controller: FakeController, last_words: list[str]
+) -> None:
+    for words in last_words:
+        parent.say(words.format(path=os.fsdecode(controller.path)))
+    parent.kill()
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_a_clean_end_leaves_nobody_behind(parent: Parent, controller: FakeController) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    parent.say("let-go")
+    parent.leave()
+    wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_the_newest_controller_is_the_one_that_counts(
+    parent: Parent, controller: FakeController, tmp_path: Path
+) -> None:
+    with FakeController(tmp_path / "hidraw4") as other:
+        parent.say(f"hold {os.fsdecode(controller.path)}")
+        parent.say(f"hold {os.fsdecode(other.path)}")
+        parent.kill()
+        assert other.written(LIMIT_S) == REPORT
+        wait_for_end(parent.watchdog_id)
+    assert controller.written(0.0) == b""
+
+
+def test_the_path_may_become_another_device_s(parent: Parent, controller: FakeController, tmp_path: Path) -> None:
+    parent.say(f"hold {os.fsdecode(controller.path)}")
+    wait_until_open(parent.watchdog_id, controller.path)
+    Path(os.fsdecode(controller.path)).rename(tmp_path / "unplugged")
+    with FakeController(Path(os.fsdecode(controller.path))) as keyboard:
+        parent.kill()
+        assert controller.written(LIMIT_S) == REPORT
+        wait_for_end(parent.watchdog_id)
+        assert keyboard.written(0.0) == b""
+
+
+def wait_until_open(process_id: int, path: bytes) -> None:
+    with select.epoll() as pause:
+        for _ in range(round(LIMIT_S / 0.01)):
+            files = Path(f"/proc/{process_id}/fd").iterdir()
+            # It opens and closes others meanwhile, while it starts.
+            with contextlib.suppress(FileNotFoundError):
+                if any(os.fsencode(file.readlink()) == path for file in files):
+                    return
+            pause.poll(0.01)
+    raise AssertionError(f"{path!r} was never opened")
+
+
+def test_a_controller_that_cannot_be_opened_harms_nobody(parent: Parent, tmp_path: Path) -> None:
+    parent.say(f"hold {tmp_path / 'nothing'}")
+    parent.kill()
+    wait_for_end(parent.watchdog_id)
+
+
+def test_it_starts_with_nothing_but_python_itself() -> None:
+    script = ROOT / "operator_side/dualsense/hid/release_watchdog.py"
+    program = f"import runpy, sys; runpy.run_path({str(script)!r}); print('site' in sys.modules, len(sys.modules))"
+    said = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True, timeout=LIMIT_S
+    ).stdout.split()
+    assert said[0] == "False"
+    assert int(said[1]) < 80
+
+
+def test_without_a_watchdog_the_guard_says_so_and_goes_on(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        assert guard.running
+        assert guard.process_id is not None
+        os.kill(guard.process_id, signal.SIGKILL)
+        wait_for_end(guard.process_id)
+        assert not guard.running
+        guard.hold(controller.path, REPORT)
+        guard.let_go()
+
+
+def end_watchdog(guard: ReleaseGuard) -> None:
+    assert guard.process_id is not None
+    os.kill(guard.process_id, signal.SIGKILL)
+    wait_for_end(guard.process_id)
+
+
+def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        guard.hold(controller.path, REPORT)
+        first = guard.process_id
+        end_watchdog(guard)
+        assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
+        assert guard.take_notes() == []
+        assert guard.running
+        assert guard.process_id != first
+    assert controller.written(LIMIT_S) == REPORT  # by the other one: it was still held when we left
+
+
+def test_watchdogs_that_end_again_and_again_are_given_up(controller: FakeController) -> None:
+    with ReleaseGuard() as guard:
+        notes = []
+        for _ in range(MOST_REPLACEMENTS + 1):
+            end_watchdog(guard)
+            notes += guard.take_notes()
+        assert len(notes) == MOST_REPLACEMENTS + 1
+        assert "there is no other" in notes[-1]
+        assert not guard.running
+        guard.hold(controller.path, REPORT)
+        guard.beat()
+        assert guard.take_notes() == []
+
+
+def test_a_controller_that_the_watchdog_cannot_open_is_told_of_once(tmp_path: Path) -> None:
+    with ReleaseGuard() as guard, select.epoll() as pause:
+        guard.hold(os.fsencode(tmp_path / "nothing"), REPORT)
+        notes: list[str] = []
+        for _ in range(round(LIMIT_S / 0.01)):
+            notes += guard.take_notes()
+            if notes:
+                break
+            pause.poll(0.01)
+        pause.poll(0.2)
+        [note] = notes + guard.take_notes()
+        assert "cannot open the controller" in note
+
+
+def test_a_controller_that_refuses_is_tried_a_few_times() -> None:
+    attempts = 0
+
+    def refuse(file: int, report: bytes) -> int:
+        nonlocal attempts
+        attempts += 1
+        raise OSError(f"{len(report)} bytes to {file}")
+
+    target = LinuxTarget(os.fsencode(os.devnull), REPORT)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "write", refuse)
+        target.release()
+    assert attempts == 3
+    target.close()
+    target.close()

@@ -1,0 +1,405 @@
+"""The scripted person alone: hand-made views of a robot that is not there, and what the hands do."""
+
+import math
+
+import pytest
+
+from common.protocol.messages import Vector3
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.dualsense.simulated.trigger_model import (
+    NORMAL_FINGER_FORCE_N,
+    SPRING_PRELOAD_N,
+    SPRING_RISE_N,
+)
+from operator_side.feel.level import stiffness_to_effect
+from operator_side.simulated_person.person import FULL_TRIGGER_M_S, PersonSettings
+from tests.helpers.simulated_desk import (
+    CALIBRATION,
+    GRASP_M,
+    TICK_S,
+    VIEW,
+    Desk,
+    Hands,
+    armed,
+    crossover,
+    habitual_force_n,
+    view,
+)
+
+# Seeing
+
+
+def test_before_the_first_picture_the_hands_rest_on_hold_to_run() -> None:
+    for hands in Desk().watch(None, 5.0):
+        assert (hands.l2_n, hands.r2_n, hands.left, hands.right) == (0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
+        assert hands.buttons == {Button.L1}
+        assert hands.phase == "wait"
+
+
+@pytest.mark.parametrize("reaction_s", [0.0, 0.1, 0.25, 0.5])
+def test_nothing_is_answered_before_the_reaction_time(reaction_s: float) -> None:
+    settings = PersonSettings(depth_error_sd_m=0.0, visual_reaction_s=reaction_s)
+    desk = Desk(settings)
+    desk.arm(armed(None))
+    desk.watch(armed(None), 1.0)
+    assert desk.hands[-1].r2_n == 0.0
+    appeared_s = desk.now_s
+    seen = desk.watch(armed((0.0, 0.0, 0.2)), 1.0)
+    acted_s = next(hands.now_s for hands in seen if hands.r2_n > 0.0)
+    assert reaction_s - 1e-9 <= acted_s - appeared_s <= reaction_s + TICK_S
+
+
+def test_a_short_flash_is_seen_as_late_and_as_short() -> None:
+    desk = Desk()
+    desk.arm(armed(None))
+    desk.watch(armed(None), 1.0)
+    appeared_s = desk.now_s
+    desk.watch(armed((0.0, 0.0, 0.2)), 0.1)
+    desk.watch(armed(None), 1.0)
+    pulled = [hands.now_s - appeared_s for hands in desk.hands if hands.now_s >= appeared_s and hands.r2_n > 0.0]
+    assert pulled[0] == pytest.approx(0.25, abs=2 * TICK_S)
+    assert pulled[-1] == pytest.approx(0.35, abs=2 * TICK_S)
+
+
+def test_a_screen_that_freezes_leaves_the_last_picture() -> None:
+    desk = Desk()
+    desk.arm()
+    frozen = armed((0.0, 0.0, 0.2))
+    for _ in range(500):
+        desk.tick(frozen)
+    assert desk.person.phase == "advance"
+    assert desk.hands[-1].r2_n > 0.0
+
+
+# The phases
+
+
+def test_the_task_goes_from_waiting_to_lifting() -> None:
+    desk = Desk()
+    waited_s = desk.until("arm", VIEW, 3.0)
+    # The first picture takes a reaction time, and resting the hands as long as arming asks for.
+    assert 1.2 < waited_s < 1.8
+    assert all(hands.buttons == {Button.L1} and hands.r2_n == hands.l2_n == 0.0 for hands in desk.hands)
+    pressed = desk.watch(VIEW, 0.1)
+    assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in pressed)
+    desk.until("advance", armed((0.0, 0.0, 0.3)), 0.5)
+    desk.watch(armed((0.0, 0.0, 0.3)), 1.0)
+    assert desk.hands[-1].r2_n > 0.0
+    desk.until("close", armed(), 0.5)
+    closing = desk.watch(armed(), 0.2)
+    assert all(Button.CROSS in hands.buttons for hands in closing)
+    assert closing[-1].r2_n == closing[-1].l2_n == 0.0
+    desk.until("lift", armed(holding=True), 1.0)
+    desk.watch(armed(holding=True), 1.0)
+    assert desk.person.phase == "lift"
+    risen = armed(holding=True, tool_position_m=(0.5, 0.0, 0.41))
+    desk.until("done", risen, 0.5)
+    for hands in desk.watch(risen, 2.0):
+        assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
+        assert hands.buttons == {Button.L1, Button.CROSS}
+        assert hands.phase == "done"
+
+
+@pytest.mark.parametrize("start_s", [0.0, 5000.0, 1e6])
+def test_the_hands_rest_before_arming_whatever_the_clock_shows(start_s: float) -> None:
+    desk = Desk(start_s=start_s)
+    assert desk.until("arm", VIEW, 3.0) > 1.2
+
+
+def test_hold_to_run_is_held_in_every_phase_and_the_right_stick_rests() -> None:
+    desk = Desk(PersonSettings(depth_error_sd_m=0.0, attempts=2))
+    desk.arm()
+    for screen, seconds in ((armed((0.1, 0.1, 0.3)), 1.0), (armed(), 8.0), (VIEW, 4.0), (armed(holding=True), 3.0)):
+        desk.watch(screen, seconds)
+    assert {hands.phase for hands in desk.hands} >= {"wait", "arm", "advance", "close", "retreat"}
+    assert all(Button.L1 in hands.buttons for hands in desk.hands)
+    assert all(hands.right == (0.0, 0.0) for hands in desk.hands)
+    assert not any(hands.buttons & {Button.CIRCLE, Button.TRIANGLE} for hands in desk.hands)
+
+
+def test_an_arm_that_does_not_answer_is_asked_again() -> None:
+    desk = Desk()
+    desk.watch(VIEW, 11.0)
+    presses = [
+        hands.now_s
+        for before, hands in zip(desk.hands, desk.hands[1:], strict=False)
+        if Button.OPTIONS in hands.buttons and Button.OPTIONS not in before.buttons
+    ]
+    assert len(presses) == 3
+    # Each time pressed shortly, and with the hands at rest.
+    assert sum(Button.OPTIONS in hands.buttons for hands in desk.hands) * TICK_S == pytest.approx(0.6, abs=0.05)
+    assert all(hands.r2_n == hands.l2_n == 0.0 for hands in desk.hands)
+
+
+@pytest.mark.parametrize("state", ["disarmed", "stopped"])
+def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(armed((0.0, 0.0, 0.3)), 1.0)
+    assert desk.hands[-1].r2_n > 0.0
+    stopped_s = desk.now_s
+    stopped = desk.watch(view(state=state), 1.0)
+    released_s = next(hands.now_s for hands in stopped if hands.r2_n == 0.0)
+    assert released_s - stopped_s == pytest.approx(0.25, abs=2 * TICK_S)
+    assert stopped[-1].phase == "wait"
+    desk.until("arm", view(state=state), 2.0)
+
+
+# Steering
+
+
+@pytest.mark.parametrize(("depth_m", "trigger"), [(0.05, "r2_n"), (0.2, "r2_n"), (-0.03, "l2_n"), (-0.3, "l2_n")])
+@pytest.mark.parametrize("delay_s", [0.0, 0.2, 1.0])
+def test_they_pull_as_far_as_distance_and_delay_ask_for(depth_m: float, trigger: str, delay_s: float) -> None:
+    desk = Desk(PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M, insistence_per_s=0.0))
+    desk.arm()
+    pulled = desk.watch(armed((0.0, 0.0, depth_m - GRASP_M)), 1.0, delay_s)[-1]
+    meant = min(1.0, crossover(0.25 + delay_s) * abs(depth_m) / FULL_TRIGGER_M_S)
+    assert getattr(pulled, trigger) == pytest.approx(habitual_force_n(meant))
+    assert min(pulled.l2_n, pulled.r2_n) == 0.0
+
+
+def test_who_does_not_adapt_steers_as_without_delay() -> None:
+    pulled = []
+    for adapts, delay_s in ((True, 0.0), (False, 0.5), (True, 0.5)):
+        desk = Desk(PersonSettings(depth_error_sd_m=0.0, adapts_to_delay=adapts))
+        desk.arm()
+        pulled.append(desk.watch(armed((0.0, 0.0, 0.1)), 1.0, delay_s)[-1].r2_n)
+    assert pulled[0] == pulled[1] > pulled[2]
+
+
+def test_a_free_trigger_travels_as_far_as_was_meant() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(armed((0.0, 0.0, 0.1)), 2.0)
+    meant = crossover(0.25) * (0.1 + GRASP_M) / FULL_TRIGGER_M_S
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(meant, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("across_m", "direction"),
+    [((0.05, 0.0), (1.0, 0.0)), ((-0.05, 0.0), (-1.0, 0.0)), ((0.0, 0.05), (0.0, -1.0)), ((0.0, -0.05), (0.0, 1.0))],
+)
+def test_the_stick_goes_to_where_the_target_is_seen(
+    across_m: tuple[float, float], direction: tuple[float, float]
+) -> None:
+    """The tool's y axis points down the screen, the stick's up."""
+    desk = Desk()
+    desk.arm()
+    hands = desk.watch(armed((*across_m, 0.2)), 1.0)[-1]
+    length = math.hypot(*hands.left)
+    assert length > CALIBRATION.left_stick.dead_zone
+    assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
+    # So far off the line they centre first.
+    assert hands.r2_n == 0.0
+
+
+def test_the_nearer_to_the_line_the_faster_they_advance() -> None:
+    pulled = []
+    for off_m in (0.03, 0.012, 0.006, 0.0):
+        desk = Desk()
+        desk.arm()
+        pulled.append(desk.watch(armed((off_m, 0.0, 0.1)), 1.0)[-1].r2_n)
+    assert pulled[0] == 0.0
+    assert pulled == sorted(set(pulled))
+
+
+def test_they_close_only_when_the_target_is_in_line_and_in_reach() -> None:
+    for place, closes in (((0.0, 0.0, 0.0), True), ((0.0, 0.0, 0.05), False), ((0.02, 0.0, 0.0), False)):
+        desk = Desk()
+        desk.arm()
+        x, y, z = place
+        desk.watch(armed((x, y, z - GRASP_M)), 1.0)
+        assert (desk.person.phase == "close") is closes
+
+
+@pytest.mark.parametrize("up", [(0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)])
+def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
+    desk = Desk()
+    desk.arm()
+    screen = armed(holding=True, up_in_tool=up)
+    desk.until("lift", screen, 3.0)
+    hands = desk.watch(screen, 1.0)[-1]
+    x, y = CALIBRATION.left_stick.deflection(hands.left)
+    # Right, down and forward of the tool frame, each as a share of its full speed.
+    assert (x, -y) == pytest.approx((0.5 * up[0], 0.5 * up[1]), abs=1e-9)
+    pull = {1: hands.r2_n, -1: hands.l2_n}
+    for side, force_n in pull.items():
+        meant = max(0.0, 0.5 * side * up[2])
+        assert force_n == pytest.approx(habitual_force_n(meant) if meant > 0.0 else 0.0)
+    assert Button.CROSS in hands.buttons
+
+
+# Trying again and giving up
+
+
+def closings(desk: Desk) -> int:
+    return sum(
+        hands.phase == "close" and before.phase != "close"
+        for before, hands in zip(desk.hands, desk.hands[1:], strict=False)
+    )
+
+
+@pytest.mark.parametrize("attempts", [1, 2, 4])
+def test_they_give_up_after_as_many_attempts_as_they_have(attempts: int) -> None:
+    desk = Desk(PersonSettings(depth_error_sd_m=0.0, attempts=attempts))
+    desk.arm()
+    desk.until("done", armed(), 6.0 * attempts)
+    assert closings(desk) == attempts
+    desk.watch(armed(), 3.0)
+    assert desk.person.phase == "done"
+    assert desk.hands[-1].buttons == {Button.L1}
+
+
+def test_between_two_attempts_they_open_and_draw_back() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.until("retreat", armed(), 5.0)
+    back = desk.watch(armed(), 0.5)
+    for hands in back[1:]:
+        assert hands.buttons == {Button.L1, Button.SQUARE}
+        assert hands.l2_n >= habitual_force_n(0.4)
+        assert hands.r2_n == 0.0
+    assert desk.until("advance", armed(), 1.0) == pytest.approx(0.5, abs=3 * TICK_S)
+
+
+def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.until("lift", armed(holding=True), 3.0)
+    # A moment without it is not noticed.
+    desk.watch(armed(), 0.3)
+    desk.watch(armed(holding=True), 1.0)
+    assert desk.person.phase == "lift"
+    assert desk.until("done", armed(), 2.0) == pytest.approx(0.25 + 0.5, abs=5 * TICK_S)
+    desk.watch(armed(), 0.5)
+    assert desk.hands[-1].buttons == {Button.L1}
+
+
+# Feeling
+
+
+STIFF = stiffness_to_effect(1.0)
+TOWARDS = armed((0.0, 0.0, 0.06))
+MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
+
+
+def test_a_trigger_that_stiffens_yields_less_to_the_same_finger_at_once() -> None:
+    desk = Desk(PersonSettings(depth_error_sd_m=0.0, insistence_per_s=0.0))
+    desk.arm()
+    desk.watch(TOWARDS, 2.0)
+    force_n, free = desk.hands[-1].r2_n, desk.device.travel[1]
+    desk.resist(STIFF)
+    desk.watch(TOWARDS, 0.2)
+    assert desk.hands[-1].r2_n == force_n
+    assert desk.device.travel[1] < 0.5 * free
+
+
+def test_they_push_harder_and_harder_while_a_trigger_yields_less_than_they_meant() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(TOWARDS, 2.0)
+    habitual_n = desk.hands[-1].r2_n
+    assert habitual_n == pytest.approx(habitual_force_n(MEANT), abs=0.02)
+    desk.resist(STIFF)
+    pushed = desk.watch(TOWARDS, 3.0)
+    # Half a normal finger's force a second, from when the finger has been pushed back on.
+    early, late = pushed[50].r2_n, pushed[100].r2_n
+    assert late - early == pytest.approx(0.5 * NORMAL_FINGER_FORCE_N * 50 * TICK_S)
+    assert [hands.r2_n for hands in pushed] == sorted(hands.r2_n for hands in pushed)
+    assert pushed[-1].r2_n == NORMAL_FINGER_FORCE_N
+    # So they overcome even the strongest effect a little: a stiff trigger is advice.
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) > 0.2
+
+
+def test_they_push_as_hard_as_it_takes_to_get_about_where_they_meant() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.resist(STIFF)
+    desk.watch(armed((0.0, 0.0, 0.03)), 4.0)
+    meant = crossover(0.25) * (0.03 + GRASP_M) / FULL_TRIGGER_M_S
+    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(0.8 * meant, abs=0.01)
+    assert habitual_force_n(meant) + 1.0 < desk.hands[-1].r2_n < NORMAL_FINGER_FORCE_N
+
+
+def test_they_stop_pushing_harder_once_the_trigger_yields_again() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(TOWARDS, 2.0)
+    habitual_n = desk.hands[-1].r2_n
+    desk.resist(STIFF)
+    desk.watch(TOWARDS, 1.0)
+    assert desk.hands[-1].r2_n > habitual_n + 0.5
+    desk.resist(stiffness_to_effect(0.0))
+    desk.watch(TOWARDS, 2.0)
+    assert desk.hands[-1].r2_n == pytest.approx(habitual_n, abs=0.02)
+
+
+def test_a_finger_that_rested_begins_with_its_habit() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.resist(STIFF)
+    desk.watch(TOWARDS, 3.0)
+    assert desk.hands[-1].r2_n == NORMAL_FINGER_FORCE_N
+    desk.watch(armed(None), 1.0)
+    assert desk.hands[-1].r2_n == 0.0
+    again = next(hands.r2_n for hands in desk.watch(TOWARDS, 0.5) if hands.r2_n > 0.0)
+    assert again == pytest.approx(habitual_force_n(MEANT), abs=0.02)
+
+
+def test_the_other_finger_does_not_push_harder_for_what_the_first_one_felt() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.resist(STIFF)
+    desk.watch(TOWARDS, 3.0)
+    assert desk.hands[-1].r2_n == NORMAL_FINGER_FORCE_N
+    turned = next(hands.l2_n for hands in desk.watch(armed((0.0, 0.0, -0.06)), 0.5) if hands.l2_n > 0.0)
+    meant = crossover(0.25) * (0.06 - GRASP_M) / FULL_TRIGGER_M_S
+    assert turned == pytest.approx(habitual_force_n(meant), abs=0.02)
+
+
+@pytest.mark.parametrize("insistence_per_s", [0.0, 0.5, 9.9])
+def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands(insistence_per_s: float) -> None:
+    desk = Desk(PersonSettings(insistence_per_s=insistence_per_s, attempts=2), seed=3)
+    desk.arm()
+    for number in range(60):
+        desk.resist(stiffness_to_effect(number % 7 / 6), stiffness_to_effect(number % 5 / 4))
+        place = (0.01 * math.sin(number), 0.01 * math.cos(1.3 * number), 0.4 * math.sin(0.7 * number))
+        desk.watch(armed(place, holding=number % 11 > 8), 0.3)
+    forces = [(hands.l2_n, hands.r2_n) for hands in desk.hands]
+    assert all(0.0 <= force_n <= NORMAL_FINGER_FORCE_N for pair in forces for force_n in pair)
+    assert all(min(pair) == 0.0 for pair in forces)
+    assert max(l2_n for l2_n, _ in forces) > 1.0
+    assert max(r2_n for _, r2_n in forces) > 1.0
+
+
+# Chance
+
+
+def depth_pulls(seed: int) -> list[Hands]:
+    desk = Desk(PersonSettings(depth_error_sd_m=0.01), seed)
+    desk.arm()
+    desk.watch(armed((0.002, 0.001, 0.05)), 1.0)
+    desk.watch(armed((0.0, 0.0, -GRASP_M)), 8.0)
+    return desk.hands
+
+
+def test_the_same_seed_gives_the_same_hands() -> None:
+    first = depth_pulls(1)
+    assert depth_pulls(1) == first
+    assert depth_pulls(2) != first
+
+
+def test_misjudged_distances_spread_as_they_are_said_to() -> None:
+    errors_m = []
+    for seed in range(60):
+        desk = Desk(PersonSettings(depth_error_sd_m=0.01, grasp_depth_m=GRASP_M, insistence_per_s=0.0), seed)
+        desk.arm()
+        force_n = desk.watch(armed((0.0, 0.0, 0.1)), 0.3)[-1].r2_n
+        free = ((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N) / SENSED_TRAVEL
+        errors_m.append(CALIBRATION.r2.travel(free) * FULL_TRIGGER_M_S / crossover(0.25) - 0.1 - GRASP_M)
+    mean = sum(errors_m) / 60
+    sd = math.sqrt(sum((error - mean) ** 2 for error in errors_m) / 59)
+    # Three standard errors.
+    assert abs(mean) < 3 * 0.01 / math.sqrt(60)
+    assert sd == pytest.approx(0.01, rel=3 / math.sqrt(2 * 59))

@@ -1,0 +1,286 @@
+"""The real operator process with a controller that is plugged in, unplugged, and left with stiff triggers."""
+
+import json
+import os
+import queue
+import select
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import pytest
+
+from feelahead.benchmarks.effects.stiffness_source import StiffnessSource
+from operator_side.dualsense.effects.official import Off
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble, parse_output_report
+from tests.helpers.repository import ROOT
+
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.skipif(sys.platform != "linux", reason="a FIFO in the place of a device node"),
+]
+LIMIT_S = 30.0
+REPORT_LENGTH = 48
+
+
+class World:
+    """An operator process, its controller, and the robot side's end of its link."""
+
+    def __init__(self, folder: Path, *flags: str, plugged_in: bool = True) -> None:
+        self._folder = folder
+        os.mkfifo(folder / "hidraw3")
+        self._controller = os.open(folder / "hidraw3", os.O_RDWR | os.O_NONBLOCK)
+        self.plug(plugged_in)
+        self.source = StiffnessSource()
+        self.source.state = "disarmed"
+        self.process = subprocess.Popen(
+            [
+                *(sys.executable, str(ROOT / "tests/helpers/plugged_operator.py"), str(folder)),
+                *(f"--connect={self.source.address}", f"--view-connect={self.source.view_address}"),
+                *("--status=json", *flags),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            start_new_session=True,
+        )
+        self.events: list[dict[str, Any]] = []
+        self._lines: queue.Queue[str] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.written: list[OutputReport] = []
+
+    def plug(self, plugged_in: bool) -> None:
+        marker = self._folder / "plugged"
+        if plugged_in:
+            marker.touch()
+        else:
+            marker.unlink(missing_ok=True)
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Go on as the robot side until that is so."""
+        for _ in range(round(LIMIT_S / 0.02)):
+            self.source.run(0.02)
+            self._look()
+            if condition():
+                return
+        raise AssertionError(f"not within {LIMIT_S} s; {self.events[-3:]}")
+
+    def notes(self) -> list[str]:
+        return [event["text"] for event in self.events if event["event"] == "note"]
+
+    def controller(self) -> str:
+        shown = [event["controller"] for event in self.events if event["event"] == "status"]
+        return shown[-1] if shown else "unknown"
+
+    def stiffen(self) -> None:
+        """Until the triggers are stiff."""
+        self.until(lambda: self.controller() == "connected" and self.source.connected)
+        self.source.state, self.source.r2 = "armed", 0.9
+        self.until(lambda: any(report.r2 not in (None, Off()) for report in self.written))
+
+    def end(self) -> tuple[int, str]:
+        """Its exit code and what it complained of, once it has ended."""
+        code = self.process.wait(LIMIT_S)
+        self._reader.join(LIMIT_S)
+        assert self.process.stderr is not None
+        return code, self.process.stderr.read()
+
+    def last_written(self) -> OutputReport:
+        """After whatever still comes within a while."""
+        while select.select([self._controller], [], [], 0.5)[0]:
+            self._look()
+        return self.written[-1]
+
+    def _look(self) -> None:
+        while not self._lines.empty():
+            self.events.append(json.loads(self._lines.get_nowait()))
+        try:
+            content = os.read(self._controller, 1 << 16)
+        except BlockingIOError:
+            return
+        reports = [content[start : start + REPORT_LENGTH] for start in range(0, len(content), REPORT_LENGTH)]
+        self.written += [parse_output_report(report) for report in reports]
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._lines.put(line)
+
+    def __enter__(self) -> "World":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._reader.join(LIMIT_S)
+        for stream in (self.process.stdout, self.process.stderr):
+            assert stream is not None
+            stream.close()
+        self.source.__exit__(None, None, None)
+        os.close(self._controller)
+
+
+def stiff(report: OutputReport) -> bool:
+    return report.r2 not in (None, Off())
+
+
+def tells_all(report: OutputReport) -> bool:
+    """It is RELEASED, or what followed so soon that both went out as one."""
+    return report.l2 == Off() and report.r2 is not None and report.rumble == Rumble()
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with World(tmp_path) as made:
+        yield made
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_however_it_ends_the_triggers_are_released(world: World, number: signal.Signals) -> None:
+    world.stiffen()
+    world.process.send_signal(number)
+    code, complaint = world.end()
+    assert (code, complaint) == ((-9, "") if number is signal.SIGKILL else (0, ""))
+    assert world.last_written() == RELEASED
+
+
+def test_an_exception_releases_them_too(world: World, tmp_path: Path) -> None:
+    world.stiffen()
+    (tmp_path / "broken").touch()
+    code, complaint = world.end()
+    assert code == 1
+    assert "as no driver should" in complaint
+    (tmp_path / "broken").unlink()
+    # The loop's last write fails with the driver; the watchdog has the device open by itself.
+    assert world.last_written() == RELEASED
+
+
+def test_they_are_released_when_the_robot_side_goes_silent(world: World) -> None:
+    world.stiffen()
+    assert world.last_written() == OutputReport(r2=Off())  # the only one that was stiff
+    assert world.process.poll() is None
+
+
+def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(tmp_path: Path) -> None:
+    with World(tmp_path, plugged_in=False) as world:
+        world.until(lambda: world.source.hellos >= 5)
+        [note] = world.notes()
+        assert "no DualSense" in note
+        assert "waiting for one" in note
+        assert world.controller() == "absent"
+        assert (world.source.commands, world.written) == (0, [])
+        world.plug(True)
+        world.until(lambda: world.source.commands > 10)
+        assert world.notes()[1] == "controller: DualSense on USB (a4:5e:60:01:02:03)"
+        assert "feelahead calibrate" in world.notes()[2]
+        assert world.written == [RELEASED]
+
+
+def test_unplugged_in_mid_run_it_commands_nothing_and_is_found_again(world: World) -> None:
+    world.stiffen()
+    world.until(lambda: world.source.commands > 10)
+    world.plug(False)
+    world.until(lambda: world.controller() == "lost")
+    commands, hellos = world.source.commands, world.source.hellos
+    world.until(lambda: world.source.hellos >= hellos + 5)
+    assert world.source.commands == commands
+    assert "gone" in world.notes()[-1]
+    written = len(world.written)
+    world.plug(True)
+    # The robot side still says that it is armed: until it has stopped, nothing is commanded.
+    world.until(lambda: world.controller() == "connected" and any(map(stiff, world.written[written:])))
+    assert tells_all(world.written[written])
+    assert world.source.commands == commands
+    world.source.state = "disarmed"
+    world.until(lambda: world.source.commands > commands + 10)
+    assert world.notes()[-1].endswith("back again")
+
+
+def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: World) -> None:
+    world.stiffen()
+    world.plug(False)
+    world.until(lambda: world.controller() == "lost")
+    world.process.send_signal(signal.SIGTERM)
+    assert world.end() == (0, "")
+
+
+def test_hung_its_triggers_are_released_and_told_anew_when_it_runs_on(world: World) -> None:
+    world.stiffen()
+    world.process.send_signal(signal.SIGSTOP)
+    assert world.last_written() == RELEASED
+    written = len(world.written)
+    world.process.send_signal(signal.SIGCONT)
+    world.until(lambda: any(stiff(report) for report in world.written[written:]))
+    assert tells_all(world.written[written])
+    assert world.process.poll() is None
+
+
+def test_released_while_a_write_does_not_return_and_told_anew_when_it_does(world: World, tmp_path: Path) -> None:
+    world.stiffen()
+    (tmp_path / "hangs").touch()
+    world.source.r2 = 0.4  # what to write
+    world.until(lambda: world.written[-1] == RELEASED)
+    world.until(lambda: any("does not return" in note for note in world.notes()))
+    written = len(world.written)
+    (tmp_path / "hangs").unlink()
+    world.until(lambda: any(map(tells_all, world.written[written:])) and stiff(world.written[-1]))
+    assert world.process.poll() is None
+
+
+def test_a_watchdog_that_ends_before_us_is_told_of_once_and_replaced(world: World) -> None:
+    world.until(lambda: world.controller() == "connected")
+    [watchdog] = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text().split()
+    os.kill(int(watchdog), signal.SIGKILL)
+    world.until(lambda: any("watchdog process has ended" in note for note in world.notes()))
+    seen = len(world.events)
+    world.until(lambda: len(world.events) > seen + 5)
+    assert sum("watchdog" in note for note in world.notes()) == 1
+    world.stiffen()
+    world.process.send_signal(signal.SIGKILL)
+    assert world.end() == (-9, "")
+    assert world.last_written() == RELEASED
+
+
+def test_only_reading_starts_no_watchdog_and_writes_nothing(tmp_path: Path) -> None:
+    with World(tmp_path, "--no-haptics") as world:
+        world.until(lambda: world.controller() == "connected" and world.source.connected)
+        children = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text()
+        assert children == ""
+        world.source.state, world.source.r2 = "armed", 0.9
+        world.until(lambda: world.source.commands > 50)
+        world.process.send_signal(signal.SIGKILL)
+        assert world.end() == (-9, "")
+        assert world.written == []
+
+
+WITHOUT_HIDAPI = """
+import sys
+sys.modules["hidraw"] = None
+sys.argv = ["feelahead-operator", "--status=none"]
+from operator_side.__main__ import main
+main()
+"""
+
+
+def test_without_hidapi_it_ends_at_once_and_says_how_to_get_it() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_HIDAPI],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=LIMIT_S,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert line.startswith("feelahead-operator: hidapi cannot be imported")
+    assert "pip install --force-reinstall hidapi" in line

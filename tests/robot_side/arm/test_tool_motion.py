@@ -1,0 +1,110 @@
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.protocol.messages import Header, MotionCommand
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist, trigger_directions
+from tests.helpers.perceived_scenes import random_rotation
+
+SETTINGS = ToolMotionSettings(trigger_speed_m_s=0.25, stick_speed_m_s=0.1, turn_speed_rad_s=0.5)
+RIGHT, DOWN, FORWARD = np.eye(3)
+IN_PLACE = np.eye(3)
+STILL = np.zeros(3)
+
+
+def command(**hands: Any) -> MotionCommand:
+    return MotionCommand(Header(epoch=1, sequence=1, sent_s=0.0), **({"l2": 0.0, "r2": 0.0} | hands))
+
+
+def motion(rotation: FloatArray = IN_PLACE, **hands: Any) -> tuple[FloatArray, FloatArray]:
+    twist = tool_twist(command(**hands), rotation, SETTINGS)
+    assert twist.shape == (6,)
+    return twist[:3], twist[3:]
+
+
+@pytest.mark.parametrize(
+    ("hands", "linear"),
+    [
+        ({"r2": 1.0}, 0.25 * FORWARD),
+        ({"l2": 1.0}, -0.25 * FORWARD),
+        ({"r2": 0.4}, 0.1 * FORWARD),
+        ({"r2": 1.0, "l2": 0.75}, 0.0625 * FORWARD),
+        ({"r2": 1.0, "l2": 1.0}, STILL),
+        ({"lateral": (1.0, 0.0)}, 0.1 * RIGHT),
+        ({"lateral": (-0.5, 0.0)}, -0.05 * RIGHT),
+        ({"lateral": (0.0, 1.0)}, -0.1 * DOWN),
+        ({"lateral": (0.0, -0.3)}, 0.03 * DOWN),
+    ],
+)
+def test_triggers_and_left_stick_move_the_tool_without_turning_it(hands: dict[str, Any], linear: FloatArray) -> None:
+    found, angular = motion(**hands)
+    np.testing.assert_allclose(found, linear, atol=1e-15)
+    np.testing.assert_array_equal(angular, STILL)
+
+
+@pytest.mark.parametrize(
+    ("turning", "towards"),
+    [((1.0, 0.0), RIGHT), ((-1.0, 0.0), -RIGHT), ((0.0, 1.0), -DOWN), ((0.0, -1.0), DOWN), ((0.6, 0.8), None)],
+)
+def test_the_right_stick_turns_the_view_the_way_it_is_pushed(
+    turning: tuple[float, float], towards: FloatArray | None
+) -> None:
+    linear, angular = motion(turning=turning)
+    np.testing.assert_array_equal(linear, STILL)
+    # The tip of the approach axis moves with ω × z.
+    tip = np.cross(angular, FORWARD)
+    expected = 0.5 * (turning[0] * RIGHT - turning[1] * DOWN) if towards is None else 0.5 * towards
+    np.testing.assert_allclose(tip, expected, atol=1e-15)
+    assert angular @ FORWARD == 0.0
+    assert np.linalg.norm(angular) == pytest.approx(0.5 * math.hypot(*turning))
+
+
+def test_gripper_and_buttons_move_nothing() -> None:
+    linear, angular = motion(gripper=1.0, run=True, arm=True, emergency_stop=True, next_target=True)
+    assert not linear.any()
+    assert not angular.any()
+
+
+def test_the_twist_is_in_the_world_frame() -> None:
+    rotation = random_rotation(np.random.default_rng(1))
+    hands: dict[str, Any] = {"r2": 0.7, "lateral": (0.3, -0.2), "turning": (0.5, 0.1)}
+    in_tool, in_world = motion(**hands), motion(rotation, **hands)
+    for of_tool, of_world in zip(in_tool, in_world, strict=True):
+        np.testing.assert_allclose(of_world, rotation @ of_tool)
+    # A tool that points along the world's x, its camera upright: down is -z, right is -y.
+    upright = np.stack([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], axis=1)
+    np.testing.assert_allclose(motion(upright, r2=1.0)[0], [0.25, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(motion(upright, lateral=(0.0, 1.0))[0], [0.0, 0.0, 0.1], atol=1e-15)
+    np.testing.assert_allclose(motion(upright, lateral=(1.0, 0.0))[0], [0.0, -0.1, 0.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_rotation_that_is_not_finite_moves_nothing(bad: float) -> None:
+    rotation = np.eye(3)
+    rotation[1, 2] = bad
+    with pytest.raises(ValueError, match="tool_rotation"):
+        tool_twist(command(), rotation, SETTINGS)
+
+
+def test_stiffness_looks_the_way_the_triggers_move_the_gripper() -> None:
+    rotation = random_rotation(np.random.default_rng(2))
+    directions = trigger_directions(rotation, 5)
+    assert set(directions) == {"l2", "r2"}
+    for trigger, along in directions.items():
+        assert along.shape == (5, 3)
+        linear, _ = motion(rotation, **{trigger: 1.0})
+        np.testing.assert_allclose(along, np.tile(linear / np.linalg.norm(linear), (5, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["trigger_speed_m_s", "stick_speed_m_s", "turn_speed_rad_s"])
+@pytest.mark.parametrize("bad", [0.0, -0.1, 5.1, math.nan, math.inf])
+def test_bad_speeds_are_named(name: str, bad: float) -> None:
+    with pytest.raises(ValueError, match=f"{name} = {bad}; valid"):
+        ToolMotionSettings(**{name: bad})
+
+
+def test_the_default_speed_is_that_of_an_arm_near_people() -> None:
+    assert ToolMotionSettings().trigger_speed_m_s == 0.25

@@ -1,0 +1,192 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
+from robot_side.gripper.held_object import grip, gripped_object, with_held
+from robot_side.objects.perceived import PerceivedObjects, Role
+from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation
+
+ORIGIN = np.zeros(3)
+REACH_M = 0.05
+
+
+class SerialArm:
+    """Turning joints with fixed axes through fixed points of the links before them, and a tool with spheres."""
+
+    def __init__(self, seed: int, joints: int = 6) -> None:
+        random = np.random.default_rng(seed)
+        axes = random.normal(size=(joints, 3))
+        self._axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+        self._points_m = random.uniform(-0.5, 0.5, (joints, 3))
+        self._tool_m, self._tool_rotation = random.uniform(-0.5, 0.5, 3), random_rotation(random)
+        self._spheres_in_tool_m = random.uniform(-0.1, 0.1, (3, 3))
+
+    def pose(self, angles_rad: FloatArray) -> GripperPose:
+        """Forward kinematics as a product of turns, and the Jacobians from the axes that these have moved."""
+        rotation, translation = np.eye(3), np.zeros(3)
+        axes, points = [], []
+        for axis, point, angle in zip(self._axes, self._points_m, angles_rad, strict=True):
+            axes.append(rotation @ axis)
+            points.append(rotation @ point + translation)
+            turn = Rotation.from_rotvec(angle * axis).as_matrix()
+            rotation, translation = rotation @ turn, rotation @ (point - turn @ point) + translation
+        tool_m = rotation @ self._tool_m + translation
+        tool_rotation = rotation @ self._tool_rotation
+        spheres = tool_m + self._spheres_in_tool_m @ tool_rotation.T
+
+        def linear(at_m: FloatArray) -> FloatArray:
+            return np.stack([np.cross(axis, at_m - point) for axis, point in zip(axes, points, strict=True)], axis=1)
+
+        return GripperPose(
+            tool_position_m=tool_m,
+            tool_rotation=tool_rotation,
+            tool_jacobian=np.concatenate([linear(tool_m), np.stack(axes, axis=1)]),
+            sphere_centers_m=spheres,
+            sphere_radii_m=np.full(3, 0.02),
+            sphere_jacobians=np.stack([linear(center) for center in spheres]),
+            sphere_on_finger=np.array([False, True, True]),
+        )
+
+
+def thing(center_m: FloatArray, seed: int = 0) -> PerceivedObjects:
+    """One object of a box, a ball, and a tetrahedron, after another one that is not meant."""
+    random = np.random.default_rng(seed)
+    scene = Scene().add().sphere(center_m, 0.3).add(Role.TARGET)
+    scene.box(center_m, random.uniform(0.005, 0.05, 3), random_rotation(random))
+    scene.box(center_m + random.normal(size=3) * 0.05, random.uniform(0.005, 0.05, 3), random_rotation(random))
+    scene.sphere(center_m + random.normal(size=3) * 0.05, 0.02)
+    scene.tetrahedron(center_m + random.normal(size=(4, 3)) * 0.03)
+    return scene.objects()
+
+
+def points_of(objects: PerceivedObjects, index: int, random: np.random.Generator) -> FloatArray:
+    """Points (n, 3) all over and in the object's primitives, their corners included."""
+    corners = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+    unit = np.vstack([corners, random.uniform(-1.0, 1.0, (200, 3))])
+    points = []
+    for row in np.flatnonzero(objects.box_object == index):
+        points.append(
+            objects.box_centers_m[row] + (unit * objects.box_half_sizes_m[row]) @ objects.box_rotations[row].T
+        )
+    for row in np.flatnonzero(objects.sphere_object == index):
+        on_surface = unit / np.linalg.norm(unit, axis=1)[:, None]
+        points.append(objects.sphere_centers_m[row] + on_surface * objects.sphere_radii_m[row])
+    for row in np.flatnonzero(objects.tetrahedron_object == index):
+        shares = np.vstack([np.eye(4), random.dirichlet(np.ones(4), 200)])
+        points.append(shares @ objects.tetrahedron_vertices_m[row])
+    return np.concatenate(points)
+
+
+def test_the_object_nearest_to_the_tool_point_is_the_gripped_one() -> None:
+    scene = Scene().add().sphere([0.06, 0.0, 0.0], 0.03)
+    scene.add(Role.TARGET).box([0.0, 0.03, 0.0], [0.02, 0.02, 0.02])
+    objects = scene.add().sphere([0.0, 0.0, 0.5], 0.4).objects()
+    assert gripped_object(objects, ORIGIN, REACH_M) == 1
+    assert gripped_object(objects, np.array([0.03, 0.0, 0.0]), REACH_M) == 0
+
+
+def test_only_what_is_within_reach_is_gripped() -> None:
+    objects = Scene().add(Role.TARGET).sphere([0.0, 0.0, 0.08], 0.03).objects()
+    assert gripped_object(objects, ORIGIN, 0.05) == 0
+    assert gripped_object(objects, ORIGIN, 0.0499) is None
+    assert gripped_object(Scene().objects(), ORIGIN, 10.0) is None
+
+
+def test_supports_and_what_is_ignored_are_never_gripped() -> None:
+    scene = Scene().add(Role.SUPPORT).box([0.0, 0.0, 0.0], [1.0, 1.0, 0.01])
+    objects = scene.add(Role.IGNORED).add().sphere([0.0, 0.0, 0.06], 0.03).objects()
+    assert gripped_object(objects, ORIGIN, REACH_M) == 2
+    assert gripped_object(objects, ORIGIN, 0.01) is None
+
+
+def test_what_has_no_end_is_never_gripped() -> None:
+    """A wall or a floor that no name tells as a support: it cannot move with the tool, and stays a danger."""
+    scene = Scene().add().half_space([0.0, 0.0, 1.0], -0.01)
+    assert gripped_object(scene.objects(), ORIGIN, REACH_M) is None
+    objects = scene.add(Role.TARGET).sphere([0.0, 0.0, 0.04], 0.02).objects()
+    assert gripped_object(objects, ORIGIN, REACH_M) == 1
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(seed=st.integers(0, 10_000))
+def test_the_spheres_cover_the_object_and_nothing_of_another(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    objects = thing(random.uniform(-0.5, 0.5, 3), seed)
+    pose = SerialArm(seed).pose(random.uniform(-2.0, 2.0, 6))
+    held = grip(objects, 1, pose)
+    assert (held.index, held.name) == (1, "object1")
+    whole = with_held(pose, held)
+    centers, radii = whole.sphere_centers_m[3:], whole.sphere_radii_m[3:]
+    points = points_of(objects, 1, random)
+    apart = np.linalg.norm(points[:, None] - centers[None], axis=2)
+    assert (apart <= radii * (1.0 + 1e-9)).any(axis=1).all()
+    # No sphere is larger than what circumscribes the largest primitive, so the other object's is not among them.
+    tetrahedron_m = objects.tetrahedron_vertices_m[0]
+    largest_m = [
+        np.linalg.norm(objects.box_half_sizes_m, axis=1).max(),
+        objects.sphere_radii_m[1],
+        np.linalg.norm(tetrahedron_m - tetrahedron_m.mean(axis=0), axis=1).max(),
+    ]
+    assert radii.max() <= max(largest_m) * (1.0 + 1e-9)
+
+
+def test_a_ball_is_held_as_itself() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0]], [0.01], tool_position_m=[0.1, 0.2, 0.3])
+    held = grip(Scene().add().sphere([0.1, 0.2, 0.35], 0.02).objects(), 0, pose)
+    np.testing.assert_allclose(held.centers_in_tool_m, [[0.0, 0.0, 0.05]], atol=1e-15)
+    np.testing.assert_array_equal(held.radii_m, [0.02])
+
+
+def test_each_box_gets_its_share_of_four_spheres() -> None:
+    scene = Scene().add().box(ORIGIN, [0.01, 0.01, 0.08]).box([0.1, 0.0, 0.0], [0.01, 0.01, 0.08])
+    held = grip(scene.objects(), 0, gripper_pose())
+    assert len(held.radii_m) == 8
+    np.testing.assert_allclose(held.radii_m, np.linalg.norm([0.01, 0.01, 0.02]))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_it_moves_with_the_tool(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    arm, before, after = SerialArm(seed), random.uniform(-1.0, 1.0, 6), random.uniform(-1.0, 1.0, 6)
+    gripped_at, moved = arm.pose(before), arm.pose(after)
+    objects = thing(gripped_at.tool_position_m, seed)
+    held = grip(objects, 1, gripped_at)
+    random = np.random.default_rng(seed)
+    points = points_of(objects, 1, random)
+    in_tool = (points - gripped_at.tool_position_m) @ gripped_at.tool_rotation
+    carried = moved.tool_position_m + in_tool @ moved.tool_rotation.T
+    whole = with_held(moved, held)
+    apart = np.linalg.norm(carried[:, None] - whole.sphere_centers_m[None, 3:], axis=2)
+    assert (apart <= whole.sphere_radii_m[3:] * (1.0 + 1e-9)).any(axis=1).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_its_jacobians_are_the_change_of_its_centres_with_the_joints(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    arm, angles, step_rad = SerialArm(seed), random.uniform(-1.5, 1.5, 6), 1e-5
+    gripped_at = arm.pose(random.uniform(-1.5, 1.5, 6))
+    held = grip(thing(gripped_at.tool_position_m, seed), 1, gripped_at)
+    found = with_held(arm.pose(angles), held).sphere_jacobians
+    for joint in range(6):
+        step = np.zeros(6)
+        step[joint] = step_rad
+        ahead, behind = (with_held(arm.pose(angles + sign * step), held).sphere_centers_m for sign in (1.0, -1.0))
+        np.testing.assert_allclose(found[:, :, joint], (ahead - behind) / (2.0 * step_rad), atol=1e-8)
+
+
+def test_the_grippers_own_spheres_come_first_and_are_unchanged() -> None:
+    pose = gripper_pose([0.1, 0.2, 0.3])
+    held = grip(thing(np.array([0.1, 0.2, 0.3])), 1, pose)
+    whole = with_held(pose, held)
+    own, added = len(pose.sphere_radii_m), len(held.radii_m)
+    for name in ("sphere_centers_m", "sphere_radii_m", "sphere_jacobians", "sphere_on_finger"):
+        np.testing.assert_array_equal(getattr(whole, name)[:own], getattr(pose, name))
+        assert len(getattr(whole, name)) == own + added
+    assert not whole.sphere_on_finger[own:].any()
+    for name in ("tool_position_m", "tool_rotation", "tool_jacobian"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(pose, name))

@@ -1,0 +1,156 @@
+"""Blocks, lanes and threads: how pairs are grouped changes nothing about their results."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.overlap import kernels
+from robot_side.overlap.kernels import PairCounts
+from robot_side.overlap.lanes.lanes import LANES
+from robot_side.overlap.primitives.solid import Overlaps
+from tests.helpers.repository import ROOT
+
+Arrays = tuple[FloatArray, ...]
+Pairs = Callable[..., Overlaps]
+
+
+def tetrahedra(count: int, seed: int = 0) -> Arrays:
+    rng = np.random.default_rng(seed)
+    radii = np.exp(rng.uniform(-1.5, 1.5, count))
+    return rng.normal(size=(count, 3)), radii, rng.normal(size=(count, 4, 3))
+
+
+def boxes(count: int, seed: int = 0) -> Arrays:
+    rng = np.random.default_rng(seed)
+    radii = np.exp(rng.uniform(-1.5, 1.5, count))
+    turns = np.ascontiguousarray(np.linalg.qr(rng.normal(size=(count, 3, 3)))[0])
+    return rng.normal(size=(count, 3)), radii, rng.normal(size=(count, 3)), turns, rng.uniform(0.2, 2.0, (count, 3))
+
+
+KINDS = pytest.mark.parametrize(
+    ("pairs", "make"),
+    [(kernels.tetrahedron_pairs, tetrahedra), (kernels.box_pairs, boxes)],
+    ids=["tetrahedra", "boxes"],
+)
+
+
+def assert_same(first: Overlaps, second: Overlaps) -> None:
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@KINDS
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, LANES - 1, LANES, LANES + 1, 3 * LANES + 5])
+def test_a_pair_does_not_depend_on_its_neighbours(pairs: Pairs, make: Callable[[int], Arrays], count: int) -> None:
+    arguments = make(count)
+    together = pairs(*arguments)
+    alone = [pairs(*(argument[i : i + 1] for argument in arguments)) for i in range(count)]
+    assert [len(result) for result in together] == [count] * 3
+    for result, parts in zip(together, zip(*alone, strict=True), strict=False):
+        np.testing.assert_array_equal(result, np.concatenate(parts))
+
+
+@KINDS
+def test_threads_change_nothing(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
+    arguments = make(5000)
+    one, three = PairCounts(), PairCounts()
+    assert_same(pairs(*arguments, threads=1, counts=one), pairs(*arguments, threads=3, counts=three))
+    assert one == three
+
+
+@KINDS
+def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
+    centers, radii, *solids = make(1000)
+    counts = PairCounts()
+    pairs(centers + 100.0, radii, *solids, counts=counts)
+    assert counts == PairCounts(pairs=1000, early=1000, precise=0)
+    volumes, _, areas = pairs(centers, radii, *solids, counts=counts)
+    cut = int(((volumes > 0.0) & (areas > 0.0) & (areas < 12.56 * radii**2)).sum())
+    assert counts.pairs == 2000
+    # What bounds leave includes every pair that is cut, and not many others.
+    assert cut <= 2000 - counts.early <= 1.2 * cut
+    assert 0 <= counts.precise <= 0.02 * cut
+
+
+@KINDS
+def test_bounds_and_lanes_agree_about_what_is_not_cut(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
+    centers, _, *solids = make(2000)
+    # From a sphere that is surely inside, or outside, to one that surely swallows the solid.
+    shares = np.linspace(0.0, 1.0, 200)
+    for i in range(0, 2000, 200):
+        radii = 30.0 ** (2.0 * shares - 1.0)
+        same = [np.ascontiguousarray(np.repeat(solid[i : i + 1], 200, axis=0)) for solid in solids]
+        volumes, _, areas = pairs(np.repeat(centers[i : i + 1], 200, axis=0), radii, *same)
+        whole = 4.0 / 3.0 * np.pi * radii**3
+        assert (np.diff(volumes) >= -1e-15 * whole[1:]).all()
+        assert (volumes <= whole).all()
+        assert areas[-1] == 0.0
+        assert (areas <= 4.0 * np.pi * radii**2).all()
+
+
+def test_the_handedness_of_a_rotation_does_not_matter() -> None:
+    centers, radii, places, turns, halves = boxes(500)
+    for axis in range(3):
+        mirrored = turns.copy()
+        mirrored[:, :, axis] *= -1.0
+        first = kernels.box_pairs(centers, radii, places, turns, halves)
+        second = kernels.box_pairs(centers, radii, places, mirrored, halves)
+        whole = 4.0 / 3.0 * np.pi * radii**3
+        assert (np.abs(first[0] - second[0]) <= 1e-15 * whole).all()
+        assert (np.abs(first[1] - second[1]).max(axis=1) <= 4e-15 * np.pi * radii**2).all()
+
+
+def test_wrong_arrays_are_refused() -> None:
+    centers, radii, vertices = tetrahedra(4)
+    with pytest.raises(TypeError):
+        kernels.tetrahedron_pairs(centers.astype(np.float32), radii, vertices)
+
+
+NEEDLE = [
+    [3.000000011175871, -1.1250000018626451, -0.1250000074505806],
+    [2.6249999906867743, -0.2812499990686774, 0.8124999944120646],
+    [2.6249999990686774, -0.28124999068677425, 0.8125000055879354],
+    [2.625000006519258, -0.2812499925494219, 0.8125000093132257],
+]
+
+
+def test_a_needle_through_the_sphere_is_not_taken_for_apart() -> None:
+    # The planes of its long faces round by more than they lie apart.
+    volumes, _, areas = kernels.tetrahedron_pairs(
+        np.array([[2.75, -0.5625, 0.5]]), np.array([0.125]), np.array([NEEDLE])
+    )
+    assert volumes[0] == pytest.approx(2.0738419e-18, rel=1e-6)
+    assert areas[0] > 0.0
+
+
+def test_a_repeated_corner_has_no_volume() -> None:
+    centers, radii, vertices = tetrahedra(500)
+    for first, second in ((0, 1), (1, 2), (2, 3), (0, 3)):
+        flat = vertices.copy()
+        flat[:, second] = flat[:, first]
+        for scale in (1.0, 10.0):
+            for result in kernels.tetrahedron_pairs(centers, scale * radii, flat):
+                assert not result.any()
+
+
+def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
+    program = (
+        "import multiprocessing, numpy as np\n"
+        "from robot_side.overlap import sphere_sphere, sphere_tetrahedron\n"
+        "def total(_): return float(sphere_tetrahedron(np.zeros((20000, 3)), 1.0, np.eye(4, 3)).sum())\n"
+        "expected = total(None)\n"
+        "pool = multiprocessing.get_context('fork').Pool(1)\n"
+        "assert pool.map_async(total, [0]).get(60.0) == [expected]\n"
+        "pool.terminate()\n"
+        "import atexit\n"
+        "atexit.register(lambda: print('the same' if total(None) == expected else 'another'))\n"
+    )
+    root = ROOT
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=False, timeout=120.0
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("the same\n", "", 0)

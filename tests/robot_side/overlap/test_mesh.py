@@ -1,0 +1,276 @@
+"""Closed meshes against sums of reference tetrahedra, in the positions that overlap algorithms fail in."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mpf
+
+from common.arrays import FloatArray, IntArray
+from robot_side.overlap import Mesh, MeshLibrary, sphere_box, sphere_mesh, sphere_tetrahedron
+from robot_side.overlap.meshes.mesh_library import mesh_pairs
+from tests.helpers.overlap_meshes import (
+    CUBE_CORNERS,
+    CUBE_TRIANGLES,
+    TETRAHEDRON_TRIANGLES,
+    grid_tetrahedra,
+    ring,
+    round_mesh,
+    sum_of_parts,
+    surface_of,
+)
+from tests.helpers.overlap_reference import Overlap, Polyhedron
+
+WORST = 1e-15
+"""Of the sphere's volume, surface and, for the gradient, great circle."""
+
+Rng = np.random.Generator
+
+
+def assert_exact(mesh: Mesh, centers: FloatArray, radii: FloatArray, truth: list[Overlap]) -> None:
+    volumes, gradients, areas = mesh.overlap(centers, radii, gradient=True)
+    for volume, gradient, area, radius, true in zip(volumes, gradients, areas, radii, truth, strict=True):
+        great_circle = np.pi * radius**2
+        assert abs(volume - true.volume) <= WORST * 4.0 / 3.0 * radius * great_circle
+        assert abs(area - true.area) <= WORST * 4.0 * great_circle
+        assert max(abs(gradient - np.array(true.gradient))) <= 2.0 * WORST * great_circle
+
+
+def positions(rng: Rng, vertices: FloatArray, triangles: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Spheres anywhere, with their centre on a corner, edge or face, or with their surface through one."""
+    centers, radii = np.empty((count, 3)), np.empty(count)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    for number in range(count):
+        kind, parts = number % 3, 1 + number // 3 % 3
+        radii[number] = rng.uniform(0.2, 1.2)
+        centers[number] = rng.uniform(low - 0.5, high + 0.5)
+        if kind:
+            corners = vertices[triangles[rng.integers(len(triangles))]]
+            centers[number] = rng.dirichlet(np.ones(parts)) @ corners[:parts]
+        if kind == 2:
+            away = rng.normal(size=3)
+            radii[number] = np.linalg.norm(away)
+            centers[number] += away
+    return centers, radii
+
+
+def as_solid(vertices: FloatArray, tetrahedra: IntArray) -> Mesh:
+    return Mesh(vertices, surface_of(tetrahedra))
+
+
+def assert_exact_at(vertices: FloatArray, tetrahedra: IntArray, centers: FloatArray, radii: FloatArray) -> None:
+    truth = [sum_of_parts(vertices, tetrahedra, *sphere) for sphere in zip(centers, radii, strict=True)]
+    assert_exact(as_solid(vertices, tetrahedra), centers, radii, truth)
+
+
+def test_a_torus_in_all_positions() -> None:
+    rng = np.random.default_rng(1)
+    vertices, tetrahedra = ring(4)
+    centers, radii = positions(rng, vertices, surface_of(tetrahedra), 27)
+    assert_exact_at(vertices, tetrahedra, centers, radii)
+
+
+def test_an_l_shape_on_the_grid_with_exact_binary_spheres() -> None:
+    rng = np.random.default_rng(2)
+    vertices, tetrahedra = grid_tetrahedra(2)
+    middles = vertices[tetrahedra].mean(axis=1)
+    tetrahedra = tetrahedra[(middles[:, 0] < 1.0) | (middles[:, 1] < 1.0)]
+    centers = rng.integers(-2, 10, size=(30, 3)) / 4.0
+    assert_exact_at(vertices, tetrahedra, centers, rng.integers(1, 7, 30) / 4.0)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_random_solids_with_parts_that_touch_at_edges_and_corners(jitter: float) -> None:
+    rng = np.random.default_rng(3)
+    vertices, tetrahedra = grid_tetrahedra(2)
+    vertices += jitter * rng.uniform(-1.0, 1.0, vertices.shape)
+    for _ in range(6):
+        some = tetrahedra[rng.uniform(size=len(tetrahedra)) < 0.4]
+        centers, radii = positions(rng, vertices, surface_of(some), 9)
+        if jitter == 0.0:
+            centers[::2] = rng.integers(0, 5, size=centers[::2].shape) / 2.0
+        assert_exact_at(vertices, some, centers, radii)
+
+
+def test_a_cavity_is_not_part_of_the_solid() -> None:
+    rng = np.random.default_rng(4)
+    vertices, tetrahedra = grid_tetrahedra(3)
+    middles = vertices[tetrahedra].mean(axis=1)
+    tetrahedra = tetrahedra[np.abs(middles - 1.5).max(axis=1) > 0.5]
+    mesh = as_solid(vertices, tetrahedra)
+    assert mesh.volume_m3 == pytest.approx(26.0)
+    assert mesh.overlap([1.5, 1.5, 1.5], 0.4) == 0.0
+    assert mesh.overlap([0.5, 0.5, 0.5], 0.4) == pytest.approx(4.0 / 3.0 * np.pi * 0.4**3, rel=1e-15)
+    hole = Polyhedron.box([1.5] * 3, np.eye(3), [0.5] * 3)
+    outer = Polyhedron.box([1.5] * 3, np.eye(3), [1.5] * 3)
+    centers, radii = rng.uniform(0.5, 2.5, (30, 3)), rng.uniform(0.1, 2.0, 30)
+    truth = []
+    for center, radius in zip(centers, radii, strict=True):
+        whole, part = outer.overlap(center, radius), hole.overlap(center, radius)
+        gradient = tuple(a - b for a, b in zip(whole.gradient, part.gradient, strict=True))
+        truth.append(
+            Overlap(whole.volume - part.volume, (gradient[0], gradient[1], gradient[2]), whole.area - part.area)
+        )
+    assert_exact(mesh, centers, radii, truth)
+
+
+def test_a_narrow_slit_and_a_thin_plate_through_the_centre() -> None:
+    radius = 0.75
+    for thickness in (1e-2, 1e-6, 1e-12, 1e-16):
+        plate = Mesh(CUBE_CORNERS * [2.0, 2.0, thickness], CUBE_TRIANGLES)
+        slit = Mesh(
+            np.concatenate([CUBE_CORNERS * 3.0, CUBE_CORNERS * [2.0, 2.0, thickness]]),
+            np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES[:, ::-1] + 8]),
+        )
+        true = Polyhedron.box([0.0] * 3, np.eye(3), [2.0, 2.0, thickness])
+        for x, z in ((0.0, 0.0), (0.25, thickness), (1.75, -thickness), (0.1, 0.5), (2.0, thickness)):
+            center = [x, 0.125, z]
+            part = true.overlap(center, radius)
+            whole = 4.0 / 3.0 * np.pi * radius**3
+            assert abs(plate.overlap(center, radius) - part.volume) <= WORST * whole
+            if x < 1.9 and abs(z) < 0.4:
+                assert abs(slit.overlap(center, radius) - (mpf(whole) - part.volume)) <= WORST * whole
+
+
+def far_plate(length: float, rng: Rng) -> tuple[FloatArray, Polyhedron, FloatArray, FloatArray]:
+    """A plate of two triangles on each side, `length` long, spheres of about its thickness anywhere on it."""
+    sizes = np.array([length, length, 1.0])
+    count = 24
+    centers = rng.uniform(-1.0, 1.0, (count, 3)) * [length, length, 1.3]
+    centers[::3, 0] = length + rng.uniform(-1.0, 1.0, count // 3)
+    centers[1::3, 1] = centers[1::3, 0] + rng.uniform(-0.7, 0.7, count // 3)
+    return CUBE_CORNERS * sizes, Polyhedron.box([0.0] * 3, np.eye(3), sizes), centers, rng.uniform(0.3, 1.5, count)
+
+
+@pytest.mark.parametrize("length", [3.0, 10.0, 200.0, 1e4, 1e6])
+def test_triangles_much_larger_than_the_sphere(length: float) -> None:
+    vertices, solid, centers, radii = far_plate(length, np.random.default_rng(5))
+    truth = [solid.overlap(center, radius) for center, radius in zip(centers, radii, strict=True)]
+    assert_exact(Mesh(vertices, CUBE_TRIANGLES), centers, radii, truth)
+
+
+@pytest.mark.parametrize("depth", [1e-3, 1e-6])
+@pytest.mark.parametrize("fixed", [1, 2, 3])
+def test_faces_edges_and_corners_barely_reached_keep_their_relative_accuracy(fixed: int, depth: float) -> None:
+    rng = np.random.default_rng(6)
+    mesh, solid = Mesh(CUBE_CORNERS, CUBE_TRIANGLES), Polyhedron.box([0.0] * 3, np.eye(3), [1.0] * 3)
+    for number in range(8):
+        away, place = np.zeros(3), rng.uniform(-0.8, 0.8, 3)
+        away[:fixed], place[:fixed] = rng.uniform(0.2, 1.0, fixed), 1.0
+        if number % 2 and fixed == 1:
+            place[2] = place[1]
+        radius = rng.uniform(0.3, 1.5)
+        center = place + radius * (1.0 - depth) * away / np.linalg.norm(away)
+        true = solid.overlap(center, radius)
+        volume, gradient, area = mesh.overlap(center, radius, gradient=True)
+        assert abs(volume - true.volume) <= 1e-12 * true.volume
+        assert abs(area - true.area) <= 1e-12 * true.area
+        error = np.array([own - expected for own, expected in zip(gradient, true.gradient, strict=True)], dtype=float)
+        assert np.linalg.norm(error) <= 1e-9 * np.linalg.norm(gradient)
+
+
+def test_the_same_as_a_box_and_a_tetrahedron() -> None:
+    rng = np.random.default_rng(7)
+    centers, radii = rng.normal(size=(500, 3)), rng.uniform(0.1, 2.0, 500)
+    box = sphere_box(centers, radii, [0.0] * 3, np.eye(3), [1.0] * 3, gradient=True)
+    corners = rng.normal(size=(4, 3))
+    if np.linalg.det(corners[1:] - corners[0]) < 0.0:
+        corners = corners[[1, 0, 2, 3]]
+    tetrahedron = sphere_tetrahedron(centers, radii, corners, gradient=True)
+    for vertices, triangles, expected in (
+        (CUBE_CORNERS, CUBE_TRIANGLES, box),
+        (corners, TETRAHEDRON_TRIANGLES, tetrahedron),
+    ):
+        results = sphere_mesh(centers, radii, vertices, triangles, gradient=True)
+        for own, other, size in zip(results, expected, (4.19, 3.14, 12.6), strict=True):
+            assert np.abs(own - other).max() <= 5e-15 * size * 8.0
+
+
+def test_gradients_and_areas_are_the_derivatives() -> None:
+    rng = np.random.default_rng(8)
+    vertices, tetrahedra = ring(8)
+    mesh = as_solid(vertices, tetrahedra)
+    centers, radii = rng.uniform(-1.8, 1.8, (200, 3)) * [1.0, 1.0, 0.4], rng.uniform(0.2, 0.8, 200)
+    _, gradients, areas = mesh.overlap(centers, radii, gradient=True)
+    step = 1e-5
+    for axis in range(3):
+        shift = step * np.eye(3)[axis]
+        slope = (mesh.overlap(centers + shift, radii) - mesh.overlap(centers - shift, radii)) / (2.0 * step)
+        assert np.abs(slope - gradients[:, axis]).max() < 1e-7
+    growth = (mesh.overlap(centers, radii + step) - mesh.overlap(centers, radii - step)) / (2.0 * step)
+    assert np.abs(growth - areas).max() < 1e-7
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    center=st.tuples(*[st.floats(-2.0, 2.0)] * 3),
+    radius=st.floats(1e-3, 3.0),
+    turn=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: sum(x * x for x in q) > 0.1),
+    shift=st.tuples(*[st.floats(-10.0, 10.0)] * 3),
+)
+def test_rigid_motions_and_growth(
+    center: tuple[float, ...], radius: float, turn: tuple[float, ...], shift: tuple[float, ...]
+) -> None:
+    vertices, tetrahedra = ring(6)
+    mesh = as_solid(vertices, tetrahedra)
+    volume, gradient, area = mesh.overlap(center, radius, gradient=True)
+    sphere = 4.0 / 3.0 * np.pi * radius**3
+    assert 0.0 <= volume <= min(sphere, mesh.volume_m3) * (1.0 + 1e-15)
+    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
+    assert mesh.overlap(center, radius * 1.001) >= volume - WORST * sphere
+    w, x, y, z = np.array(turn) / np.linalg.norm(turn)
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    placed = rotation @ np.array(center) + np.array(shift)
+    arrays = np.zeros(1, dtype=np.int64), np.array([shift]), rotation[None].copy()
+    volumes, gradients, areas = mesh_pairs(placed[None], np.array([radius]), MeshLibrary([mesh]), *arrays)
+    # The placed centre is rounded where the shift is large.
+    rounding = 3e-15 * 10.0 / radius
+    assert abs(volumes[0] - volume) <= (WORST + rounding) * sphere
+    assert abs(areas[0] - area) <= (WORST + 10.0 * rounding) * 4.0 * np.pi * radius**2 + 1e-6 * np.sqrt(rounding)
+    assert np.abs(gradients[0] - rotation @ gradient).max() <= 1e-6 * np.sqrt(rounding) + 10.0 * rounding * radius**2
+
+
+def test_relabelling_and_splitting_change_nothing() -> None:
+    rng = np.random.default_rng(9)
+    vertices, triangles = round_mesh(4)
+    centers, radii = rng.uniform(-1.5, 1.5, (100, 3)), rng.uniform(0.05, 1.0, 100)
+    expected = Mesh(vertices, triangles).overlap(centers, radii)
+    order, rows = rng.permutation(len(vertices)), rng.permutation(len(triangles))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    relabelled = Mesh(vertices[order], np.roll(place[triangles[rows]], 1, axis=1))
+    sphere = 4.0 / 3.0 * np.pi * radii**3
+    assert (np.abs(relabelled.overlap(centers, radii) - expected) <= WORST * sphere).all()
+    # Every triangle with vertices of its own: they are found to be the same places.
+    apart = Mesh(vertices[triangles].reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
+    assert (np.abs(apart.overlap(centers, radii) - expected) <= WORST * sphere).all()
+
+
+def test_a_query_touches_only_the_triangles_near_the_sphere() -> None:
+    rng = np.random.default_rng(10)
+    mesh = Mesh(*round_mesh(35))
+    assert mesh.triangle_count == 9800
+    centers = rng.normal(size=(100, 3))
+    centers /= np.linalg.norm(centers, axis=1, keepdims=True)
+    counts = mesh.counts(centers, 0.05)
+    assert counts.min() > 5
+    assert counts.max() < 60
+    assert mesh.counts([0.0, 0.0, 0.0], 0.5) == 0
+    assert mesh.counts([0.0, 0.0, 0.0], 2.0) == 0
+    assert mesh.counts([0.0, 0.0, 2.0], 0.5) == 0
+
+
+def test_more_triangles_than_lanes() -> None:
+    rng = np.random.default_rng(11)
+    mesh = Mesh(*round_mesh(12))
+    coarse = mesh.overlap(rng.uniform(-0.2, 0.2, (50, 3)), 1.0)
+    assert mesh.counts(np.zeros(3), 0.999) > 500
+    assert ((coarse > 2.5) & (coarse < mesh.volume_m3)).all()
+    near, inside = mesh.overlap([0.0, 0.0, 0.0], 0.99999), mesh.overlap([0.0, 0.0, 0.0], 1.0 + 1e-9)
+    assert 0.0 < near < inside == mesh.volume_m3

@@ -1,0 +1,266 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.errors import ConfigurationError, FeelaheadError
+from robot_side.simulation.arm import MujocoArm, measure_gripper
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.simulation.scene import GroundTruth, Scene, load_scene
+from tests.helpers.arm_models import (
+    COUPLING,
+    MIRRORED_GRIPPER,
+    MOTORS,
+    POSITION_SERVOS,
+    TENDON_GRIPPER,
+    VELOCITY_SERVOS,
+    planar_arm,
+)
+from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
+
+
+def perfect_arm(scene: Scene, limits: MotionLimits | None = None) -> MujocoArm:
+    return MujocoArm(scene, Encoder(0.0, 0.0), limits)
+
+
+@pytest.mark.parametrize(
+    "velocity_m_s", [(0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.15), (-0.1, -0.1, 0.05), (0.02, 0.0, 0.0)]
+)
+def test_the_tool_moves_as_commanded(velocity_m_s: tuple[float, float, float]) -> None:
+    driver = ToolDriver.load()
+    wanted = np.array(velocity_m_s)
+    path = driver.move(np.concatenate([wanted, np.zeros(3)]), 0.8)
+    steady = path[round(0.3 / PERIOD_S) :]
+    velocity = (steady[-1] - steady[0]) / (PERIOD_S * (len(steady) - 1))
+    # 1 % of the speed along and across, over half a second.
+    assert np.linalg.norm(velocity - wanted) < 0.01 * np.linalg.norm(wanted)
+
+
+def test_the_tool_turns_as_commanded() -> None:
+    driver = ToolDriver.load()
+    site = driver.scene.robot.site
+    before = driver.scene.data.site_xmat[site].reshape(3, 3).copy()
+    path = driver.move(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), 1.0)
+    turned = driver.scene.data.site_xmat[site].reshape(3, 3) @ before.T
+    angle = np.arctan2(turned[1, 0], turned[0, 0])
+    # Acceleration at 8 rad/s² costs the first 0.05 s a half of its turn.
+    assert angle == pytest.approx(0.4, abs=0.03)
+    assert np.linalg.norm(path - path[0], axis=1).max() < 2e-3
+
+
+def test_an_arm_that_nobody_ticks_stops_by_itself() -> None:
+    driver = ToolDriver.load()
+    path = driver.move(np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.5)
+    speed = float(np.linalg.norm(path[-1] - path[-2]) / PERIOD_S)
+    assert speed == pytest.approx(0.25, rel=0.02)
+    last = driver.tool_m()
+    state = driver.wait(1.0)
+    stopped = driver.tool_m()
+    assert np.linalg.norm(driver.scene.data.qvel[driver.scene.robot.arm_velocities]) < 1e-3
+    assert np.abs(state.joint_velocities_rad_s).max() < 1e-3
+    # What the command still allowed, then a stop; at 12 rad/s² it takes less than 2 cm from 0.25 m/s.
+    assert speed * VALID_S * 0.95 < np.linalg.norm(stopped - last) < speed * VALID_S + 0.02
+    driver.wait(1.0)
+    assert np.linalg.norm(driver.tool_m() - stopped) < 1e-5
+
+
+def test_it_does_not_slow_down_before_the_command_runs_out() -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    arm.command(np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.5)
+    speeds = [arm.state(tick * 1e-3).joint_velocities_rad_s[0] for tick in range(1, 700)]
+    np.testing.assert_allclose(speeds[200:500], 0.3, rtol=0.01)
+    # 0.3 rad/s at 12 rad/s² is gone in 25 ms; the servo behind it takes a little longer.
+    assert abs(speeds[510]) < 0.9 * 0.3
+    assert abs(speeds[600]) < 0.02 * 0.3
+
+
+def test_ticking_does_not_change_the_physics() -> None:
+    paths = []
+    for ticks in (1, 500):
+        scene = load_scene()
+        arm = perfect_arm(scene)
+        arm.state(7.0)
+        arm.command(np.array([0.4, -0.2, 0.1, 0.0, 0.3, 0.0]), 7.3)
+        for tick in range(1, ticks + 1):
+            state = arm.state(7.0 + 0.5 * tick / ticks)
+        paths.append(state.joint_positions_rad)
+        assert state.time_s == pytest.approx(7.5)
+    np.testing.assert_array_equal(paths[0], paths[1])
+
+
+def test_the_same_instant_is_measured_once_and_the_past_not_at_all() -> None:
+    arm = MujocoArm(load_scene(), Encoder(seed=1))
+    first = arm.state(3.0)
+    assert arm.state(3.0) is first
+    assert arm.state(2.0) is first
+    later = arm.state(3.001)
+    assert later.time_s == pytest.approx(3.001)
+    assert arm.state(3.001) is later
+
+
+def test_a_suspended_process_skips_all_but_two_seconds() -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    arm.command(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.1)
+    before = scene.data.qpos[0]
+    state = arm.state(3600.0)
+    assert scene.data.time == pytest.approx(2.0)
+    assert state.time_s == pytest.approx(3600.0)
+    assert scene.data.qpos[0] - before < 0.1
+    assert arm.state(3600.5).time_s == pytest.approx(3600.5)
+    assert scene.data.time == pytest.approx(2.5)
+
+
+def test_the_arm_does_not_leave_its_joints_ranges(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path), "tcp")
+    arm = perfect_arm(scene)
+    upper = scene.robot.upper_rad[1]
+    arm.state(0.0)
+    highest = -np.inf
+    for tick in range(1, 1500):
+        arm.command(np.array([0.0, 2.0]), tick * 2e-3 + 0.1)
+        highest = max(highest, float(arm.state(tick * 2e-3).joint_positions_rad[1]))
+    assert upper - 0.01 < highest <= upper
+
+
+def test_a_blocked_arm_winds_nothing_up(tmp_path: Path) -> None:
+    block = '<geom name="block" type="box" pos="0.5 0 -0.15" size="0.15 0.3 0.1"/>'
+    key = '<keyframe><key qpos="0.2 -0.2 0 0"/></keyframe>'
+    stiff = POSITION_SERVOS.replace('kp="1000" kv="50"', 'kp="8000" kv="400"')
+    path = planar_arm(tmp_path, arm_actuators=stiff, world=block, extra_bottom=COUPLING + key)
+    scene = load_scene(path, "tcp")
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    for tick in range(1, 1000):
+        arm.command(np.array([0.5, 0.0]), tick * 2e-3 + 0.05)
+        state = arm.state(tick * 2e-3)
+    assert "block" in {name for _, name in GroundTruth(scene).observe().contacts}
+    blocked = state.joint_positions_rad
+    pressing = abs(float(scene.data.actuator_force[0]))
+    # Halted, it lets go of what it pressed on and stays where it is.
+    released = arm.state(3.0)
+    assert np.abs(released.joint_velocities_rad_s).max() < 1e-3
+    assert np.abs(released.joint_positions_rad - blocked).max() < 0.02
+    assert abs(float(scene.data.actuator_force[0])) < pressing - 10.0
+    # Told to go back it does so at once: 1.5 s of pressing at 0.5 rad/s left no 0.75 rad to be unwound.
+    arm.command(np.array([-0.5, 0.0]), 4.0)
+    assert arm.state(3.2).joint_positions_rad[0] < blocked[0] - 0.06
+
+
+@pytest.mark.parametrize("actuators", [POSITION_SERVOS, VELOCITY_SERVOS, MOTORS])
+def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, actuators: str) -> None:
+    scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators), "tcp")
+    arm = perfect_arm(scene)
+    start = arm.state(0.0).joint_positions_rad
+    # Gravity pulls on an arm that has no compensation of its own.
+    np.testing.assert_allclose(arm.state(1.0).joint_positions_rad, start, atol=2e-3)
+    velocity = np.array([0.4, -0.3])
+    positions = []
+    for tick in range(500):
+        arm.command(velocity, 1.0 + tick * 2e-3 + 0.05)
+        positions.append(arm.state(1.0 + tick * 2e-3).joint_positions_rad)
+    np.testing.assert_allclose((positions[-1] - positions[200]) / (299 * 2e-3), velocity, rtol=0.02)
+    stopped = arm.state(2.5)
+    assert np.abs(stopped.joint_velocities_rad_s).max() < 1e-3
+    assert np.abs(stopped.joint_positions_rad - positions[-1]).max() < 0.4 * 0.05 + 0.4**2 / 12.0 + 5e-3
+
+
+def test_bad_commands_change_nothing() -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    for bad in (np.zeros(5), np.full(6, np.nan), np.full(6, np.inf)):
+        with pytest.raises(ValueError, match="joint_velocity_rad_s"):
+            arm.command(bad, 1.0)
+    with pytest.raises(ValueError, match="valid_until_s"):
+        arm.command(np.ones(6), np.inf)
+    with pytest.raises(ValueError, match="closing"):
+        arm.command_gripper(2.0, 1.0)
+    before = scene.data.qpos[:8].copy()
+    arm.state(0.5)
+    np.testing.assert_allclose(scene.data.qpos[:6], before[:6], atol=1e-5)
+    # The fingers settle into their coupling.
+    np.testing.assert_allclose(scene.data.qpos[6:8], before[6:], atol=1e-4)
+
+
+def test_an_unstable_simulation_is_no_motion_of_the_arm() -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    scene.data.qvel[:] = np.nan
+    with pytest.raises(FeelaheadError, match="unstable"):
+        arm.state(0.01)
+
+
+def test_it_grasps_and_lifts_the_target() -> None:
+    driver = ToolDriver.load()
+    target = driver.scene.data.body("table_scene/target")
+    assert driver.arm.state(driver.now_s).gripper_opening_m == pytest.approx(0.085, abs=1e-3)
+    driver.go_to(np.array([0.6, 0.0, 0.07]), 1.5)
+    driver.go_to(np.array([0.785, 0.0, 0.07]), 2.0)
+    assert driver.contacts == set()
+    state = driver.grip(1.0, 0.8)
+    assert state.gripper_holding
+    assert state.gripper_opening_m == pytest.approx(0.04, abs=1e-3)
+    driver.go_to(np.array([0.7, 0.0, 0.2]), 3.0)
+    assert target.xpos[2] > 0.18
+    assert {name for _, name in driver.contacts} == {"target"}
+    assert driver.wait(2.0).gripper_holding
+    assert target.xpos[2] > 0.18
+    assert not driver.grip(-1.0, 0.8).gripper_holding
+    assert target.xpos[2] < 0.1
+
+
+def test_an_empty_gripper_holds_nothing_and_stops_with_its_command() -> None:
+    driver = ToolDriver.load()
+    half_closed = driver.grip(1.0, 0.25)
+    rested = driver.wait(0.5)
+    # The command is valid for 50 ms after the last tick.
+    assert 0.03 < rested.gripper_opening_m <= half_closed.gripper_opening_m < 0.06
+    assert not rested.gripper_holding
+    closed = driver.grip(1.0, 1.0)
+    assert closed.gripper_opening_m < 1e-3
+    assert not closed.gripper_holding
+    opened = driver.grip(-1.0, 1.0)
+    assert opened.gripper_opening_m == pytest.approx(0.085, abs=1e-3)
+
+
+def test_a_gripper_like_frankas_opens_towards_its_high_input(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path), "tcp")
+    travel = measure_gripper(scene)
+    assert travel is not None
+    np.testing.assert_array_equal(travel.open_control, [255.0])
+    np.testing.assert_array_equal(travel.closed_control, [0.0])
+    assert travel.openings_m[0] == pytest.approx(0.08, abs=1e-3)
+    assert travel.openings_m[-1] == pytest.approx(0.0, abs=1e-3)
+    arm = perfect_arm(scene)
+    assert arm.state(0.0).gripper_opening_m == pytest.approx(0.08, abs=1e-3)
+    np.testing.assert_allclose(arm.state(0.0).finger_positions, [0.04, 0.04], atol=1e-3)
+
+
+def test_two_fingers_with_servos_that_run_against_each_other(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path, gripper_actuators=MIRRORED_GRIPPER, extra_bottom="", mirrored=True)
+    travel = measure_gripper(load_scene(path, "tcp"))
+    assert travel is not None
+    np.testing.assert_allclose(travel.open_control, [0.04, -0.04])
+    np.testing.assert_allclose(travel.closed_control, [0.0, 0.0])
+    assert travel.openings_m[0] == pytest.approx(0.08, abs=1e-3)
+
+
+def test_an_arm_without_a_gripper_ignores_its_commands(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path, gripper_actuators=""), "tcp")
+    arm = perfect_arm(scene)
+    arm.command_gripper(1.0, 10.0)
+    state = arm.state(0.0)
+    assert state.gripper_opening_m == 0.0
+    assert not state.gripper_holding
+
+
+def test_a_gripper_of_unknown_range_is_named(tmp_path: Path) -> None:
+    unlimited = TENDON_GRIPPER.replace('ctrlrange="0 255"', "")
+    with pytest.raises(ConfigurationError, match="'hand' has no ctrlrange; valid: its open and its closed input"):
+        perfect_arm(load_scene(planar_arm(tmp_path, gripper_actuators=unlimited), "tcp"))

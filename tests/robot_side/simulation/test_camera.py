@@ -1,0 +1,101 @@
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.scene import MujocoCamera, Scene, load_scene
+from tests.helpers.arm_models import SHAPES, STONE, planar_arm
+
+
+@pytest.fixture
+def built_in() -> Scene:
+    return load_scene()
+
+
+@pytest.fixture
+def shapes(tmp_path: Path) -> Scene:
+    return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
+
+
+def index_of(seen: PerceivedObjects, name: str) -> int:
+    return seen.names.index(name)
+
+
+def test_every_array_is_contiguous(shapes: Scene) -> None:
+    seen = MujocoCamera(shapes).perceive(0.0)
+    arrays = [getattr(seen, field.name) for field in fields(seen) if isinstance(getattr(seen, field.name), np.ndarray)]
+    assert len(arrays) == 16
+    assert all(array.flags.c_contiguous for array in arrays)
+
+
+def test_exact_shapes_are_exact(shapes: Scene) -> None:
+    seen = MujocoCamera(shapes).perceive(0.0)
+    model, data = shapes.model, shapes.data
+    table = int(np.flatnonzero(seen.box_object == index_of(seen, "table_slab"))[0])
+    geom = model.geom("table_slab").id
+    np.testing.assert_allclose(seen.box_centers_m[table], [0.8, -0.4, 0.1], atol=1e-12)
+    np.testing.assert_allclose(seen.box_rotations[table], data.geom_xmat[geom].reshape(3, 3))
+    np.testing.assert_allclose(seen.box_half_sizes_m[table], [0.1, 0.2, 0.1])
+
+    lamp = int(np.flatnonzero(seen.sphere_object == index_of(seen, "post"))[0])
+    np.testing.assert_allclose(seen.sphere_centers_m[lamp], data.geom("lamp").xpos)
+    assert seen.sphere_radii_m[lamp] == pytest.approx(0.04)
+
+    # The vertices as written, taken to the world by the body's own frame.
+    written = np.array([[0, 0, 0.1], [0.07, 0, 0], [-0.035, 0.06, 0], [-0.035, -0.06, 0.01]])
+    body = data.body("stone")
+    expected = body.xpos + written @ body.xmat.reshape(3, 3).T
+    found = seen.tetrahedron_vertices_m[0]
+    # MuJoCo stores a mesh in single precision.
+    for vertex in expected:
+        assert np.linalg.norm(found - vertex, axis=1).min() < 1e-7
+
+    # Solid is the side that the plane's z axis points away from.
+    away = np.array([-1.0, 0.0, 0.2]) / np.linalg.norm([-1.0, 0.0, 0.2])
+    np.testing.assert_allclose(seen.half_space_normals, [away], atol=1e-12)
+    np.testing.assert_allclose(seen.half_space_offsets_m, [away @ np.array([1.5, 0.0, 0.0])], atol=1e-12)
+
+
+def test_the_camera_errs_by_the_same_vector_for_every_primitive_of_an_object(shapes: Scene) -> None:
+    names = tuple(thing.name for thing in shapes.objects)
+    error = CameraError(names, mean_m=0.01, standard_deviation_m=0.005, seed=3)
+    true, seen = MujocoCamera(shapes).perceive(0.0), MujocoCamera(shapes, error).perceive(0.0)
+    offsets = error.next_frame()
+    np.testing.assert_allclose(seen.sphere_centers_m - true.sphere_centers_m, offsets[seen.sphere_object], atol=1e-12)
+    np.testing.assert_allclose(seen.box_centers_m - true.box_centers_m, offsets[seen.box_object], atol=1e-12)
+    moved = seen.tetrahedron_vertices_m - true.tetrahedron_vertices_m
+    np.testing.assert_allclose(moved[0], np.tile(offsets[seen.tetrahedron_object[0]], (4, 1)), atol=1e-12)
+    shift = seen.half_space_offsets_m - true.half_space_offsets_m
+    np.testing.assert_allclose(shift, [seen.half_space_normals[0] @ offsets[seen.half_space_object[0]]], atol=1e-12)
+    np.testing.assert_array_equal(seen.box_rotations, true.box_rotations)
+
+
+def test_a_frame_lasts_until_the_next_is_due(built_in: Scene) -> None:
+    names = tuple(thing.name for thing in built_in.objects)
+    camera = MujocoCamera(built_in, CameraError(names, frame_standard_deviation_m=0.001))
+    frames = {id(frame): frame for frame in [camera.perceive(5.0 + tick * 1e-3) for tick in range(1000)]}
+    assert len(frames) == 30
+    first, second, *_ = frames.values()
+    assert first.time_s == 5.0
+    assert second.time_s == pytest.approx(5.0 + 1.0 / 30.0, abs=1e-3)
+    assert (first.box_centers_m != second.box_centers_m).any()
+    # After a pause there is one new frame, not all those that were missed.
+    late = camera.perceive(9.0)
+    assert camera.perceive(9.001) is late
+
+
+def test_a_role_changes_from_the_next_frame_on(built_in: Scene) -> None:
+    camera = MujocoCamera(built_in)
+    before = camera.perceive(0.0)
+    camera.set_role("ball", Role.IGNORED)
+    assert camera.perceive(0.01) is before
+    after = camera.perceive(0.05)
+    assert after.roles[index_of(after, "ball")] is Role.IGNORED
+    assert len(after.sphere_radii_m) == len(before.sphere_radii_m) - 1
+    with pytest.raises(ValueError, match=r"'vase' is no object; valid: floor, table"):
+        camera.set_role("vase", Role.TARGET)
+    with pytest.raises(ValueError, match="frame_rate_hz"):
+        MujocoCamera(built_in, frame_rate_hz=0.0)

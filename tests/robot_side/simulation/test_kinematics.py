@@ -1,0 +1,105 @@
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from robot_side.simulation.arm import MujocoKinematics
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.scene import Scene, load_scene
+from tests.helpers.tool_driver import PERIOD_S, ToolDriver
+
+
+def test_kinematics_with_perfect_encoders_is_the_truth() -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    driver.move(np.array([0.1, 0.1, -0.05, 0.2, 0.1, 0.3]), 0.4)
+    state = driver.grip(1.0, 0.3)
+    pose = driver.pose(state)
+    data, site = driver.scene.data, driver.scene.robot.site
+    # The encoders are read after the last step, the simulation's own kinematics stand before it.
+    mujoco.mj_forward(driver.scene.model, data)
+    np.testing.assert_allclose(pose.tool_position_m, data.site_xpos[site], atol=1e-12)
+    np.testing.assert_allclose(pose.tool_rotation, data.site_xmat[site].reshape(3, 3), atol=1e-12)
+
+
+def test_encoder_noise_moves_the_tool_as_the_propagated_error_says() -> None:
+    driver = ToolDriver.load()
+    encoder = Encoder(2e-3, 1e-3, seed=2)
+    data, robot = driver.scene.data, driver.scene.robot
+    true = data.qpos[robot.arm_positions].copy()
+    state = driver.arm.state(driver.now_s)
+    errors = []
+    for _ in range(3000):
+        reading = type(state)(**{**state.__dict__, "joint_positions_rad": encoder.read(true)})
+        pose = driver.pose(reading)
+        errors.append(pose.tool_position_m - data.site_xpos[robot.site])
+    jacobian = pose.tool_jacobian[:3]
+    predicted = encoder.standard_deviation_rad() ** 2 * jacobian @ jacobian.T
+    # Whitened by what eq. 5 predicts, the errors have unit covariance; 3000 samples leave about 2.6 % (1 sigma).
+    whitened = np.linalg.solve(np.linalg.cholesky(predicted), np.array(errors).T)
+    np.testing.assert_allclose(np.cov(whitened), np.eye(3), atol=0.1)
+    assert np.abs(whitened.mean(axis=1)).max() < 4.0 / np.sqrt(3000)
+
+
+def test_the_arms_own_reading_is_within_the_predicted_error_of_the_truth() -> None:
+    driver = ToolDriver.load()
+    sigma_rad = Encoder().standard_deviation_rad()
+    ratios = []
+    for _ in range(200):
+        pose = driver.pose(driver.wait(PERIOD_S))
+        error = pose.tool_position_m - driver.tool_m()
+        jacobian = pose.tool_jacobian[:3]
+        ratios.append(float(error @ np.linalg.solve(sigma_rad**2 * jacobian @ jacobian.T, error)))
+    # Chi-squared with three degrees of freedom: mean 3, and the mean of 200 within 4 of its deviations.
+    assert np.mean(ratios) == pytest.approx(3.0, abs=4.0 * np.sqrt(6.0 / 200))
+
+
+def test_jacobians_are_the_derivatives_of_the_spheres() -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.wait(PERIOD_S)
+    pose = driver.pose(state)
+    step = 1e-6
+    for joint in range(6):
+        poses = []
+        for sign in (-1.0, 1.0):
+            moved = state.joint_positions_rad.copy()
+            moved[joint] += sign * step
+            poses.append(driver.pose(type(state)(**{**state.__dict__, "joint_positions_rad": moved})))
+        numeric = (poses[1].sphere_centers_m - poses[0].sphere_centers_m) / (2.0 * step)
+        np.testing.assert_allclose(pose.sphere_jacobians[:, :, joint], numeric, atol=1e-8)
+        tool = (poses[1].tool_position_m - poses[0].tool_position_m) / (2.0 * step)
+        np.testing.assert_allclose(pose.tool_jacobian[:3, joint], tool, atol=1e-8)
+
+
+def corners_of(scene: Scene, geom: int) -> FloatArray:
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    local = scene.model.geom_aabb[geom, :3] + signs * scene.model.geom_aabb[geom, 3:]
+    placed: FloatArray = scene.data.geom_xpos[geom] + local @ scene.data.geom_xmat[geom].reshape(3, 3).T
+    return placed
+
+
+@pytest.mark.parametrize("closing_s", [0.0, 0.3, 0.8])
+def test_the_spheres_cover_the_gripper_wherever_its_fingers_are(closing_s: float) -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.grip(1.0, closing_s) if closing_s else driver.wait(PERIOD_S)
+    mujoco.mj_forward(driver.scene.model, driver.scene.data)
+    pose = driver.pose(state)
+    assert len(pose.sphere_radii_m) == 16
+    assert pose.sphere_radii_m.max() < 0.04
+    for geom, on_finger in zip(driver.scene.robot.gripper_geoms, driver.scene.robot.geom_on_finger, strict=True):
+        chosen = pose.sphere_on_finger == on_finger
+        apart = np.linalg.norm(
+            corners_of(driver.scene, int(geom))[:, None] - pose.sphere_centers_m[chosen][None], axis=2
+        )
+        assert (apart <= pose.sphere_radii_m[chosen] + 1e-9).any(axis=1).all()
+
+
+def test_nothing_at_the_tool_is_told(tmp_path: Path) -> None:
+    bare = """<mujoco><worldbody><body><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <site name="end"/></body><body name="box"><geom size="0.1"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>"""
+    (tmp_path / "bare.xml").write_text(bare)
+    with pytest.raises(ConfigurationError, match="nothing at the tool can touch"):
+        MujocoKinematics(load_scene(tmp_path / "bare.xml", "end"))

@@ -1,0 +1,289 @@
+import math
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.errors import ConfigurationError
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.simulation import model_enums
+from robot_side.simulation.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
+
+
+@pytest.fixture
+def built_in() -> Scene:
+    return load_scene()
+
+
+@pytest.fixture
+def shapes(tmp_path: Path) -> Scene:
+    return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
+
+
+def index_of(seen: PerceivedObjects, name: str) -> int:
+    return seen.names.index(name)
+
+
+def test_the_numbers_of_the_kinds_are_mujocos() -> None:
+    names = {
+        model_enums.JointKind: (mujoco.mjtJoint, "mjJNT_"),
+        model_enums.GeomKind: (mujoco.mjtGeom, "mjGEOM_"),
+        model_enums.TransmissionKind: (mujoco.mjtTrn, "mjTRN_"),
+        model_enums.WrappedKind: (mujoco.mjtWrap, "mjWRAP_"),
+        model_enums.GainKind: (mujoco.mjtGain, "mjGAIN_"),
+        model_enums.BiasKind: (mujoco.mjtBias, "mjBIAS_"),
+    }
+    for kinds, (theirs, prefix) in names.items():
+        for kind in kinds:
+            assert int(getattr(theirs, prefix + kind.name.replace("_", ""))) == kind
+
+
+def test_the_built_in_scene_is_a_cluttered_table(built_in: Scene) -> None:
+    roles = built_in.roles
+    assert [name for name, role in roles.items() if role is Role.TARGET] == ["target"]
+    assert {name for name, role in roles.items() if role is Role.SUPPORT} == {"floor", "table"}
+    assert sum(role is Role.OBSTACLE for role in roles.values()) >= 6
+    assert built_in.approximated == ()
+    assert built_in.warnings == ()
+    seen = MujocoCamera(built_in).perceive(0.0)
+    counts = [len(seen.sphere_radii_m), len(seen.box_object), len(seen.tetrahedron_object), len(seen.half_space_object)]
+    assert counts == [2, 6, 1, 1]
+
+
+def test_the_arm_starts_with_its_tool_forward_over_the_table(built_in: Scene) -> None:
+    robot, data = built_in.robot, built_in.data
+    np.testing.assert_allclose(data.site_xpos[robot.site], [0.55, 0.0, 0.2], atol=1e-4)
+    rotation = data.site_xmat[robot.site].reshape(3, 3)
+    # As a camera sees: x right, y down, z forward.
+    np.testing.assert_allclose(rotation, [[0, 0, 1], [-1, 0, 0], [0, -1, 0]], atol=1e-4)
+    assert GroundTruth(built_in).observe().contacts == frozenset()
+    joints = [built_in.model.joint(int(joint)).name for joint in robot.arm_joints]
+    assert joints == ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
+    np.testing.assert_array_equal(robot.geom_on_finger, [False, True, True, True, True])
+
+
+def test_the_built_in_arm_has_the_published_dimensions(built_in: Scene) -> None:
+    data = mujoco.MjData(built_in.model)
+    random = np.random.default_rng(1)
+    flange_to_tool = 0.145
+    for _ in range(20):
+        angles = random.uniform(-3.0, 3.0, 6)
+        data.qpos[built_in.robot.arm_positions] = angles
+        mujoco.mj_kinematics(built_in.model, data)
+        # Standard Denavit-Hartenberg parameters of the UR5e (d, a, alpha), the base turned by half a turn.
+        pose = np.diag([-1.0, -1.0, 1.0, 1.0])
+        rows = [(0.1625, 0, 1), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, 1), (0.0997, 0, -1), (0.0996, 0, 0)]
+        for angle, (d, a, quarter_turns) in zip(angles, rows, strict=True):
+            c, s, k = math.cos(angle), math.sin(angle), quarter_turns
+            turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
+            tilt = np.array([[1, 0, 0, a], [0, 1 - abs(k), -k, 0], [0, k, 1 - abs(k), 0], [0, 0, 0, 1]])
+            pose = pose @ turn @ tilt
+        tool = pose @ np.array([0.0, 0.0, flange_to_tool, 1.0])
+        np.testing.assert_allclose(data.site_xpos[built_in.robot.site], tool[:3], atol=1e-6)
+
+
+def test_objects_and_roles_come_from_names(shapes: Scene) -> None:
+    anonymous = next(name for name in shapes.roles if name.startswith("geom"))
+    assert shapes.roles == {
+        "wall": Role.OBSTACLE,
+        "table_slab": Role.SUPPORT,
+        anonymous: Role.OBSTACLE,
+        "post": Role.OBSTACLE,
+        "Target_egg": Role.TARGET,
+        "stone": Role.OBSTACLE,
+    }
+    assert set(shapes.approximated) == {"post", "Target_egg"}
+    post = next(thing for thing in shapes.objects if thing.name == "post")
+    assert len(post.geoms) == 3
+
+
+def test_roles_can_be_overridden_and_ignored_objects_have_no_primitives(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path, world=SHAPES, extra_top=STONE)
+    scene = load_scene(path, "tcp", {"wall": Role.IGNORED, "post": Role.TARGET})
+    seen = MujocoCamera(scene).perceive(0.0)
+    assert scene.roles["post"] is Role.TARGET
+    assert seen.roles[index_of(seen, "wall")] is Role.IGNORED
+    assert len(seen.half_space_object) == 0
+    with pytest.raises(ConfigurationError, match="no object 'vase'; valid: wall, table_slab"):
+        load_scene(path, "tcp", {"vase": Role.TARGET})
+
+
+def brute_force_distance(scene: Scene, roles: set[Role]) -> float:
+    geoms = [geom for thing in scene.objects if scene.roles[thing.name] in roles for geom in thing.geoms]
+    return min(
+        float(mujoco.mj_geomDistance(scene.model, scene.data, int(mine), geom, 10.0, None))
+        for mine in scene.robot.gripper_geoms
+        for geom in geoms
+    )
+
+
+def test_the_true_distance_is_the_smallest_over_all_pairs(built_in: Scene) -> None:
+    random = np.random.default_rng(4)
+    truth = GroundTruth(built_in, farthest_m=5.0)
+    home = built_in.data.qpos[built_in.robot.arm_positions].copy()
+    seen_inside = 0
+    for _ in range(40):
+        built_in.data.qpos[built_in.robot.arm_positions] = home + random.uniform(-0.5, 0.5, 6)
+        mujoco.mj_forward(built_in.model, built_in.data)
+        observed = truth.observe()
+        assert observed.min_distance_m is not None
+        to_any = brute_force_distance(built_in, {Role.OBSTACLE, Role.TARGET})
+        to_obstacle = brute_force_distance(built_in, {Role.OBSTACLE})
+        assert observed.min_distance_m == pytest.approx(to_any, abs=1e-6)
+        assert observed.min_obstacle_distance_m == pytest.approx(to_obstacle, abs=1e-6)
+        seen_inside += to_any < 0.0
+    assert 0 < seen_inside < 40
+
+
+def test_nothing_near_is_none(built_in: Scene) -> None:
+    observed = GroundTruth(built_in, farthest_m=0.05).observe()
+    assert observed.min_distance_m is None
+    assert observed.min_obstacle_distance_m is None
+
+
+def test_contacts_name_the_gripper_geom_and_the_object_supports_included(built_in: Scene) -> None:
+    model, data = built_in.model, built_in.data
+    target = int(model.body("table_scene/target").jntadr[0])
+    address = int(model.jnt_qposadr[target])
+    data.qpos[address : address + 3] = data.geom("left_fingertip").xpos
+    table = model.body("table_scene/table").id
+    model.body_pos[table, 2] = data.geom("palm").xpos[2]
+    mujoco.mj_forward(model, data)
+    contacts = GroundTruth(built_in).observe().contacts
+    assert ("left_fingertip", "target") in contacts
+    assert ("palm", "table") in contacts
+    assert {name for _, name in contacts} <= set(built_in.roles)
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 90.0])
+def test_a_bare_robot_gets_the_table_where_its_tool_is(tmp_path: Path, yaw_deg: float) -> None:
+    floor = '<geom name="floor" type="plane" size="2 2 0.1"/>'
+    key = '<keyframe><key qpos="0.1 -0.2 0.01 0.01"/></keyframe>'
+    path = planar_arm(tmp_path, world=floor, base="1 2 0.1", yaw_deg=yaw_deg, extra_bottom=key)
+    scene = load_scene(path, "tcp")
+    assert scene.warnings == ()
+    assert scene.roles["target"] is Role.TARGET
+    assert list(scene.roles).count("floor") == 1
+    tool, target = scene.data.site_xpos[scene.robot.site], scene.data.body("table_scene/target").xpos
+    ahead = np.array([math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))])
+    np.testing.assert_allclose(target[:2] - tool[:2], 0.23 * ahead, atol=1e-6)
+    half_height = scene.model.geom("table_scene/target").size[2]
+    np.testing.assert_allclose(target[2], 0.1 + half_height, atol=1e-6)
+    # The configuration came through the attaching.
+    np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], [0.1, -0.2])
+
+
+def test_a_model_with_objects_of_its_own_keeps_them(shapes: Scene) -> None:
+    assert "carton" not in shapes.roles
+
+
+def test_the_start_is_the_keyframe_home_or_the_first_or_the_middle(tmp_path: Path) -> None:
+    keys = '<keyframe><key name="a" qpos="0.1 -0.5 0 0"/>{}</keyframe>'
+    home = '<key name="home" qpos="0.3 -0.7 0 0"/>'
+    for bottom, expected in (
+        (keys.format(home), [0.3, -0.7]),
+        (keys.format(""), [0.1, -0.5]),
+        ("", np.radians([0.0, -85.0])),
+    ):
+        scene = load_scene(planar_arm(tmp_path, extra_bottom=bottom), "tcp")
+        np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], expected, atol=1e-9)
+
+
+def one_line(error: pytest.ExceptionInfo[ConfigurationError]) -> str:
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_what_cannot_be_loaded_is_told_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        load_scene(tmp_path / "none.xml", "tcp")
+    assert "there is no file" in one_line(error)
+    assert "none.xml" in one_line(error)
+    with pytest.raises(ConfigurationError, match="there is no file"):
+        load_scene(tmp_path, "tcp")
+    for text in ("<mujoco", "<robots/>", "<mujoco><worldbody><geom size='x'/></worldbody></mujoco>", ""):
+        (tmp_path / "bad.xml").write_text(text)
+        with pytest.raises(ConfigurationError) as error:
+            load_scene(tmp_path / "bad.xml", "tcp")
+        assert "valid: an MJCF file that MuJoCo compiles" in one_line(error)
+
+
+@pytest.mark.parametrize("site", ["tool", "", None])
+def test_an_unknown_site_lists_the_sites(tmp_path: Path, site: str | None) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        load_scene(planar_arm(tmp_path), site)
+    assert "valid: tcp, camera_mount" in one_line(error)
+    with pytest.raises(ConfigurationError, match="valid: tool"):
+        load_scene(None, "gripper")
+
+
+def test_what_is_no_arm_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="no actuators"):
+        load_scene(planar_arm(tmp_path, arm_actuators="", gripper_actuators=""), "tcp")
+    only_shoulder = MOTORS.split("/>")[0] + "/>"
+    with pytest.raises(ConfigurationError, match="arm joint 'elbow' has no actuator; valid: a position"):
+        load_scene(planar_arm(tmp_path, arm_actuators=only_shoulder), "tcp")
+    muscle = POSITION_SERVOS.split("/>")[0] + '/><muscle name="pull" joint="elbow" lengthrange="0 1"/>'
+    with pytest.raises(ConfigurationError, match="'pull' of joint 'elbow' is of an unsupported kind; valid: position"):
+        load_scene(planar_arm(tmp_path, arm_actuators=muscle), "tcp")
+    fixed = planar_arm(tmp_path, world='<site name="corner"/>')
+    with pytest.raises(ConfigurationError, match="'corner' hangs on no joint"):
+        load_scene(fixed, "corner")
+    floating = planar_arm(
+        tmp_path,
+        wrist='<body name="ball" pos="0.3 0 0"><joint name="b" type="ball"/>'
+        '<geom size="0.01"/><site name="end"/></body>',
+    )
+    with pytest.raises(ConfigurationError, match="joint 'b' is ball; valid: hinge or slide"):
+        load_scene(floating, "end")
+
+
+def test_mujocos_warnings_leave_no_file_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = load_scene()
+    scene.data.qvel[0] = np.nan
+    mujoco.mj_step(scene.model, scene.data)
+    assert scene.data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_gripper_without_other_bodies_is_the_last_link(tmp_path: Path) -> None:
+    stick = """<mujoco><worldbody><body name="link"><joint name="j" axis="0 0 1"/>
+      <geom name="stick" type="box" size="0.1 0.01 0.01"/><site name="end" pos="0.1 0 0"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>"""
+    (tmp_path / "stick.xml").write_text(stick)
+    scene = load_scene(tmp_path / "stick.xml", "end")
+    assert [scene.model.geom(int(geom)).name for geom in scene.robot.gripper_geoms] == ["stick"]
+    assert scene.robot.gripper_actuators.size == 0
+    assert not scene.robot.geom_on_finger.any()
+
+
+def test_the_gripper_is_found_beyond_the_last_arm_link(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path, gripper_actuators=TENDON_GRIPPER), "camera_mount")
+    names = [scene.model.geom(int(geom)).name for geom in scene.robot.gripper_geoms]
+    assert names == ["palm", "left_tip", "right_tip"]
+    np.testing.assert_array_equal(scene.robot.geom_on_finger, [False, True, True])
+    assert [scene.model.actuator(int(index)).name for index in scene.robot.gripper_actuators] == ["hand"]
+
+
+def test_a_timestep_that_cannot_advance_is_named(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path)
+    path.write_text(path.read_text().replace("<worldbody>", '<option timestep="0"/><worldbody>', 1))
+    with pytest.raises(ConfigurationError, match="timestep"):
+        load_scene(path, "tcp")
+
+
+def test_a_keyframe_that_is_no_number_is_named(tmp_path: Path) -> None:
+    path = planar_arm(tmp_path, extra_bottom='<keyframe><key name="home" qpos="nan 0 0 0"/></keyframe>')
+    with pytest.raises(ConfigurationError, match="'home'"):
+        load_scene(path, "tcp")
+
+
+def test_a_keyframe_may_have_the_name_that_the_table_would_take(tmp_path: Path) -> None:
+    keys = '<key name="home" qpos="0.1 -0.2 0.01 0.01"/><key name="feelahead_start" qpos="0 0 0 0"/>'
+    floor = '<geom type="plane" size="1 1 0.1"/>'
+    scene = load_scene(planar_arm(tmp_path, world=floor, extra_bottom=f"<keyframe>{keys}</keyframe>"), "tcp")
+    assert scene.roles["target"] is Role.TARGET
+    assert scene.data.qpos[0] == pytest.approx(0.1)

@@ -1,0 +1,363 @@
+"""Curved and non-convex objects through the whole robot side: never smaller than they are, and hardly larger."""
+
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.assembly import build_robot_side
+from robot_side.compiled.kernel import Compiled
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.overlap import Mesh, sphere_sphere, warm_up
+from robot_side.overlap.meshes import mesh_library
+from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
+from robot_side.pairs import nearest_on_meshes
+from robot_side.pairs.candidates import candidate_pairs
+from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces
+from robot_side.settings import RobotSettings
+from robot_side.simulation.scene import MujocoCamera, Scene
+from tests.helpers.arm_models import planar_arm
+from tests.helpers.gripper_poses import gripper_pose
+from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.perceived_scenes import Scene as Objects
+from tests.helpers.perceived_scenes import random_rotation
+from tests.helpers.repository import ROOT
+from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
+from tests.robot_side.test_sensing import Senses
+
+TURNED = 'pos="0.9 0.3 0.2" euler="20 30 40"'
+ROUND = {
+    "cylinder": f'<body name="round" {TURNED}><geom type="cylinder" size="0.05 0.1"/></body>',
+    "capsule": f'<body name="round" {TURNED}><geom type="capsule" size="0.03 0.05"/></body>',
+    "ball": f'<body name="round" {TURNED}><geom type="ellipsoid" size="0.04 0.04 0.04"/></body>',
+    "ellipsoid": f'<body name="round" {TURNED}><geom type="ellipsoid" size="0.03 0.04 0.06"/></body>',
+}
+VOLUMES_M3 = {
+    "cylinder": math.pi * 0.05**2 * 0.2,
+    "capsule": math.pi * 0.03**2 * (0.1 + 4.0 / 3.0 * 0.03),
+    "ball": 4.0 / 3.0 * math.pi * 0.04**3,
+    "ellipsoid": 4.0 / 3.0 * math.pi * 0.03 * 0.04 * 0.06,
+}
+LARGEST_ERROR = 0.01
+
+
+def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArray:
+    """Points (n, 3) of a body's frame in the world."""
+    frame = scene.data.body(body)
+    in_world: FloatArray = frame.xpos + in_body_m @ frame.xmat.reshape(3, 3).T
+    return in_world
+
+
+def overlap_of(objects: PerceivedObjects, name: str, centers_m: FloatArray, radius_m: float) -> FloatArray:
+    """(n,) of spheres with one object, in m³, by the way that a tick takes."""
+    radii = np.full(len(centers_m), radius_m)
+    pairs = candidate_pairs(centers_m, radii, objects)
+    overlaps = by_object(evaluate(centers_m, radii[pairs.sphere_index], objects, pairs))
+    volumes = np.zeros(len(centers_m))
+    of_object = overlaps.object_index == objects.names.index(name)
+    volumes[overlaps.sphere_index[of_object]] = overlaps.volume_m3[of_object]
+    return volumes
+
+
+def cap(radius_m: float, depth_m: float) -> float:
+    return math.pi * depth_m**2 * (3.0 * radius_m - depth_m) / 3.0
+
+
+def axis_points(*heights_m: float) -> FloatArray:
+    return np.array([[0.0, 0.0, height] for height in heights_m])
+
+
+# Round shapes
+
+
+@pytest.mark.parametrize("shape", ROUND)
+def test_a_sphere_around_a_round_shape_overlaps_by_its_volume_within_the_stated_error(
+    shape: str, tmp_path: Path
+) -> None:
+    scene = scene_with(tmp_path, ROUND[shape])
+    error = scene.volume_errors["round"]
+    assert 0.0 < error <= LARGEST_ERROR
+    assert scene.approximated == ("round",)
+    volume = overlap_of(MujocoCamera(scene).perceive(0.0), "round", placed(scene, np.zeros((1, 3))), 0.2)[0]
+    assert VOLUMES_M3[shape] < volume <= VOLUMES_M3[shape] * (1.0 + error) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "heights_m", "radius_m", "closed_form"),
+    [
+        # Through the flat end, and within.
+        ("cylinder", [0.12, 0.105, 0.09, 0.0], 0.03, lambda z: cap(0.03, min(0.13 - z, 0.06) if z < 0.1 else 0.13 - z)),
+        # The end of a capsule is a ball's, as far as the other ball reaches no farther than its middle.
+        ("capsule", [0.1, 0.085, 0.08], 0.03, lambda z: float(sphere_sphere([0, 0, z], 0.03, [0, 0, 0.05], 0.03))),
+        ("ball", [0.08, 0.06, 0.03, 0.0], 0.05, lambda z: float(sphere_sphere([0, 0, z], 0.05, [0, 0, 0], 0.04))),
+    ],
+)
+def test_overlaps_are_the_closed_forms_within_the_stated_error(
+    shape: str, heights_m: list[float], radius_m: float, closed_form: Callable[[float], float], tmp_path: Path
+) -> None:
+    scene = scene_with(tmp_path, ROUND[shape])
+    allowance = scene.volume_errors["round"] * VOLUMES_M3[shape]
+    found = overlap_of(MujocoCamera(scene).perceive(0.0), "round", placed(scene, axis_points(*heights_m)), radius_m)
+    for height, volume in zip(heights_m, found, strict=True):
+        exact = closed_form(height)
+        # What the mesh adds to the shape is no more than the allowance, wherever the sphere is.
+        assert exact * (1.0 - 1e-9) <= volume <= exact + allowance * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("shape", ROUND)
+def test_it_is_never_perceived_smaller_than_it_is(shape: str, tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, ROUND[shape])
+    random = np.random.default_rng(3)
+    unit = random.normal(size=(500, 3))
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    if shape == "cylinder":
+        surface = unit / np.maximum(np.hypot(unit[:, 0], unit[:, 1]) / 0.05, np.abs(unit[:, 2]) / 0.1)[:, None]
+    elif shape == "capsule":
+        surface = 0.03 * unit + np.outer(np.clip(3.0 * unit[:, 2], -1.0, 1.0) * 0.05, [0.0, 0.0, 1.0])
+    else:
+        surface = unit * (0.04 if shape == "ball" else np.array([0.03, 0.04, 0.06]))
+    points = placed(scene, surface)
+    objects = MujocoCamera(scene).perceive(0.0)
+    pairs = candidate_pairs(points, np.full(500, 1e-4), objects)
+    assert len(pairs) == 500
+    assert (nearest_surfaces(points, objects, pairs).signed_distance_m <= 1e-15).all()
+
+
+def test_things_of_the_same_shape_share_one_mesh(tmp_path: Path) -> None:
+    vertices, triangles = cup()
+    world = "".join(
+        f'<body name="{kind}{number}" pos="{0.8 + 0.3 * number} {side} 0.3" euler="0 {20 * number} 0">{geom}</body>'
+        for number in range(3)
+        for side, (kind, geom) in enumerate(
+            [
+                ("post", '<geom type="cylinder" size="0.02 0.1"/>'),
+                ("rod", '<geom type="capsule" size="0.02 0.1"/>'),
+                ("cup", '<geom type="mesh" mesh="cup"/>'),
+            ]
+        )
+    )
+    scene = scene_with(tmp_path, world, mesh_asset("cup", vertices, triangles))
+    objects = MujocoCamera(scene).perceive(0.0)
+    assert objects.mesh_library is not None
+    assert len(objects.mesh_library) == 3
+    for kind in ("post", "rod", "cup"):
+        rows = np.isin(objects.mesh_object, [objects.names.index(f"{kind}{number}") for number in range(3)])
+        assert rows.sum() == 3
+        assert len(set(objects.mesh_index[rows].tolist())) == 1
+
+
+# Meshes of any form
+
+
+def test_a_cup_is_seen_with_its_mouth(tmp_path: Path) -> None:
+    scene = scene_with(
+        tmp_path, f'<body name="cup" {TURNED}><geom type="mesh" mesh="cup"/></body>', mesh_asset("cup", *cup())
+    )
+    assert scene.approximated == ()
+    objects = MujocoCamera(scene).perceive(0.0)
+    # In the mouth, halfway into a wall, across the rim, in the wall and under the floor of the mouth.
+    centers = CELL_M * np.array([[0, 0, 0.1], [0.5, 0, 0.5], [1.0, 0, 1.5], [1.0, 0, 0], [0, 0, -0.7], [0, 0, -0.5]])
+    radius = 0.4 * CELL_M
+    sphere = 4.0 / 3.0 * math.pi * radius**3
+    found = overlap_of(objects, "cup", placed(scene, centers, "cup"), radius)
+    expected = [0.0, sphere / 2.0, sphere / 2.0, sphere, sphere - cap(radius, 0.2 * CELL_M), sphere / 2.0]
+    # MuJoCo keeps vertices in single precision.
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * sphere)
+    nearest = nearest_surfaces(
+        placed(scene, centers[:1], "cup"),
+        objects,
+        candidate_pairs(placed(scene, centers[:1], "cup"), np.array([radius]), objects),
+    )
+    assert nearest.signed_distance_m[0] == pytest.approx(0.5 * CELL_M, rel=1e-6)
+
+
+def test_a_box_as_a_mesh_is_the_box(tmp_path: Path) -> None:
+    half_sizes = np.array([0.05, 0.1, 0.15])
+    scene = scene_with(
+        tmp_path,
+        f'<body name="mesh" {TURNED}><geom type="mesh" mesh="box"/></body>'
+        f'<body name="box" {TURNED}><geom type="box" size="0.05 0.1 0.15"/></body>',
+        mesh_asset("box", CUBE_CORNERS * half_sizes, CUBE_TRIANGLES),
+    )
+    assert scene.approximated == ()
+    objects = MujocoCamera(scene).perceive(0.0)
+    centers = placed(scene, np.random.default_rng(1).uniform(-0.2, 0.2, (200, 3)), "box")
+    of_mesh, of_box = (overlap_of(objects, name, centers, 0.05) for name in ("mesh", "box"))
+    assert (of_box > 0.0).sum() > 50
+    np.testing.assert_allclose(of_mesh, of_box, atol=1e-6 * 4.0 / 3.0 * math.pi * 0.05**3)
+
+
+@pytest.mark.parametrize("change", ["open", "one triangle turned", "each triangle twice", "inward"])
+def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_path: Path) -> None:
+    vertices, triangles = cup()
+    if change == "open":
+        triangles = triangles[1:]
+    elif change == "one triangle turned":
+        triangles = np.concatenate([triangles[:1, ::-1], triangles[1:]])
+    elif change == "each triangle twice":
+        triangles = np.concatenate([triangles, triangles])
+    else:
+        triangles = triangles[:, ::-1]
+    scene = scene_with(
+        tmp_path,
+        f'<body name="cup" {TURNED}><geom type="mesh" mesh="cup"/></body>',
+        mesh_asset("cup", vertices, triangles),
+    )
+    objects = MujocoCamera(scene).perceive(0.0)
+    mouth = overlap_of(objects, "cup", placed(scene, np.zeros((1, 3)), "cup"), 0.01)[0]
+    if change == "inward":
+        # Turned round as a whole it is closed, and means the same.
+        assert scene.approximated == ()
+        assert mouth == 0.0
+    else:
+        assert scene.volume_errors == {"cup": math.inf}
+        assert mouth == pytest.approx(4.0 / 3.0 * math.pi * 0.01**3)
+        around = overlap_of(objects, "cup", placed(scene, np.zeros((1, 3)), "cup"), 0.2)[0]
+        assert around == pytest.approx((3.0 * CELL_M) ** 3, rel=1e-6)
+
+
+def test_an_open_mesh_of_four_vertices_is_no_tetrahedron(tmp_path: Path) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    scene = scene_with(
+        tmp_path, '<geom name="shard" type="mesh" mesh="m" pos="1 0 0"/>', mesh_asset("m", corners, faces)
+    )
+    assert scene.volume_errors == {"shard": math.inf}
+
+
+def test_a_capsule_too_thin_for_a_mesh_stands_for_its_bounding_box(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, '<geom name="thread" type="capsule" size="1e-12 1" pos="1 0 0"/>')
+    assert scene.volume_errors == {"thread": math.inf}
+
+
+def test_what_no_mesh_describes_stands_for_its_bounding_box(tmp_path: Path) -> None:
+    field = '<asset><hfield name="hills" nrow="2" ncol="2" size="0.2 0.2 0.1 0.05" elevation="0 1 1 0"/></asset>'
+    world = '<geom name="hills" type="hfield" hfield="hills" pos="1 0 0.3"/>'
+    scene = scene_with(tmp_path, world, field)
+    assert scene.volume_errors == {"hills": math.inf}
+    objects = MujocoCamera(scene).perceive(0.0)
+    assert len(objects.box_object) == 1
+    assert len(objects.mesh_object) == 0
+    assert objects.mesh_library is None
+
+
+def test_a_frame_moves_and_leaves_out_meshes_as_other_primitives(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, ROUND["capsule"] + '<geom name="post" type="cylinder" size="0.1 0.1" pos="1 1 0"/>')
+    camera = MujocoCamera(scene)
+    before = camera.perceive(0.0)
+    camera.set_role("round", Role.IGNORED)
+    scene.data.geom("post").xpos[:] += 0.1
+    after = camera.perceive(1.0)
+    assert after.mesh_library is before.mesh_library
+    assert [before.names[index] for index in before.mesh_object] == ["post", "round"]
+    assert [after.names[index] for index in after.mesh_object] == ["post"]
+    np.testing.assert_allclose(after.mesh_positions_m, before.mesh_positions_m[:1] + 0.1)
+    np.testing.assert_array_equal(after.mesh_rotations, before.mesh_rotations[:1])
+
+
+# What is felt, said and skipped
+
+
+def test_stiffness_rises_towards_a_capsule_and_only_ahead() -> None:
+    capsule = Mesh(*capsule_mesh(0.03, 0.1, 12)[:2])
+    pose = gripper_pose([0.3, 0.1, 0.2], random_rotation(np.random.default_rng(4)))
+    approach, across = pose.tool_rotation[:, 2], pose.tool_rotation[:, 0]
+    front = float((pose.sphere_centers_m @ approach + pose.sphere_radii_m).max() - pose.tool_position_m @ approach)
+    # Its axis lies across the gap between the fingers, which therefore both meet it.
+    rotation = np.column_stack([pose.tool_rotation[:, 1], approach, across])
+    felt = []
+    for gap in (0.05, 0.01, 0.006, 0.002, -0.002):
+        objects = Objects().add().mesh(capsule, pose.tool_position_m + (front + 0.03 + gap) * approach, rotation)
+        sensed = Senses().sense(pose, objects.objects())
+        assert sensed.stiffness.l2 == 0.0
+        felt.append(sensed.stiffness.r2)
+    assert felt[0] == 0.0
+    assert felt[1:] == sorted(set(felt[1:]))
+    assert felt[1] > 0.0
+    behind = Objects().add().mesh(capsule, pose.tool_position_m - 0.175 * approach, rotation)
+    sensed = Senses().sense(pose, behind.objects())
+    assert sensed.stiffness.r2 == 0.0
+    assert sensed.stiffness.l2 > 0.0
+
+
+def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows: list[int] = []
+    nearest, overlap = mesh_library.nearest_mesh_pairs, mesh_library.mesh_pairs
+
+    def counted_nearest(points: FloatArray, *placed_meshes: object) -> tuple[FloatArray, FloatArray]:
+        rows.append(len(points))
+        return nearest(points, *placed_meshes)  # type: ignore[arg-type]
+
+    def counted_overlap(centers: FloatArray, *others: object) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rows.append(len(centers))
+        return overlap(centers, *others)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(nearest_on_meshes, "nearest_mesh_pairs", counted_nearest)
+    monkeypatch.setattr(mesh_library, "mesh_pairs", counted_overlap)
+    capsule = Mesh(*capsule_mesh(0.03, 0.1, 4)[:2])
+    scene = Objects()
+    places = np.random.default_rng(2).uniform(-2.0, 2.0, (997, 3))
+    places[:, 2] += 4.0
+    for place in [*places, [0.0, 0.0, 0.06], [0.1, 0.0, 0.06], [-0.1, 0.0, 0.06]]:
+        scene.add().mesh(capsule, place)
+    objects = scene.objects()
+    senses = Senses()
+    assert senses.sense(gripper_pose(), objects).overlap_m3 > 0.0
+    assert 0 < sum(rows) < 16 * 3 * 3
+    assert senses.ahead.skipped.pairs_culled >= 16 * 997
+    rows.clear()
+    senses.sense(gripper_pose([50.0, 0.0, 0.0]), objects)
+    assert rows == []
+
+
+def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
+    program = (
+        "import feelahead.both_sides.loopback, robot_side.main\n"
+        "from robot_side.assembly import build_robot_side\n"
+        "from robot_side.compiled.kernel import imported_kernels\n"
+        "from robot_side.settings import RobotSettings\n"
+        "robot = build_robot_side(RobotSettings(), 1, 'clock')\n"
+        "robot.tick(0.0)\n"
+        "assert robot.notes == ()\n"
+        "print(*(kernel.name for kernel in imported_kernels()))"
+    )
+    root = ROOT
+    done = subprocess.run([sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=True)
+    names = done.stdout.split()
+    assert any("overlap.kernels" in name for name in names)
+    assert [name for name in names if "mesh" in name] == []
+
+
+def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(kernel: Compiled) -> None:
+        raise AssertionError(f"{kernel.name} was not ready")
+
+    model = planar_arm(tmp_path, world='<geom name="post" type="cylinder" size="0.05 0.1" pos="0.33 0 0.8"/>')
+    robot = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock")
+    warm_up()
+    monkeypatch.setattr(Compiled, "prepare", late)
+    for tick in range(5):
+        robot.tick(0.001 * tick)
+    assert robot.figures.summary()["overlap_mm3"]["max"] > 0.0
+
+
+def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path) -> None:
+    vertices, triangles = cup()
+    world = '<geom name="post" type="cylinder" size="0.1 0.1" pos="1 1 0"/>'
+    world += '<geom name="bowl" type="mesh" mesh="bowl" pos="1 0 0.3"/>'
+    model = planar_arm(tmp_path, world=world, extra_top=mesh_asset("bowl", vertices, triangles[1:]))
+    (note,) = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert "\n" not in note
+    assert "bowl as its convex hull or bounding box, post by 0.9 %" in note
+
+
+def test_a_note_about_many_things_names_the_worst(tmp_path: Path) -> None:
+    world = "".join(f'<geom name="g{k}" type="cylinder" size="0.1 0.1" pos="{k} 1 0"/>' for k in range(12))
+    model = planar_arm(tmp_path, world=world)
+    (note,) = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert note.endswith("g7 by 0.9 %, and 4 more by no more than that")
