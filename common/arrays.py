@@ -6,3 +6,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+
+def require_finite(name: str, values: FloatArray) -> None:
+    """Raise a ValueError that names the argument when an element of `values` is NaN or infinite."""
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")

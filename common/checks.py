@@ -1,4 +1,4 @@
-"""What the dataclasses here require of their fields: ValueError that names the field, its value and what is valid.
+"""What records and functions require of what they get: ValueError that names it, its value and what is valid.
 
 A value that passes can be packed: a type hint does not keep a float out of a field for an integer.
 """

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import secrets
-import time
 from collections import deque
 from collections.abc import Sequence
 from typing import Any
@@ -24,9 +23,9 @@ from common.sockets.keys import passed_over_note
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from robot_side.assembly import build_robot_side
+from robot_side.compiled.warm_up import warm_up
 from robot_side.core import Outgoing, RobotSide
 from robot_side.figures import tick_microseconds
-from robot_side.overlap.kernels import warm_up
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
@@ -163,9 +162,9 @@ class _Loop:
     def _tick(self, now_s: float) -> None:
         self._pacer.begin(now_s)
         self._admission.begin_tick()
-        began_s = time.perf_counter()
+        began_s = self._clock.now()
         outgoing = self._core.tick(now_s)
-        took_s = time.perf_counter() - began_s
+        took_s = self._clock.now() - began_s
         self._tick_time.add(took_s)
         self._latest_tick_times_s.append(took_s)
         for message in outgoing:

@@ -4,11 +4,10 @@ Everything happens at the instant when it is due, in order of time, so that the 
 the same numbers on every machine.
 """
 
-import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.clock import VirtualClock
+from common.clock import MonotonicClock, VirtualClock
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
 from common.statistics import RunningStatistics
@@ -22,12 +21,14 @@ from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from robot_side.assembly import build_robot_side
+from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
 from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
-from robot_side.overlap.kernels import warm_up
 from robot_side.settings import RobotSettings
 
+_WALL = MonotonicClock()
+"""For how long a tick takes, and nothing else."""
 _PEER = b"loopback"
 _VIRTUAL_CLOCK = "virtual"
 
@@ -125,8 +126,8 @@ class Loopback:
             self._to_robot.push(now_s, payload)
 
     def _robot_tick(self, now_s: float) -> None:
-        start_s = time.perf_counter()
+        start_s = _WALL.now()
         outgoing = self.robot.tick(now_s)
-        self.tick_time.add(time.perf_counter() - start_s)
+        self.tick_time.add(_WALL.now() - start_s)
         for message in outgoing:
             self._to_operator[message.stream].push(now_s, message.payload)

@@ -1,6 +1,8 @@
 """One summary of a run from what each side saw of it."""
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 
@@ -24,3 +26,12 @@ def _joined(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         elif key in ("rejected", "stale"):
             joined[key] += value
     return joined
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """A side's summary; empty when it did not live to write one, which `errors` then says."""
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError):
+        return {}
+    return content

@@ -18,7 +18,7 @@ from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.summary import merge_summaries
+from feelahead.both_sides.summary import merge_summaries, read_summary
 
 _START_TIMEOUT_S = 90.0
 """The first start compiles the overlap kernels."""
@@ -182,15 +182,6 @@ def _watch(
         status.show(now_s, values)
         time.sleep(0.02)
     return []
-
-
-def read_summary(path: Path) -> dict[str, Any]:
-    """A side's summary; empty when it did not live to write one, which `errors` then says."""
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError):
-        return {}
-    return content
 
 
 def _report(summary: dict[str, Any]) -> list[str]:

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from common.arrays import FloatArray
-from robot_side.enlargement.kinematic_error import require_finite
+from common.arrays import FloatArray, require_finite
 
 
 def delay_displacement(velocities_m_s: FloatArray, loop_age_s: float) -> FloatArray:

@@ -8,16 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, require_finite
 from common.errors import ConfigurationError
 from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.enlargement.delay_displacement import require_age
-from robot_side.enlargement.kinematic_error import (
-    VarianceMeasure,
-    directional_variance,
-    require_finite,
-    scalar_variance,
-)
+from robot_side.enlargement.kinematic_error import VarianceMeasure, directional_variance, scalar_variance
 
 _PER_AXIS_TO_LENGTH = math.sqrt(3.0)
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, require_finite
 from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
 
 VarianceMeasure = Literal["isotropic", "trace"]
@@ -17,12 +17,6 @@ _NEGLIGIBLE = 1e-17
 """Share of the trace below which what lies off the diagonal changes no digit of the largest eigenvalue."""
 _MOST_SWEEPS = 20
 """Jacobi's method converges quadratically: five sweeps are usual."""
-
-
-def require_finite(name: str, values: FloatArray) -> None:
-    """Raise a ValueError that names the argument when an element of `values` is NaN or infinite."""
-    if not np.isfinite(values).all():
-        raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")
 
 
 def encoder_sigma(specified_rad: FloatArray, quantisation_step_rad: FloatArray) -> FloatArray:

@@ -5,9 +5,8 @@ import sys
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, require_finite
 from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array
-from robot_side.enlargement.kinematic_error import require_finite
 from robot_side.objects.perceived import PerceivedObjects
 
 _UNIT_TOLERANCE = 1e-6

@@ -8,7 +8,7 @@ tick calls.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robot_side.overlap.kernels import warm_up
+from robot_side.compiled.warm_up import warm_up
 from robot_side.overlap.volumes import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ the few for which doubles do not suffice (see `lane_result`) are worked out once
 """
 
 import os
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -18,8 +17,7 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from common.clock import MonotonicClock
-from robot_side.compiled.kernel import Compiled, compiled, imported_kernels, inlined, input_array, output_array
+from robot_side.compiled.kernel import Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
@@ -30,9 +28,6 @@ from robot_side.overlap.primitives.solid import Overlap, Overlaps
 
 PAIRS_PER_THREAD = 8192
 """A thread is worth starting for so many boxes or tetrahedra, nearly a millisecond of work."""
-
-NOTEWORTHY_WARM_UP_S = 1.0
-"""A person is told about a longer one."""
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
@@ -95,22 +90,6 @@ def tetrahedron_pairs(
     `threads` None takes as many as pay.
     """
     return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), counts, threads)
-
-
-def warm_up(announce: Callable[[], None] | None = None) -> float:
-    """Compile every kernel of the imported modules, or load it from the cache on disk; how long that took (s).
-
-    Without it the first call of each kernel does so, which takes up to seconds. `announce` is called once, as soon as
-    that has taken more than a second, so that a person learns what they wait for.
-    """
-    clock = MonotonicClock()
-    start_s = clock.now()
-    for kernel in imported_kernels():
-        kernel.prepare()
-        if announce is not None and clock.now() - start_s > NOTEWORTHY_WARM_UP_S:
-            announce()
-            announce = None
-    return clock.now() - start_s
 
 
 def _many(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.compiled.kernel import (
     COUNT,
     compiled,
@@ -22,7 +22,6 @@ from robot_side.compiled.kernel import (
     output_indices,
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
-from robot_side.enlargement.kinematic_error import require_finite
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.objects.validity import require_valid

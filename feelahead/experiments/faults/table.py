@@ -28,7 +28,7 @@ from feelahead.experiments.faults.slow_viewer import slow_viewer
 from feelahead.experiments.faults.unplugged import unplugged
 from feelahead.experiments.faults.virtual_session_faults import SESSION_FAULTS
 from feelahead.experiments.faults.virtual_stream_faults import STREAM_FAULTS
-from robot_side.overlap.kernels import warm_up
+from robot_side.compiled.warm_up import warm_up
 
 PROGRAM = "feelahead try faults"
 _DECELERATION = "begins by T + 5 ms (p99), T + 20 ms (max); T = 100 ms"

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from common.command.command_line import parse_settings
 from feelahead.both_sides.processes import SideProcess
-from feelahead.commands.demo import read_summary
+from feelahead.both_sides.summary import read_summary
 from feelahead.experiments.hostile.hostile_inputs import Attacker
 from feelahead.experiments.hostile.raw_zmtp import port_of
 

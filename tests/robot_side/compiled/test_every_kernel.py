@@ -5,7 +5,7 @@ import pytest
 
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.kernel import Compiled, imported_kernels
-from robot_side.overlap.kernels import warm_up
+from robot_side.compiled.warm_up import warm_up
 from robot_side.pairs.candidates import candidate_pairs
 from robot_side.settings import EnlargementOptions, RobotSettings
 from tests.helpers.perceived_scenes import random_scene

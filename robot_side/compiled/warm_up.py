@@ -1,0 +1,25 @@
+"""Compiling every kernel beforehand, so that no tick waits for one."""
+
+from collections.abc import Callable
+
+from common.clock import MonotonicClock
+from robot_side.compiled.kernel import imported_kernels
+
+NOTEWORTHY_WARM_UP_S = 1.0
+"""A person is told about a longer one."""
+
+
+def warm_up(announce: Callable[[], None] | None = None) -> float:
+    """Compile every kernel of the imported modules, or load it from the cache on disk; how long that took (s).
+
+    Without it the first call of each kernel does so, which takes up to seconds. `announce` is called once, as soon as
+    that has taken more than a second, so that a person learns what they wait for.
+    """
+    clock = MonotonicClock()
+    start_s = clock.now()
+    for kernel in imported_kernels():
+        kernel.prepare()
+        if announce is not None and clock.now() - start_s > NOTEWORTHY_WARM_UP_S:
+            announce()
+            announce = None
+    return clock.now() - start_s
