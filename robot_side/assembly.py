@@ -19,11 +19,14 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.sensing import AheadSensing
 from robot_side.settings import RobotSettings
-from robot_side.simulation.arm import MujocoArm, MujocoKinematics
+from robot_side.simulation.arm import MujocoArm
+from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.simulation.kinematics import MujocoKinematics
+from robot_side.simulation.scene import Scene, load_scene
 from robot_side.stiffness.map import StiffnessMap
 from robot_side.stiffness.predicted_contact import ContactPredictor
 

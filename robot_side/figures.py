@@ -12,7 +12,7 @@ from robot_side.objects.perceived import Role
 from robot_side.sensing import Sensed
 
 if TYPE_CHECKING:
-    from robot_side.simulation.scene import Truth
+    from robot_side.simulation.ground_truth import Truth
 
 MOVING_M_S = 0.01
 """A tool faster than this counts as moving."""

@@ -1,4 +1,4 @@
-"""The simulated world: MJCF to an arm among objects, what a camera sees of them, and what is true of them."""
+"""The simulated world: from MJCF to an arm among objects."""
 
 import logging
 import math
@@ -13,9 +13,8 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.perceived import Role
 from robot_side.objects.roles import assign_roles
-from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.simulation.robot_model import RobotModel, can_touch, find_robot
@@ -98,108 +97,6 @@ def load_scene(
         primitives=ObjectPrimitives(model, objects),
         warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
     )
-
-
-class MujocoCamera:
-    """An ObjectSource: the simulated objects as a camera with segmentation reports them, frame by frame."""
-
-    def __init__(self, scene: Scene, error: CameraError | None = None, frame_rate_hz: float = 30.0) -> None:
-        """Look at `scene` with `error`, drawn for its objects' names in their order; no error when None."""
-        if not (math.isfinite(frame_rate_hz) and frame_rate_hz > 0.0):
-            raise ValueError(f"frame_rate_hz = {frame_rate_hz}; valid: finite and above 0")
-        self._scene = scene
-        self._error = error or CameraError(tuple(thing.name for thing in scene.objects))
-        self._period_s = 1.0 / frame_rate_hz
-        self._origin_s: float | None = None
-        self._frame_number = -1
-        self._newest: PerceivedObjects | None = None
-
-    def perceive(self, now_s: float) -> PerceivedObjects:
-        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
-        if self._origin_s is None:
-            self._origin_s = now_s
-        # A frame is due on the grid of the first one, so that the rate does not sink with the tick's period.
-        number = math.floor((now_s - self._origin_s) / self._period_s + 1e-9)
-        if self._newest is None or number > self._frame_number:
-            self._frame_number = number
-            scene = self._scene
-            self._newest = scene.primitives.place(
-                now_s, scene.roles, self._error.next_frame(), scene.data.geom_xpos, scene.data.geom_xmat
-            )
-        return self._newest
-
-    def set_role(self, name: str, role: Role) -> None:
-        """Change what the object `name` is to the task, from the next frame on. ValueError for an unknown name."""
-        if name not in self._scene.roles:
-            raise ValueError(f"name = {name!r} is no object; valid: {', '.join(self._scene.roles)}")
-        self._scene.roles[name] = role
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What nobody on the robot side can see: where the gripper really is among the objects."""
-
-    min_distance_m: float | None
-    """From the true, unenlarged gripper to the nearest object that is no support, negative inside it; None beyond
-    the distance that was looked for."""
-    min_obstacle_distance_m: float | None
-    """The same over obstacles alone."""
-    contacts: frozenset[tuple[str, str]]
-    """(gripper geom, object) now in contact, supports included"""
-
-
-class GroundTruth:
-    """Watches the simulation itself, for the summary and for tests."""
-
-    def __init__(self, scene: Scene, farthest_m: float = 1.0) -> None:
-        """Look for objects up to `farthest_m` from the gripper."""
-        self._scene = scene
-        self._farthest_m = farthest_m
-        model = scene.model
-        self._gripper = {int(geom): model.geom(geom).name or f"geom{geom}" for geom in scene.robot.gripper_geoms}
-        self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
-
-    def observe(self) -> Truth:
-        """The distances and contacts at the simulation's present state."""
-        roles = self._scene.roles
-        obstacles = [geom for geom, name in self._object_of.items() if roles[name] is Role.OBSTACLE]
-        others = [geom for geom, name in self._object_of.items() if roles[name] in {Role.TARGET, Role.IGNORED}]
-        to_obstacles = self._distance(obstacles, self._farthest_m)
-        to_any = min(to_obstacles, self._distance(others, to_obstacles))
-        return Truth(
-            min_distance_m=to_any if to_any < self._farthest_m else None,
-            min_obstacle_distance_m=to_obstacles if to_obstacles < self._farthest_m else None,
-            contacts=self._contacts(),
-        )
-
-    def _distance(self, object_geoms: list[int], farthest_m: float) -> float:
-        """The smallest signed distance between the gripper and some geoms, at most `farthest_m`."""
-        model, data = self._scene.model, self._scene.data
-        mine, theirs = np.array(list(self._gripper), dtype=np.int64), np.array(object_geoms, dtype=np.int64)
-        if theirs.size == 0:
-            return farthest_m
-        apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
-        # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
-        bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
-        bound -= model.geom_rbound[mine][:, None]
-        nearest = farthest_m
-        for pair in np.argsort(bound, axis=None):
-            first, second = np.unravel_index(pair, bound.shape)
-            if bound[first, second] >= nearest:
-                break
-            distance = mujoco.mj_geomDistance(
-                model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0), None
-            )
-            nearest = min(nearest, float(distance))
-        return nearest
-
-    def _contacts(self) -> frozenset[tuple[str, str]]:
-        found = set()
-        for first, second in self._scene.data.contact.geom:
-            for mine, other in ((int(first), int(second)), (int(second), int(first))):
-                if mine in self._gripper and other in self._object_of:
-                    found.add((self._gripper[mine], self._object_of[other]))
-        return frozenset(found)
 
 
 def _log_warning(message: str) -> None:

@@ -8,7 +8,7 @@ from common.statistics import RunningStatistics
 from robot_side.figures import MOVING_M_S, RunFigures, tick_microseconds
 from robot_side.objects.perceived import Role
 from robot_side.sensing import Sensed
-from robot_side.simulation.scene import Truth
+from robot_side.simulation.ground_truth import Truth
 from robot_side.stiffness.map import Stiffness
 
 ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError, FeelaheadError
-from robot_side.simulation.arm import MujocoArm, measure_gripper
+from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.gripper_measurement import measure_gripper
+from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.scene import GroundTruth, Scene, load_scene
+from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import (
     COUPLING,
     MIRRORED_GRIPPER,

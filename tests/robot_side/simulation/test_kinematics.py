@@ -6,8 +6,8 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.simulation.arm import MujocoKinematics
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.tool_driver import PERIOD_S, ToolDriver
 

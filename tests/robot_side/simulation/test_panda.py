@@ -8,8 +8,9 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.objects.perceived import Role
-from robot_side.simulation.arm import measure_gripper
-from robot_side.simulation.scene import GroundTruth, MujocoCamera
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.gripper_measurement import measure_gripper
+from robot_side.simulation.ground_truth import GroundTruth
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 

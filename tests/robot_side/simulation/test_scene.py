@@ -8,7 +8,9 @@ import pytest
 from common.errors import ConfigurationError
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation import model_enums
-from robot_side.simulation.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.ground_truth import GroundTruth
+from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
 
 

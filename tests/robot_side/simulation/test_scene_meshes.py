@@ -20,7 +20,8 @@ from robot_side.pairs import nearest_on_meshes
 from robot_side.pairs.candidates import candidate_pairs
 from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces
 from robot_side.settings import RobotSettings
-from robot_side.simulation.scene import MujocoCamera, Scene
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.scene import Scene
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.gripper_poses import gripper_pose
 from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES

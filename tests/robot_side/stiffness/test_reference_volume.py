@@ -10,8 +10,9 @@ from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import sphere_half_space
 from robot_side.pairs.candidates import candidate_pairs
 from robot_side.pairs.overlaps import evaluate
-from robot_side.simulation.arm import MujocoArm, MujocoKinematics
+from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import load_scene
 from robot_side.stiffness.map import StiffnessMap, StiffnessSettings
 from robot_side.stiffness.reference_volume import plane_overlaps
