@@ -14,8 +14,9 @@ import tyro
 from common.command_line import given_fields, parse_settings
 from common.link_figures import report_lines
 from common.link_model import Direction, Stream, unused_clauses
+from common.live_view import LINK_UP, Value
 from common.run_options import RunOptions
-from common.status import Status, Value
+from common.status import Status
 from common.stop_signal import StopSignal, ignore_broken_output
 from feelahead.processes import SideFailedError, SideProcess
 from feelahead.summary import merge_summaries
@@ -29,6 +30,8 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "telemetry"),
 )
 """What the two sides send to each other."""
+_OPERATORS_OWN = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
+"""What both sides tell, and the operator side knows better."""
 
 
 @dataclass(frozen=True)
@@ -157,13 +160,13 @@ def _watch(
     """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
     start_s = time.monotonic()
     linked_s: float | None = None
-    values: dict[str, Value] = {}
+    said: dict[str, dict[str, Value]] = {"robot": {}, "operator": {}}
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
             for event in side.events():
                 if event["event"] == "status":
-                    values |= {name: value for name, value in event.items() if name != "event"}
+                    said[side.name] = {name: value for name, value in event.items() if name != "event"}
                 elif event["event"] == "note":
                     status.note(f"{side.name}: {event['text']}")
             if not side.running:
@@ -173,15 +176,20 @@ def _watch(
                     return [str(error)]
                 return [f"the {side.name} side ended early"]
         if linked_s is None:
-            if values.get("link") == "up":
+            if said["operator"].get("link") == LINK_UP:
                 linked_s = now_s
             elif now_s - start_s > _LINK_TIMEOUT_S:
                 return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s"]
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
             break
-        status.show(now_s, values)
+        status.show(now_s, _together(said["robot"], said["operator"]))
         time.sleep(0.02)
     return []
+
+
+def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:
+    """What both sides know: of the controller and the link what the operator side says, of the rest the robot side."""
+    return {**operator, **robot, **{name: operator[name] for name in _OPERATORS_OWN if name in operator}}
 
 
 def read_summary(path: Path) -> dict[str, Any]:

@@ -14,11 +14,12 @@ from common.command_line import given_fields, parse_settings, run_command
 from common.errors import ConfigurationError, FeelaheadError
 from common.garbage import IdleCollection
 from common.link_model import DelayLine, link_summary, unused_clauses
+from common.live_view import Value
 from common.pacing import Pacer, wait_for_turn
 from common.priority import make_realtime, raise_priority
 from common.sockets import OperatorSockets
 from common.sockets.authentication import OperatorKeys
-from common.status import Status, Value
+from common.status import Status
 from common.stop_signal import StopSignal, ignore_broken_output
 from operator_side.calibration_store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
@@ -242,8 +243,9 @@ class _Loop:
                 values["link"] = self._sockets.trouble
             values["controller"] = self._connection.state
             if self._person is not None:
-                values["person"] = self._person.phase
-            self._status.show(now_s, values | {"motion_overruns": self._pacer.overruns})
+                values["person"] = self._person.doing
+            values["motion_overruns"] = self._pacer.overruns
+            self._status.show(now_s, values)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 

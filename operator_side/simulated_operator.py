@@ -115,6 +115,12 @@ class SimulatedOperator:
         self._pulling: int | None = None
         self._hands_s: float | None = None
 
+    @property
+    def doing(self) -> str:
+        """Their phase in a word for people; without a target they do not seem to advance."""
+        aimless = self.phase == "advance" and self._view is not None and self._view.target_in_tool_m is None
+        return "no target" if aimless else self.phase
+
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
         if self._hands_s is None:

@@ -13,11 +13,14 @@ import numpy as np
 from common.arrays import FloatArray
 from common.codec import encode
 from common.delay import LoopAge
+from common.live_view import LINK_LOST, LINK_UP
 from common.messages import MotionState, StiffnessUpdate, Telemetry
+from common.statistics import RunningStatistics
 from robot_side.arm_port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.contact import Contact, ContactPredictor
 from robot_side.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.operator_session import OperatorSession, Receiver
+from robot_side.perceived_distances import perceived_distances
 from robot_side.perceived_objects import ObjectSource, PerceivedObjects, Role
 from robot_side.resolved_rate import joint_velocities
 from robot_side.run_figures import RunFigures
@@ -95,7 +98,8 @@ class RobotSide:
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
         self._centers_m: FloatArray = np.empty((0, 3))
-        self._last: tuple[ArmState, Sensed] | None = None
+        self._last: tuple[Sensed, GripperPose, PerceivedObjects] | None = None
+        self._loop_age_s = RunningStatistics(seed)
         self._next_telemetry_s = -np.inf
         self._next_observers_s = -np.inf
         self._next_truth_s = -np.inf
@@ -120,11 +124,13 @@ class RobotSide:
         self._follow_target(objects, pose)
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
+        loop_age_s = self._loop_age.value(now_s)
+        self._loop_age_s.add(loop_age_s)
         sensed = self._sensing.sense(
             whole,
             state.joint_velocities_rad_s,
             objects,
-            self._loop_age.value(now_s),
+            loop_age_s,
             state.gripper_opening_m if pose.sphere_on_finger.any() else None,
             None if self._held is None else self._held.index,
             now_s,
@@ -138,8 +144,8 @@ class RobotSide:
             self._sensing.stiffness_map.set_support_baseline()
         self._was_armed, self._was_carrying = armed, carrying
         target = target_index(objects) if armed and not carrying else None
-        contact = self._contact.predict(whole, objects, target, self._loop_age.value(now_s), now_s)
-        self._last = (state, sensed)
+        contact = self._contact.predict(whole, objects, target, loop_age_s, now_s)
+        self._last = sensed, whole, objects
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
         self._record(sensed, objects, speed_m_s, armed, now_s)
         return self._outgoing(permission, pose, objects, state, sensed, contact, speed_m_s, now_s)
@@ -241,22 +247,35 @@ class RobotSide:
         return outgoing
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
-        """A few figures for the status line."""
-        loop_age_s = self._loop_age.value(now_s)
+        """What a person is shown, and a few figures for whoever reads JSON lines."""
+        lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
+        delay_s = self.session.link.delay.mean
+        lost = f"{LINK_LOST}nothing heard from the operator" if lease.token > 0 else "waiting for an operator"
         values: dict[str, float | str | bool | None] = {
-            "state": self.session.safety.state,
-            "owner": "none" if self.session.lease.owner is None else str(self.session.lease.owner.state),
-            "observers": len(self.session.lease.observers()),
+            "link": lost if lease.owner is None else LINK_UP,
+            "state": safety.state,
+            "stopped_because": safety.stops[-1][1] if safety.stops and safety.state != "armed" else None,
+            "owner": "none" if lease.owner is None else str(lease.owner.state),
+            "observers": len(lease.observers()),
             "refused": self.session.refused,
-            "loop_age_ms": 1e3 * loop_age_s,
+            "loop_age_ms": 1e3 * self._loop_age.value(now_s),
+            "delay_ms": None if delay_s is None else 1e3 * delay_s,
+            "L2_pulled": None if command is None else command.l2,
+            "R2_pulled": None if command is None else command.r2,
         }
         if self._last is not None:
-            _, sensed = self._last
+            sensed, pose, objects = self._last
+            target, held = target_index(objects), None if self._held is None else self._held.index
+            apart = perceived_distances(pose, objects, target, held)
             values |= {
                 "L2": sensed.stiffness.l2,
                 "R2": sensed.stiffness.r2,
                 "enlargement_mm": 1e3 * float(sensed.enlargement_m.max()),
-                "holding": "nothing" if self._held is None else self._held.name,
+                "holding": "nothing" if self._held is None else self._held.name[:_SHOWN_NAME],
+                "nearest": None if apart.nearest is None else apart.nearest[:_SHOWN_NAME],
+                "nearest_mm": _millimetres(apart.nearest_m),
+                "target": None if target is None else objects.names[target][:_SHOWN_NAME],
+                "target_mm": _millimetres(apart.target_m),
             }
         return values
 
@@ -274,6 +293,7 @@ class RobotSide:
             },
             "lease": self.session.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
+            "loop_age_ms": self._loop_age_s.summary_ms(),
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
@@ -291,6 +311,10 @@ def _stiffness(receiver: Receiver, stiffness: Stiffness, contact: Contact, state
         r2_contact=contact[1],
     )
     return Outgoing("haptics", receiver.peer, encode(update))
+
+
+def _millimetres(value_m: float | None) -> float | None:
+    return None if value_m is None else 1e3 * value_m
 
 
 def _vector3(values: FloatArray) -> tuple[float, float, float]:
