@@ -33,6 +33,8 @@ class _State:
 
     phase: str = ""
     reason: str | None = None
+    linked: bool = False
+    armed: bool = False
     l2: Resistance = Resistance.NONE
     r2: Resistance = Resistance.NONE
     touched: str | None = None
@@ -71,6 +73,8 @@ def _next_state(before: _State, view: LiveView) -> _State:
         before,
         phase=view.phase,
         reason=view.reason,
+        linked=view.linked is True,
+        armed=view.armed,
         l2=next_resistance(before.l2, view.l2.resists or 0.0),
         r2=next_resistance(before.r2, view.r2.resists or 0.0),
         touched=touched,
@@ -80,6 +84,10 @@ def _next_state(before: _State, view: LiveView) -> _State:
 
 def _news(told: _State, state: _State, view: LiveView) -> list[str]:
     news = []
+    if state.linked and not told.linked:
+        news.append("link up")
+    if state.armed and not told.armed and state.phase != "armed":
+        news.append("armed")
     if (state.phase, state.reason) != (told.phase, told.reason):
         news.append(state.phase if state.reason is None else f"{state.phase}: {state.reason}")
     for name, before, after, trigger in (("L2", told.l2, state.l2, view.l2), ("R2", told.r2, state.r2, view.r2)):
@@ -103,6 +111,8 @@ def _resistance(name: str, before: Resistance, after: Resistance, trigger: Trigg
 
 
 def _figures(view: LiveView) -> str:
+    if not view.armed:
+        return ""
     figures = [
         f"{name} pulled {percent(trigger.pulled)} %"
         for name, trigger in (("L2", view.l2), ("R2", view.r2))

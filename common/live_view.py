@@ -36,6 +36,7 @@ class LiveView:
     """Why, after a stop or a lost link."""
     alarm: bool = False
     """Whether that has stopped the arm against somebody's will."""
+    armed: bool = False
     linked: bool | None = None
     delay_ms: float | None = None
     l2: TriggerView = TriggerView()
@@ -69,6 +70,7 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
         phase=phase,
         reason=reason,
         alarm=alarm,
+        armed=armed,
         linked=None if link is None else link == LINK_UP,
         delay_ms=_number(values, "delay_ms"),
         l2=l2,

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from common.command_line import given_fields, parse_settings
+from common.errors import ConfigurationError
 from common.link_figures import report_lines
 from common.link_model import Direction, Stream, unused_clauses
 from common.live_view import LINK_UP, Value
@@ -30,6 +31,7 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "telemetry"),
 )
 """What the two sides send to each other."""
+_ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
 _OPERATORS_OWN = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
 """What both sides tell, and the operator side knows better."""
 
@@ -66,7 +68,9 @@ class DemoSettings(RunOptions):
 
 def demo(arguments: Sequence[str]) -> int:
     """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
-    settings = parse_settings(DemoSettings, "feelahead demo", arguments)
+    settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
+    if (complaint := _too_slow(settings)) is not None:
+        raise ConfigurationError(complaint)
     given = given_fields(arguments, DemoSettings)
     with (
         tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
@@ -118,6 +122,18 @@ def _run_both(
                     if str(failure) not in errors:
                         errors.append(str(failure))
     return errors
+
+
+def _too_slow(settings: DemoSettings) -> str | None:
+    """Why the sides cannot find each other in time over the link that was asked for; None where they can."""
+    link = settings.link_spec()
+    there_s, back_s = (link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
+    if there_s + back_s < _LINK_TIMEOUT_S:
+        return None
+    return (
+        f"--link {settings.link!r}: a message and its answer take {there_s + back_s:g} s;"
+        f" valid: below {_LINK_TIMEOUT_S:g} s, within which the two sides have to find each other"
+    )
 
 
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
@@ -179,10 +195,12 @@ def _watch(
             if said["operator"].get("link") == LINK_UP:
                 linked_s = now_s
             elif now_s - start_s > _LINK_TIMEOUT_S:
-                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s"]
+                asked = f"; the link that was asked for may be why: --link {settings.link!r}" if settings.link else ""
+                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
             break
-        status.show(now_s, _together(said["robot"], said["operator"]))
+        if said["operator"]:
+            status.show(now_s, _together(said["robot"], said["operator"]))
         time.sleep(0.02)
     return []
 
