@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import errno
 import io
 import re
 import signal
@@ -14,13 +15,15 @@ import msgspec
 import tyro
 
 from common.errors import ConfigurationError, FeelaheadError
-from common.stop_signal import STOP_SIGNALS, ignore_broken_output
+from common.stop_signal import STOP_SIGNALS, ignore_broken_output, say_output_failed
 from common.toml_complaint import explain
 from common.toml_file import read_toml
 
 Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What the system says where standard output leads to a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
@@ -88,7 +91,12 @@ def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") ->
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     """Run `command(arguments)` and exit: a FeelaheadError becomes one line, with exit code 2 for bad input, else 1."""
     try:
-        code = command(sys.argv[1:])
+        try:
+            code = command(sys.argv[1:])
+        except SystemExit as shown:  # after --help
+            code = int(shown.code or 0)
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except FeelaheadError as error:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
@@ -97,11 +105,14 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         ignore_broken_output()
         code = 0
     except OSError as error:
-        if error.filename is None:
+        if error.filename is not None:
+            # A file or folder that somebody named, and that the system does not let us at.
+            print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
+            code = 2
+        elif error.errno in _NO_ROOM:
+            code = say_output_failed(program, error)
+        else:
             raise
-        # A file or folder that somebody named, and that the system does not let us at.
-        print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
-        code = 2
     except KeyboardInterrupt:
         code = 0
     # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.

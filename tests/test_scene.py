@@ -236,7 +236,7 @@ def test_what_is_no_arm_is_named(tmp_path: Path) -> None:
         wrist='<body name="ball" pos="0.3 0 0"><joint name="b" type="ball"/>'
         '<geom size="0.01"/><site name="end"/></body>',
     )
-    with pytest.raises(ConfigurationError, match="joint 'b' is ball: no single motor .* valid: hinge or slide"):
+    with pytest.raises(ConfigurationError, match=r"joint 'b' is ball: no single motor .* valid: hinge or slide"):
         load_scene(floating, "end")
 
 
