@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
+from robot_side.assembly import build_robot_side
 from robot_side.perceived_objects import PerceivedObjects, Role
 from robot_side.scene import GroundTruth, MujocoCamera, Scene, load_scene
+from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from tests.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
 
@@ -287,3 +289,73 @@ def test_a_keyframe_may_have_the_name_that_the_table_would_take(tmp_path: Path) 
     scene = load_scene(planar_arm(tmp_path, world=floor, extra_bottom=f"<keyframe>{keys}</keyframe>"), "tcp")
     assert scene.roles["target"] is Role.TARGET
     assert scene.data.qpos[0] == pytest.approx(0.1)
+
+
+KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{second}" qpos="0 0 0 0"/></keyframe>'
+
+
+@pytest.mark.parametrize(
+    ("extra_bottom", "said"),
+    [
+        (KEYS.format(first="rest", second="home"), "the keyframe 'home'"),
+        (KEYS.format(first="rest", second="up"), "the first keyframe, 'rest' ("),
+        ("", "the middle of the joints' ranges, as there is no keyframe ("),
+    ],
+)
+def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) -> None:
+    model = planar_arm(tmp_path, extra_bottom=extra_bottom)
+    assert load_scene(model, "tcp").start_pose.startswith(said)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[0].startswith(f"starts at {said}")
+    assert notes[1].startswith("objects: target: target; obstacle: ")
+
+
+def test_a_scene_without_a_target_says_how_to_name_one(tmp_path: Path) -> None:
+    world = '<geom name="tin" type="sphere" size="0.1" pos="1 1 0"/><geom name="table" type="sphere" size="0.1"/>'
+    model = planar_arm(tmp_path, world=world)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[1] == "objects: obstacle: tin; support: table"
+    assert "no object is a target" in notes[2]
+    assert '[roles] NAME = "target"' in notes[2]
+    settings = RobotSettings(model=model, site="tcp", roles={"tin": Role.TARGET})
+    assert build_robot_side(settings, 1, "clock").notes[1:] == ("objects: target: tin; support: table",)
+
+
+def test_a_body_and_a_geom_of_one_name_are_one_object_and_that_is_said(tmp_path: Path) -> None:
+    world = (
+        '<geom name="target" type="sphere" size="0.1" pos="1 1 0"/>'
+        '<body name="target" pos="1 0 0"><geom type="sphere" size="0.1"/></body>'
+    )
+    model = planar_arm(tmp_path, world=world)
+    assert load_scene(model, "tcp").shared_names == ("target",)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[2].startswith("'target' names more than one thing")
+    assert load_scene().shared_names == ()
+
+
+@pytest.mark.parametrize(
+    ("joint", "more", "said"),
+    [
+        ("<freejoint/>", "", "unnamed joint 0 of body 'arm' is free: the robot's base must stand fixed; valid: hinge"),
+        (
+            "<joint/>",
+            '<body mocap="true"/>',
+            "unnamed joint 0 of body 'arm' has no actuator of its own: the model is",
+        ),
+    ],
+)
+def test_a_kind_of_robot_that_is_refused_is_told_why(tmp_path: Path, joint: str, more: str, said: str) -> None:
+    (tmp_path / "arm.xml").write_text(
+        f"""<mujoco><worldbody>{more}<body name="arm">{joint}<geom size="0.1"/><site name="end"/>
+        <body><joint name="other"/><geom size="0.1"/></body></body></worldbody>
+        <actuator><motor joint="other"/></actuator></mujoco>"""
+    )
+    with pytest.raises(ConfigurationError) as caught:
+        load_scene(tmp_path / "arm.xml", "end")
+    assert said in one_line(caught)
+
+
+def test_an_arm_that_hangs_on_a_mocap_body_is_told_so(tmp_path: Path) -> None:
+    hand = '<body mocap="true"><geom size="0.1"/><site name="grip"/></body>'
+    with pytest.raises(ConfigurationError, match="'grip' hangs on no joint: a mocap body carries it"):
+        load_scene(planar_arm(tmp_path, world=hand), "grip")
