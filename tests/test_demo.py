@@ -77,21 +77,10 @@ def test_a_sides_own_file_is_pointed_to_its_own_flag(tmp_path: Path) -> None:
 
 
 def test_each_side_says_what_it_knows_better() -> None:
-    robot = {
-        "link": "up",
-        "L2": 0.1,
-        "target": "carton",
-        "holding": "carton",
-        "stopped_because": "no command for 101 ms",
-    }
-    operator: dict[str, Value] = {
-        "link": "lost: nothing",
-        "L2": None,
-        "target": "other",
-        "person": "done",
-        "stopped_because": "gap",
-    }
-    assert module._together(robot, operator) == {**robot, "link": "lost: nothing", "L2": None, "person": "done"}
+    robot: dict[str, Value] = {"link": "up", "L2": 0.1, "target": "carton", "stopped_because": "no command for 101 ms"}
+    operator: dict[str, Value] = {"link": "lost: all", "L2": None, "target": "?", "person": "done"}
+    operator["stopped_because"] = "no command for the gap limit"
+    assert module._together(robot, operator) == {**robot, "link": "lost: all", "L2": None, "person": "done"}
     assert module._together(robot, {}) == robot
 
 
