@@ -1,5 +1,6 @@
 """A run as a few lines for a file: one whenever something changed that a person cares about, and else none."""
 
+import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -47,12 +48,12 @@ class Story:
     def __init__(self) -> None:
         self._state = self._told = _State()
         self._start_s: float | None = None
-        self._told_s = 0.0
+        self._told_s = -math.inf
 
     def tell(self, now_s: float, view: LiveView) -> str | None:
         """A line with what is new at `now_s` and the time since the first call; None while there is nothing."""
         if self._start_s is None:
-            self._start_s, self._told_s = now_s, now_s - SHORTEST_GAP_S
+            self._start_s = now_s
         self._state = _next_state(self._state, view)
         state, told = self._state, self._told
         alarm = view.alarm and (state.phase, state.reason) != (told.phase, told.reason)

@@ -14,6 +14,8 @@ LINK_UP = "up"
 LINK_LOST = "lost: "
 """How the link's word begins when there was one; the reason follows."""
 LINK_REFUSED = "refused: "
+_BEFORE_ARMED = ("resting", "arming")
+"""What the simulated person does before they have seen that it is armed."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,8 @@ def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
         return str(link), None, False
     if controller == "absent":
         return "no controller", None, False
+    if state == "armed" and person in (None, *_BEFORE_ARMED):
+        return "armed", None, False
     ready = state == "disarmed" and values.get("owner") == "ready"
     return person or ("ready to arm" if ready else str(state or "starting")), None, False
 

@@ -118,6 +118,7 @@ class RobotSide:
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             self._loop_age.update(age_s, now_s)
+            self._loop_age_s.add(self._loop_age.value(now_s))
         state = self._arm.state(now_s)
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
@@ -125,7 +126,6 @@ class RobotSide:
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
         loop_age_s = self._loop_age.value(now_s)
-        self._loop_age_s.add(loop_age_s)
         sensed = self._sensing.sense(
             whole,
             state.joint_velocities_rad_s,

@@ -83,6 +83,8 @@ def test_a_narrow_one_drops_the_least_important_facts(width: int, expected: str)
         ({"link": "waiting for the robot side", "state": None}, "waiting for the robot side  "),
         ({"person": "no target", "target": None, "target_mm": None}, "no target  "),
         ({"person": None}, "armed  "),
+        ({"person": "arming"}, "armed  "),
+        ({"person": "arming", "state": "disarmed"}, "arming  "),
     ],
 )
 def test_what_keeps_the_arm_from_moving_comes_first_and_in_words(changed: dict[str, Any], expected: str) -> None:

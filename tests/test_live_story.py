@@ -26,6 +26,11 @@ def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
     return [line for line in lines if line is not None]
 
 
+@pytest.mark.parametrize("start_s", [0.0, 0.3, 1234.5678])
+def test_the_first_call_is_told_at_once_whatever_the_clock_shows(start_s: float) -> None:
+    assert Story().tell(start_s, RESTING) == "   0.0 s  link up; resting"
+
+
 def test_nothing_is_told_while_nothing_changes() -> None:
     moving = [replace(ADVANCING, nearest_mm=80.0 - step, r2=TriggerView(0.01 * step, 0.0)) for step in range(50)]
     assert told(*moving) == ["   0.0 s  link up; armed; advancing  (nearest 80 mm, target 120 mm)"]
