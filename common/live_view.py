@@ -91,10 +91,9 @@ def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
     """What is going on, why, and whether it is an alarm: what keeps the arm from moving comes first."""
     link, state, person = _text(values, "link"), values.get("state"), _text(values, "person")
     because, controller = _text(values, "stopped_because"), values.get("controller")
-    if link is not None and link.startswith(LINK_LOST):
-        return "LINK LOST", link.removeprefix(LINK_LOST), True
-    if link is not None and link.startswith(LINK_REFUSED):
-        return "REFUSED", link.removeprefix(LINK_REFUSED), True
+    for beginning, word in ((LINK_LOST, "LINK LOST"), (LINK_REFUSED, "REFUSED")):
+        if link is not None and link.startswith(beginning):
+            return word, link.removeprefix(beginning), True
     if state == "stopped":
         return "STOPPED", because, True
     if controller == "lost":
