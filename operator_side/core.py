@@ -8,6 +8,7 @@ view payloads ─▶ receive_view ─▶ screen
 import math
 from typing import Any
 
+from common.command.live_view import LINK_LOST, LINK_REFUSED, LINK_UP
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
@@ -79,6 +80,7 @@ class OperatorSide:
         self._write_bound = WriteBound()
         self._written: OutputReport | None = RELEASED
         self._lost_s: float | None = None
+        self._has_been_armed = False
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
@@ -103,6 +105,7 @@ class OperatorSide:
             self.stiffness_received += 1
             if arrival.fresh:
                 self.stiffness, self._stiffness_s = message, now_s
+                self._has_been_armed |= message.state == "armed"
                 if arrival.one_way_s is not None:
                     self.applied_age.add(arrival.one_way_s)
 
@@ -222,30 +225,49 @@ class OperatorSide:
             return build_output_report(shown)
         return build_output_report(shown.change_from(before))
 
-    def status(self, now_s: float) -> dict[str, float | str | None]:
-        """A few figures for the status line."""
-        mean_s = self.link.delay.mean
-        felt = None if self.stiffness is None else (self.stiffness.l2, self.stiffness.r2)
-        left, right = (None, None) if felt is None else (felt[::-1] if self._swap_sides else felt)
-        return {
+    def status(self, now_s: float) -> dict[str, float | str | bool | None]:
+        """What a person is shown; L2 and R2 are the controller's own, whatever the sides mean."""
+        mean_s, lease, screen = self.link.delay.mean, self.lease, self.screen
+        felt = (None, None) if self.stiffness is None else (self.stiffness.l2, self.stiffness.r2)
+        intent = None if now_s - self._intent_s > INTENT_EXPIRES_S else self._intent
+        pulled = (None, None) if intent is None else (intent.l2, intent.r2)
+        order = -1 if self._swap_sides else 1
+        (left, right), (left_pulled, right_pulled) = felt[::order], pulled[::order]
+        state = None if self.stiffness is None else self.stiffness.state
+        values: dict[str, float | str | bool | None] = {
             "link": self._link_status(now_s),
-            "state": None if self.stiffness is None else self.stiffness.state,
+            "state": state,
+            "stopped_because": lease.why if lease is not None and self._has_been_armed and state != "armed" else None,
+            "owner": None if lease is None else str(lease.session),
             "L2": left,
             "R2": right,
+            "L2_pulled": left_pulled,
+            "R2_pulled": right_pulled,
+            "haptics": self._haptics,
             "feel": f"L2 {self._rendering.l2.status()}, R2 {self._rendering.r2.status()}",
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
+        if screen is not None and values["link"] == LINK_UP:
+            centre_m = screen.target_in_tool_m
+            values |= {
+                "target": screen.target,
+                "target_centre_mm": None if centre_m is None else 1e3 * math.hypot(*centre_m),
+                "holding": "something" if screen.holding else "nothing",
+            }
+        return values
 
     def _link_status(self, now_s: float) -> str:
         lease = self.lease
         if self.other_version is not None:
-            return f"refused: {self.other_version}"
+            return f"{LINK_REFUSED}{self.other_version}"
         if lease is not None and lease.session is SessionState.OBSERVING:
             return f"observing ({lease.place} of {lease.waiting} waiting)"
         if lease is not None and lease.session not in OWNING:
-            return f"refused: {lease.why}"
+            return f"{LINK_REFUSED}{lease.why}"
         linked = self.stiffness is not None and now_s - self._stiffness_s <= STIFFNESS_EXPIRES_S
-        return "up" if linked and lease is not None else "waiting for the robot side"
+        if linked and lease is not None:
+            return LINK_UP
+        return f"{LINK_LOST}nothing heard from the robot" if self.stiffness_received else "waiting for the robot side"
 
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""

@@ -11,7 +11,8 @@ from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
 from common.command.command_line import given_fields, parse_settings, run_command
-from common.command.status import Status, Value
+from common.command.live_view import Value
+from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
@@ -243,8 +244,9 @@ class _Loop:
                 values["link"] = self._sockets.trouble
             values["controller"] = self._connection.state
             if self._person is not None:
-                values["person"] = self._person.phase
-            self._status.show(now_s, values | {"motion_overruns": self._pacer.overruns})
+                values["person"] = self._person.doing
+            values["motion_overruns"] = self._pacer.overruns
+            self._status.show(now_s, values)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 

@@ -1,7 +1,7 @@
 """Settings to a robot side that is ready to tick: the simulated arm, its camera, and everything in between."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from robot_side.core import RobotSide
 from robot_side.enlargement.distance import Enlargement
 from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.figures import RunFigures
+from robot_side.objects.perceived import Role
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.sensing import AheadSensing
@@ -31,7 +32,7 @@ from robot_side.stiffness.map import StiffnessMap
 from robot_side.stiffness.predicted_contact import ContactPredictor
 
 _SAMPLED_CONFIGURATIONS = 256
-_NAMED_APPROXIMATIONS = 8
+_NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
 
 
@@ -102,17 +103,38 @@ def build_robot_side(
 
 
 def _notes(scene: Scene) -> tuple[str, ...]:
-    """One line that names what is perceived larger than it is, and by how much; none where all is exact."""
-    if not scene.volume_errors:
-        return ()
-    largest_first = sorted(scene.volume_errors.items(), key=lambda item: -item[1])
-    shown = [
-        f"{name} by {100.0 * error:.1f} %" if math.isfinite(error) else f"{name} as its convex hull or bounding box"
-        for name, error in largest_first[:_NAMED_APPROXIMATIONS]
+    """What a person should know before the run: objects and roles, start pose, and what is not quite as modelled."""
+    notes = [f"starts at {scene.start_pose}", f"objects: {_roles(scene.roles)}"]
+    if Role.TARGET not in scene.roles.values():
+        notes.append(
+            "no object is a target, so there is nothing to advance to; to name one: let its name begin with target, or"
+            ' [roles] NAME = "target" in the --config file (feelahead demo: --robot-config)'
+        )
+    notes += [
+        f"{name!r} names more than one thing, such as a body and a geom of the world: they count as one object"
+        for name in scene.shared_names[:_NAMED_OBJECTS]
     ]
-    if len(largest_first) > len(shown):
-        shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
-    return (f"perceived larger than they are (in volume): {', '.join(shown)}",)
+    if scene.volume_errors:
+        largest_first = sorted(scene.volume_errors.items(), key=lambda item: -item[1])
+        shown = [
+            f"{name} by {100.0 * error:.1f} %" if math.isfinite(error) else f"{name} as its convex hull or bounding box"
+            for name, error in largest_first[:_NAMED_OBJECTS]
+        ]
+        if len(largest_first) > len(shown):
+            shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
+        notes.append(f"perceived larger than they are (in volume): {', '.join(shown)}")
+    return tuple(notes)
+
+
+def _roles(roles: Mapping[str, Role]) -> str:
+    """The objects by role, the target first."""
+    shown = []
+    for role in (Role.TARGET, Role.OBSTACLE, Role.SUPPORT, Role.IGNORED):
+        names = [name for name, has in roles.items() if has is role]
+        if names:
+            more = [f"and {len(names) - _NAMED_OBJECTS} more"] if len(names) > _NAMED_OBJECTS else []
+            shown.append(f"{role.value}: {', '.join([*names[:_NAMED_OBJECTS], *more])}")
+    return "; ".join(shown) or "none"
 
 
 def _sampled_covariances(

@@ -5,47 +5,34 @@ arm ─▶ kinematics ─▶ sensing of what is ahead ─▶ stiffness, telemetr
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from common.arrays import FloatArray
-from common.protocol.codec import encode
-from common.protocol.messages import MotionState, StiffnessUpdate, Telemetry
+from common.command.live_view import LINK_LOST, LINK_UP
+from common.statistics import RunningStatistics
 from common.timing.ages import LoopAge
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
+from robot_side.gripper.perceived_distances import perceived_distances
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
 from robot_side.objects.target import next_target, object_centers, target_index
-from robot_side.operators.operator_session import OperatorSession, Receiver
+from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
+from robot_side.outgoing import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
 from robot_side.sensing import AheadSensing, Sensed
-from robot_side.stiffness.map import Stiffness
 from robot_side.stiffness.predicted_contact import Contact, ContactPredictor
-
-OutgoingStream = Literal["haptics", "telemetry"]
 
 TELEMETRY_PERIOD_S = 0.02
 OBSERVER_PERIOD_S = 0.02
 """How often those who only observe are told the stiffness."""
 TRUTH_PERIOD_S = 0.01
-_SHOWN_NAME = 100
-"""Characters of an object's name that telemetry carries; a message has a limit."""
 _LET_GO_S = 0.1
 """Fingers that move for a moment, as they follow a slipping object, still hold it."""
-
-
-@dataclass(frozen=True)
-class Outgoing:
-    """One payload to send: haptics to `peer` over the control port, telemetry to whoever looks."""
-
-    stream: OutgoingStream
-    peer: bytes
-    payload: bytes
 
 
 class Observer(Protocol):
@@ -95,7 +82,8 @@ class RobotSide:
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
         self._centers_m: FloatArray = np.empty((0, 3))
-        self._last: tuple[ArmState, Sensed] | None = None
+        self._last: tuple[Sensed, GripperPose, PerceivedObjects] | None = None
+        self._loop_age_s = RunningStatistics(seed)
         self._next_telemetry_s = -np.inf
         self._next_observers_s = -np.inf
         self._next_truth_s = -np.inf
@@ -114,17 +102,19 @@ class RobotSide:
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             self._loop_age.update(age_s, now_s)
+            self._loop_age_s.add(self._loop_age.value(now_s))
         state = self._arm.state(now_s)
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
         self._follow_target(objects, pose)
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
+        loop_age_s = self._loop_age.value(now_s)
         sensed = self._sensing.sense(
             whole,
             state.joint_velocities_rad_s,
             objects,
-            self._loop_age.value(now_s),
+            loop_age_s,
             state.gripper_opening_m if pose.sphere_on_finger.any() else None,
             None if self._held is None else self._held.index,
             now_s,
@@ -138,8 +128,8 @@ class RobotSide:
             self._sensing.stiffness_map.set_support_baseline()
         self._was_armed, self._was_carrying = armed, carrying
         target = target_index(objects) if armed and not carrying else None
-        contact = self._contact.predict(whole, objects, target, self._loop_age.value(now_s), now_s)
-        self._last = (state, sensed)
+        contact = self._contact.predict(whole, objects, target, loop_age_s, now_s)
+        self._last = sensed, whole, objects
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
         self._record(sensed, objects, speed_m_s, armed, now_s)
         return self._outgoing(permission, pose, objects, state, sensed, contact, speed_m_s, now_s)
@@ -211,52 +201,62 @@ class RobotSide:
         stiffness = sensed.stiffness
         if (owner := self.session.owner(now_s)) is not None:
             self.stiffness_sent += 1
-            outgoing.append(_stiffness(owner, stiffness, contact, permission.state))
+            outgoing.append(stiffness_message(owner, stiffness, contact, permission.state))
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             observers = self.session.observers(now_s)
-            outgoing += [_stiffness(one, stiffness, contact, permission.state) for one in observers]
+            outgoing += [stiffness_message(one, stiffness, contact, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
-            target = target_index(objects)
-            target_in_tool = None
-            if target is not None and np.isfinite(self._centers_m[target]).all():
-                target_in_tool = (self._centers_m[target] - pose.tool_position_m) @ pose.tool_rotation
-            view = Telemetry(
-                self.session.view_header(now_s),
-                state=permission.state,
-                tool_position_m=_vector3(pose.tool_position_m),
-                # A simulation about to become unstable shows wild figures, and must get as far as saying so.
-                tool_speed_m_s=min(speed_m_s, 100.0),
-                target=None if target is None else objects.names[target][:_SHOWN_NAME],
-                target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
-                up_in_tool=_vector3(pose.tool_rotation[2]),
-                gripper_opening_m=max(0.0, state.gripper_opening_m),
-                holding=self._held is not None,
-                enlargement_m=min(float(sensed.enlargement_m.max()), 100.0),
-                l2=stiffness.l2,
-                r2=stiffness.r2,
+            outgoing.append(
+                telemetry_message(
+                    self.session.view_header(now_s),
+                    permission.state,
+                    pose,
+                    sensed,
+                    speed_m_s=speed_m_s,
+                    gripper_opening_m=state.gripper_opening_m,
+                    target=self._target(objects),
+                    holding=self._held is not None,
+                )
             )
-            outgoing.append(Outgoing("telemetry", b"", encode(view)))
         return outgoing
 
+    def _target(self, objects: PerceivedObjects) -> tuple[str, FloatArray] | None:
+        """The target's name and where its centre is; None without one."""
+        target = target_index(objects)
+        return None if target is None else (objects.names[target], self._centers_m[target])
+
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
-        """A few figures for the status line."""
-        loop_age_s = self._loop_age.value(now_s)
+        """What a person is shown, and a few figures for whoever reads JSON lines."""
+        lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
+        delay_s = self.session.link.delay.mean
+        lost = f"{LINK_LOST}nothing heard from the operator" if lease.token > 0 else "waiting for an operator"
         values: dict[str, float | str | bool | None] = {
-            "state": self.session.safety.state,
-            "owner": "none" if self.session.lease.owner is None else str(self.session.lease.owner.state),
-            "observers": len(self.session.lease.observers()),
+            "link": lost if lease.owner is None else LINK_UP,
+            "state": safety.state,
+            "stopped_because": safety.stops[-1][1] if safety.stops and safety.state != "armed" else None,
+            "owner": "none" if lease.owner is None else str(lease.owner.state),
+            "observers": len(lease.observers()),
             "refused": self.session.refused,
-            "loop_age_ms": 1e3 * loop_age_s,
+            "loop_age_ms": 1e3 * self._loop_age.value(now_s),
+            "delay_ms": None if delay_s is None else 1e3 * delay_s,
+            "L2_pulled": None if command is None else command.l2,
+            "R2_pulled": None if command is None else command.r2,
         }
         if self._last is not None:
-            _, sensed = self._last
+            sensed, pose, objects = self._last
+            target, held = target_index(objects), None if self._held is None else self._held.index
+            apart = perceived_distances(pose, objects, target, held)
             values |= {
                 "L2": sensed.stiffness.l2,
                 "R2": sensed.stiffness.r2,
                 "enlargement_mm": 1e3 * float(sensed.enlargement_m.max()),
-                "holding": "nothing" if self._held is None else self._held.name,
+                "holding": "nothing" if self._held is None else self._held.name[:SHOWN_NAME],
+                "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
+                "nearest_mm": _millimetres(apart.nearest_m),
+                "target": None if target is None else objects.names[target][:SHOWN_NAME],
+                "target_mm": _millimetres(apart.target_m),
             }
         return values
 
@@ -274,25 +274,12 @@ class RobotSide:
             },
             "lease": self.session.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
+            "loop_age_ms": self._loop_age_s.summary_ms(),
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
         }
 
 
-def _stiffness(receiver: Receiver, stiffness: Stiffness, contact: Contact, state: MotionState) -> Outgoing:
-    update = StiffnessUpdate(
-        receiver.header,
-        l2=stiffness.l2,
-        r2=stiffness.r2,
-        rumble=stiffness.rumble,
-        state=state,
-        l2_contact=contact[0],
-        r2_contact=contact[1],
-    )
-    return Outgoing("haptics", receiver.peer, encode(update))
-
-
-def _vector3(values: FloatArray) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return (x, y, z)
+def _millimetres(value_m: float | None) -> float | None:
+    return None if value_m is None else 1e3 * value_m

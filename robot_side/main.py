@@ -24,8 +24,9 @@ from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core import Outgoing, RobotSide
+from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
+from robot_side.outgoing import Outgoing
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3

@@ -87,7 +87,8 @@ class RobotSettings(RunOptions):
     realtime: bool = False
     """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
-    """Any MJCF arm with actuators instead of the built-in one."""
+    """Any MJCF arm with actuators instead of the built-in one. It starts at its keyframe named home, else at its first
+    keyframe, else in the middle of its joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
     spheres: int = 16

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import errno
 import io
 import re
 import signal
@@ -13,26 +14,31 @@ from typing import Any, TypeVar, get_type_hints
 import msgspec
 import tyro
 
-from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output
+from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output, say_output_failed
 from common.errors import ConfigurationError, FeelaheadError
+from common.files.toml_complaint import explain
 from common.files.toml_file import read_toml
 
 Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What the system says where standard output leads to a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
-def parse_settings(settings_type: type[Settings], program: str, arguments: Sequence[str]) -> Settings:
+def parse_settings(
+    settings_type: type[Settings], program: str, arguments: Sequence[str], elsewhere: str = ""
+) -> Settings:
     """Build the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
 
     Every field of the (nested) dataclass is a key of the file and a flag: `[camera] mean_m = 0.001` and
-    `--camera.mean-m 0.001`. ConfigurationError for whatever is unknown, malformed or out of range; SystemExit
-    after `--help`.
+    `--camera.mean-m 0.001`. `elsewhere` ends the complaint about an unknown key of the file. ConfigurationError for
+    whatever is unknown, malformed or out of range; SystemExit after `--help`.
     """
     path = _config_path(arguments)
     try:
-        default = settings_type() if path is None else load_toml(Path(path), settings_type)
+        default = settings_type() if path is None else load_toml(Path(path), settings_type, elsewhere)
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
     complaint = io.StringIO()
@@ -67,7 +73,7 @@ def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str
     return frozenset(said & set(hints))
 
 
-def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
+def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") -> Settings:
     """Read `settings_type` from a TOML file; ConfigurationError names the file, the key and what is valid."""
     try:
         content = read_toml(path, _LARGEST_CONFIG_BYTES)
@@ -75,17 +81,22 @@ def load_toml(path: Path, settings_type: type[Settings]) -> Settings:
         raise ConfigurationError(f"--config {path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ConfigurationError(f"--config {path}: {error}") from error
-    _refuse_unknown_keys(content, settings_type, path, "")
+    _refuse_unknown_keys(content, settings_type, path, "", elsewhere)
     try:
         return msgspec.convert(content, settings_type, dec_hook=_from_toml)
     except msgspec.ValidationError as error:
-        raise ConfigurationError(f"--config {path}: {error}") from error
+        raise ConfigurationError(f"--config {path}: {explain(str(error), content, settings_type)}") from error
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     """Run `command(arguments)` and exit: a FeelaheadError becomes one line, with exit code 2 for bad input, else 1."""
     try:
-        code = command(sys.argv[1:])
+        try:
+            code = command(sys.argv[1:])
+        except SystemExit as shown:  # after --help
+            code = int(shown.code or 0)
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except FeelaheadError as error:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
@@ -94,11 +105,14 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         ignore_broken_output()
         code = 0
     except OSError as error:
-        if error.filename is None:
+        if error.filename is not None:
+            # A file or folder that somebody named, and that the system does not let us at.
+            print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
+            code = 2
+        elif error.errno in _NO_ROOM:
+            code = say_output_failed(program, error)
+        else:
             raise
-        # A file or folder that somebody named, and that the system does not let us at.
-        print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
-        code = 2
     except KeyboardInterrupt:
         code = 0
     # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.
@@ -131,15 +145,16 @@ def _is_nested(settings_type: type) -> bool:
     return any(dataclasses.is_dataclass(hint) for hint in get_type_hints(settings_type).values())
 
 
-def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str) -> None:
+def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str, elsewhere: str) -> None:
     hints = get_type_hints(settings_type)
     for key, value in content.items():
         if key not in hints:
             raise ConfigurationError(
                 f"--config {path}: unknown key {_shortened(prefix + key)!r}; valid: {', '.join(sorted(hints))}"
+                + elsewhere
             )
         if isinstance(value, dict) and dataclasses.is_dataclass(hints[key]):
-            _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.")
+            _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.", elsewhere)
 
 
 def _one_line(box: str, program: str) -> str:

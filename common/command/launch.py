@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
-from common.command.stop_signal import STOP_SIGNALS, leave_at_once_on_signals
+from common.command.stop_signal import STOP_SIGNALS, leave_at_once_on_signals, say_output_failed
 
 Command = Callable[[Sequence[str]], int]
 
@@ -29,7 +29,11 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
     leave_at_once_on_signals()
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
-        sys.stdout.write(f"{program} {importlib.metadata.version('feelahead')}\n")
+        try:
+            sys.stdout.write(f"{program} {importlib.metadata.version('feelahead')}\n")
+            sys.stdout.flush()
+        except OSError as error:
+            sys.exit(say_output_failed(program, error))
         sys.exit(0)
     try:
         command = load()

@@ -1,4 +1,4 @@
-"""A live one-line status for people, or a line of JSON at a time for the program that started us."""
+"""A live line for people, a story in a file, or a line of JSON at a time for the program that started us."""
 
 import json
 import sys
@@ -10,11 +10,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from common.command.live_line import live_line
+from common.command.live_story import Story
+from common.command.live_view import Value, live_view
+
 StatusMode = Literal["line", "json", "none"]
-Value = float | int | str | bool | None
 
 _PERIOD_S = 0.2
-_PERIOD_WITHOUT_TERMINAL_S = 2.0
 
 
 class Status:
@@ -25,6 +27,7 @@ class Status:
         self._program = program
         self._console = Console()
         self._live: Live | None = None
+        self._story = Story()
         self._next_s = -1.0
 
     def __enter__(self) -> "Status":
@@ -44,19 +47,21 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, at most five times a second; BrokenPipeError when a JSON reader has gone."""
+        """Show the values, at most five times a second; BrokenPipeError when a reader has gone."""
         if not self.due(now_s):
             return
         self._next_s = now_s + _PERIOD_S
         if self._mode == "json":
             self.event("status", **values)
             return
-        line = f"{self._program}  " + "  ".join(f"{name} {_shown(value)}" for name, value in values.items())
+        view = live_view(values)
         if self._live is not None:
-            self._live.update(Text(line, overflow="ellipsis", no_wrap=True), refresh=True)
-        else:
-            self._next_s = now_s + _PERIOD_WITHOUT_TERMINAL_S
-            print(line, flush=True)
+            # The last column stays free: some terminals break the line as soon as it is written to.
+            text = live_line(view, self._console.width - 1)
+            style = "bold red" if view.alarm else ""
+            self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
+        elif (told := self._story.tell(now_s, view)) is not None:
+            print(told, flush=True)
 
     def event(self, kind: str, **values: Value) -> None:
         """One line of JSON, in the JSON mode only, at once."""
@@ -71,11 +76,3 @@ class Status:
             self.event("note", text=text)
         elif self._mode == "line":
             self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=True)
-
-
-def _shown(value: Value) -> str:
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.2f}" if isinstance(value, float) else str(value)

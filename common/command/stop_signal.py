@@ -39,6 +39,13 @@ def ignore_broken_output() -> None:
     sys.stdout = None
 
 
+def say_output_failed(program: str, error: OSError) -> int:
+    """After our standard output could not be written, as on a full disk: one line, and the exit code."""
+    ignore_broken_output()
+    sys.stderr.write(f"{program}: the output cannot be written: {error.strerror}; valid: a place with room for it\n")
+    return 1
+
+
 def leave_at_once_on_signals() -> None:
     """Until a `StopSignal` opens, a stop signal ends the process on the spot, with code 0.
 

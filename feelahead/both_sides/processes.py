@@ -40,6 +40,7 @@ class SideProcess:
             start_new_session=True,
         )
         self._interrupted = False
+        self._has_spoken = False
         self._events: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=1000)
         self._passed_over: list[dict[str, Any]] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -106,6 +107,9 @@ class SideProcess:
     def check(self) -> None:
         """SideFailedError when it has ended with an error, in its own words; ConfigurationError for bad input."""
         code = self._process.poll()
+        if self._interrupted and not self._has_spoken:
+            # Our own interrupt met the interpreter before any handler of ours stood, which no side can help.
+            return
         if code not in (None, 0):
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
@@ -138,6 +142,7 @@ class SideProcess:
         stream = self._process.stdout
         if stream is not None:
             for line in stream:
+                self._has_spoken = True
                 if self._events.full():
                     self._events.get_nowait()
                 try:

@@ -12,11 +12,13 @@ from typing import Annotated, Any
 import tyro
 
 from common.command.command_line import given_fields, parse_settings
+from common.command.live_view import LINK_UP, Value
 from common.command.run_options import RunOptions
-from common.command.status import Status, Value
+from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
+from common.errors import ConfigurationError
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
 
@@ -29,6 +31,9 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "telemetry"),
 )
 """What the two sides send to each other."""
+_ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
+_OPERATORS_OWN = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
+"""What both sides tell, and the operator side knows better."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,9 @@ class DemoSettings(RunOptions):
 
 def demo(arguments: Sequence[str]) -> int:
     """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
-    settings = parse_settings(DemoSettings, "feelahead demo", arguments)
+    settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
+    if (complaint := _too_slow(settings)) is not None:
+        raise ConfigurationError(complaint)
     given = given_fields(arguments, DemoSettings)
     with (
         tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
@@ -117,6 +124,18 @@ def _run_both(
     return errors
 
 
+def _too_slow(settings: DemoSettings) -> str | None:
+    """Why the sides cannot find each other in time over the link that was asked for; None where they can."""
+    link = settings.link_spec()
+    there_s, back_s = (link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
+    if there_s + back_s < _LINK_TIMEOUT_S:
+        return None
+    return (
+        f"--link {settings.link!r}: a message and its answer take {there_s + back_s:g} s;"
+        f" valid: below {_LINK_TIMEOUT_S:g} s, within which the two sides have to find each other"
+    )
+
+
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
     arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     if settings.robot_config is not None:
@@ -157,13 +176,13 @@ def _watch(
     """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
     start_s = time.monotonic()
     linked_s: float | None = None
-    values: dict[str, Value] = {}
+    said: dict[str, dict[str, Value]] = {"robot": {}, "operator": {}}
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
             for event in side.events():
                 if event["event"] == "status":
-                    values |= {name: value for name, value in event.items() if name != "event"}
+                    said[side.name] = {name: value for name, value in event.items() if name != "event"}
                 elif event["event"] == "note":
                     status.note(f"{side.name}: {event['text']}")
             if not side.running:
@@ -173,15 +192,22 @@ def _watch(
                     return [str(error)]
                 return [f"the {side.name} side ended early"]
         if linked_s is None:
-            if values.get("link") == "up":
+            if said["operator"].get("link") == LINK_UP:
                 linked_s = now_s
             elif now_s - start_s > _LINK_TIMEOUT_S:
-                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s"]
+                asked = f"; the link that was asked for may be why: --link {settings.link!r}" if settings.link else ""
+                return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
             break
-        status.show(now_s, values)
+        if said["operator"]:
+            status.show(now_s, _together(said["robot"], said["operator"]))
         time.sleep(0.02)
     return []
+
+
+def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:
+    """What both sides know: of the controller and the link what the operator side says, of the rest the robot side."""
+    return {**operator, **robot, **{name: operator[name] for name in _OPERATORS_OWN if name in operator}}
 
 
 def _report(summary: dict[str, Any]) -> list[str]:

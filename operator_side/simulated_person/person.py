@@ -14,7 +14,7 @@ import math
 from collections import deque
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -39,6 +39,15 @@ _FELT_SHARE = 0.8
 """A trigger that yields less than this share of what was meant is noticed."""
 
 Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "done"]
+_DOING: Final[dict[Phase, str]] = {
+    "wait": "resting",
+    "arm": "arming",
+    "advance": "advancing",
+    "close": "grasping",
+    "retreat": "retreating",
+    "lift": "lifting",
+    "done": "done",
+}
 
 
 @dataclass(frozen=True)
@@ -114,6 +123,12 @@ class SimulatedOperator:
         self._insistence_n = 0.0
         self._pulling: int | None = None
         self._hands_s: float | None = None
+
+    @property
+    def doing(self) -> str:
+        """Their phase in a word for people; without a target they do not seem to advance."""
+        aimless = self.phase == "advance" and self._view is not None and self._view.target_in_tool_m is None
+        return "no target" if aimless else _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""

@@ -85,6 +85,11 @@ class Safety:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
 
+    @property
+    def command(self) -> MotionCommand | None:
+        """The newest accepted one, whether it moves the arm or not; None once it is past the gap limit."""
+        return self._command
+
     def begin(self, session: Session) -> None:
         """Listen to another owner; nothing of the one before counts."""
         self._forget()

@@ -58,8 +58,8 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     joints = np.array([joint for body in chain for joint in _joints(model, body)], dtype=np.int64)
     if joints.size == 0:
         raise ConfigurationError(
-            f"site: {site_name!r} hangs on no joint; valid: a site that 1 or more joints move, of "
-            + ", ".join(_site_names(model))
+            f"site: {site_name!r} hangs on no joint{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
+            " move, of " + ", ".join(_site_names(model))
         )
     _require_simple(model, joints)
     actuators = np.array([_actuator_of(model, int(joint)) for joint in joints])
@@ -110,6 +110,11 @@ def _site_names(model: Any) -> list[str]:
     return [model.site(site).name for site in range(model.nsite) if model.site(site).name]
 
 
+def _moved_by_mocap(model: Any, chain: list[int]) -> str:
+    mocap = bool(chain) and bool((model.body_mocapid[chain] >= 0).any())
+    return ": a mocap body carries it, which no real robot has" if mocap else ""
+
+
 def _find_site(model: Any, site_name: str | None) -> int:
     names = _site_names(model)
     if not names:
@@ -138,11 +143,25 @@ def _require_simple(model: Any, joints: IntArray) -> None:
     for joint in joints:
         if model.jnt_type[joint] not in _TURNING_OR_SLIDING:
             kind = JointKind(int(model.jnt_type[joint])).name.lower()
-            raise ConfigurationError(f"model: joint {_joint_name(model, joint)} is {kind}; valid: hinge or slide")
+            why = "the robot's base must stand fixed" if kind == "free" else "no single motor moves such a joint"
+            raise ConfigurationError(f"model: {_joint_name(model, joint)} is {kind}: {why}; valid: hinge or slide")
 
 
 def _joint_name(model: Any, joint: int) -> str:
-    return repr(model.joint(joint).name or f"joint{joint}")
+    """Words by which a person finds the joint in the model."""
+    if name := model.joint(joint).name:
+        return f"joint {name!r}"
+    body = int(model.jnt_bodyid[joint])
+    return f"unnamed joint {joint} of body {model.body(body).name or str(body)!r}"
+
+
+def _why_no_actuator(model: Any, joint: int) -> str:
+    """What moves a joint that has no actuator of its own."""
+    if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
+        return "it is pulled by a tendon that it shares"
+    if model.nmocap > 0:
+        return "the model is moved by a mocap body, which no real robot has"
+    return "nothing would hold or move it"
 
 
 def _actuator_of(model: Any, joint: int) -> int:
@@ -163,13 +182,13 @@ def _actuator_of(model: Any, joint: int) -> int:
         )
         if not simple:
             raise ConfigurationError(
-                f"model: the actuator {model.actuator(actuator).name!r} of joint {_joint_name(model, joint)} is of an"
+                f"model: the actuator {model.actuator(actuator).name!r} of {_joint_name(model, joint)} is of an"
                 " unsupported kind; valid: position, velocity, motor"
             )
         return actuator
     raise ConfigurationError(
-        f"model: the arm joint {_joint_name(model, joint)} has no actuator; valid: a position, velocity or motor"
-        " actuator on each arm joint"
+        f"model: the arm's {_joint_name(model, joint)} has no actuator of its own: {_why_no_actuator(model, joint)};"
+        " valid: a position, velocity or motor actuator on each joint from the base to the site"
     )
 
 

@@ -39,6 +39,10 @@ class Scene:
     roles: dict[str, Role]
     """Each object's present role; `MujocoCamera.set_role` changes it."""
     primitives: ObjectPrimitives
+    start_pose: str
+    """Where the arm starts, in words for people."""
+    shared_names: tuple[str, ...]
+    """Names of a body and of a geom of the world, or the like: each is one object."""
     warnings: tuple[str, ...]
     """What MuJoCo had to say about the model."""
 
@@ -71,8 +75,8 @@ def load_scene(
             spec = _read(model_path)
         model = _compile(spec)
         robot = find_robot(model, site)
-        start = _start_configuration(model, robot)
-        if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot) for geom in thing.geoms):
+        start, start_pose = _start_configuration(model, robot)
+        if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
             # Attaching extends the keyframes by what is attached, so that one carries the configuration over.
             start_key = _START_KEY
             while any(model.key(key).name == start_key for key in range(model.nkey)):
@@ -87,7 +91,7 @@ def load_scene(
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_forward(model, data)
-    objects = _objects(model, robot)
+    objects, shared_names = _objects(model, robot)
     return Scene(
         model=model,
         data=data,
@@ -95,6 +99,8 @@ def load_scene(
         objects=objects,
         roles=assign_roles([thing.name for thing in objects], roles or {}),
         primitives=ObjectPrimitives(model, objects),
+        start_pose=start_pose,
+        shared_names=shared_names,
         warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
     )
 
@@ -124,25 +130,29 @@ def _unusable(error: Exception) -> ConfigurationError:
     return ConfigurationError(f"model: {' '.join(str(error).split())}; valid: an MJCF file that MuJoCo compiles")
 
 
-def _start_configuration(model: Any, robot: RobotModel) -> FloatArray:
-    """qpos (nq,) of the keyframe `home`, else of the first one, else the middle of the arm joints' ranges."""
+def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
+    """qpos (nq,) of the keyframe `home`, else of the first one, else the middle of the ranges; and which, in words."""
     keyframes = [model.key(key).name for key in range(model.nkey)]
     start: FloatArray
     if keyframes:
-        chosen = keyframes.index("home") if "home" in keyframes else 0
+        home = "home" in keyframes
+        chosen = keyframes.index("home") if home else 0
         start = model.key_qpos[chosen].copy()
         if not np.isfinite(start).all():
             raise ConfigurationError(f"model: keyframe {keyframes[chosen]!r} holds NaN or infinity; valid: finite qpos")
-        return start
+        if home:
+            return start, "the keyframe 'home'"
+        return start, f"the first keyframe, {keyframes[0]!r} (a keyframe named 'home' would come before it)"
     start = model.qpos0.copy()
     limited = np.isfinite(robot.lower_rad)
     start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
-    return start
+    return start, "the middle of the joints' ranges, as there is no keyframe (to choose: a keyframe named 'home')"
 
 
-def _objects(model: Any, robot: RobotModel) -> tuple[SceneObject, ...]:
-    """What is not the robot and can touch something, in the order of its first geom."""
+def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:
+    """What is not the robot and can touch something, in the order of its first geom; and the names that are shared."""
     geoms_of: dict[str, list[int]] = {}
+    parts_of: dict[str, set[tuple[str, int]]] = {}
     for geom in range(model.ngeom):
         root = int(model.body_rootid[model.geom_bodyid[geom]])
         if root == robot.root_body or not can_touch(model, geom):
@@ -151,7 +161,9 @@ def _objects(model: Any, robot: RobotModel) -> tuple[SceneObject, ...]:
         kind, index, named = ("geom", geom, model.geom(geom)) if root == 0 else ("body", root, model.body(root))
         name = named.name.removeprefix(_TABLE_PREFIX) or f"{kind}{index}"
         geoms_of.setdefault(name, []).append(geom)
-    return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items())
+        parts_of.setdefault(name, set()).add((kind, index))
+    shared = tuple(name for name, parts in parts_of.items() if len(parts) > 1)
+    return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
 
 
 def _attach_table(spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:

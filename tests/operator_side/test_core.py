@@ -382,6 +382,39 @@ def test_the_status_shows_where_we_stand(bench: Bench, session: SessionState, sh
     assert (status["link"], status["state"]) == (shown, "armed")
 
 
+def test_a_link_that_was_up_is_lost_and_not_awaited(bench: Bench) -> None:
+    assert bench.side.status(bench.now_s)["link"] == "waiting for the robot side"
+    bench.feel(0.2)
+    assert bench.side.status(bench.now_s)["link"] == "up"
+    bench.now_s += STIFFNESS_EXPIRES_S + 0.1
+    assert bench.side.status(bench.now_s)["link"] == "lost: nothing heard from the robot"
+
+
+def test_why_it_stopped_is_shown_once_it_has_been_armed(bench: Bench) -> None:
+    bench.notice(SessionState.DISARMED, "first come, and always disarmed")
+    bench.feel(0.0, "disarmed")
+    assert bench.side.status(bench.now_s)["stopped_because"] is None
+    bench.feel(0.0)
+    assert bench.side.status(bench.now_s)["stopped_because"] is None
+    bench.notice(SessionState.STOPPED, "emergency stop")
+    bench.feel(0.0, "stopped")
+    assert bench.side.status(bench.now_s)["stopped_because"] == "emergency stop"
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_status_says_how_far_the_controllers_own_triggers_are_pulled(swapped: bool) -> None:
+    bench = Bench(swap_sides=swapped)
+    status = bench.side.status(bench.now_s)
+    assert (status["L2_pulled"], status["R2_pulled"]) == (None, None)
+    bench.device.set_finger_force(10.0, 0.0)
+    bench.device.read(bench.now_s)
+    bench.now_s += 1.0
+    bench.read()
+    status = bench.side.status(bench.now_s)
+    assert (status["L2_pulled"], status["R2_pulled"]) == (1.0, 0.0)
+    assert bench.side.status(bench.now_s + INTENT_EXPIRES_S + 0.1)["L2_pulled"] is None
+
+
 def test_every_standing_is_in_the_summary(bench: Bench) -> None:
     for session in (SessionState.READY, SessionState.ARMED, SessionState.OBSERVING, SessionState.DISARMED):
         bench.notice(session)

@@ -84,6 +84,32 @@ def test_without_a_measured_delay_the_worst_case_holds(bench: Bench) -> None:
     assert bench.robot.status(bench.now_s)["loop_age_ms"] == pytest.approx(1000.0)
 
 
+def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(bench: Bench) -> None:
+    status = bench.robot.status(bench.now_s)
+    assert (status["link"], status["L2_pulled"], "nearest_mm" in status) == ("waiting for an operator", None, False)
+    operator = bench.join(2)
+    bench.arm_it(operator)
+    bench.drive(0.2, operator, r2=0.4)
+    status = bench.robot.status(bench.now_s)
+    assert (status["link"], status["R2_pulled"], status["stopped_because"]) == ("up", 0.4, None)
+    assert status["target"] == "target"
+    before_mm = status["target_mm"]
+    assert isinstance(before_mm, float)
+    bench.drive(0.5, operator, r2=0.4)
+    nearer_mm, nearest_mm = (bench.robot.status(bench.now_s)[name] for name in ("target_mm", "nearest_mm"))
+    assert isinstance(nearer_mm, float)
+    assert isinstance(nearest_mm, float)
+    assert nearer_mm == pytest.approx(before_mm - 50.0, abs=15.0)
+    assert nearest_mm <= nearer_mm
+    bench.tick(400)
+    status = bench.robot.status(bench.now_s)
+    assert "no command for" in str(status["stopped_because"])
+    assert status["R2_pulled"] is None
+    bench.silence(1.0)
+    assert bench.robot.status(bench.now_s)["link"] == "lost: nothing heard from the operator"
+    assert bench.robot.summary()["loop_age_ms"]["mean"] > 0.0
+
+
 @pytest.mark.parametrize("direction", ["isotropic", "towards_object"])
 @pytest.mark.parametrize("mode", ["once", "per_configuration"])
 def test_every_way_of_enlarging_ticks(direction: str, mode: str) -> None:

@@ -23,7 +23,8 @@ from common.sockets.admission import Admission
 from feelahead.experiments.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import build_robot_side
-from robot_side.core import Outgoing, RobotSide
+from robot_side.core import RobotSide
+from robot_side.outgoing import Outgoing
 from robot_side.settings import RobotSettings
 
 PROGRAM = "python -m feelahead.experiments.faults.watched_robot"

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -125,3 +126,22 @@ def test_a_reader_that_goes_away_is_no_fault() -> None:
         process.stdout.close()
         assert process.wait(20) == 0
         assert process.stderr.read() == ""
+
+
+PRINT = "from common.command_line import run_command\nrun_command('x', lambda _: print('a' * {length}) or 0)"
+HELP = "from common.command_line import run_command\nrun_command('x', lambda _: print('help') or exit(0))"
+VERSION = "import sys; sys.argv = ['x', '--version']\nfrom common.launch import launch\nlaunch('x', lambda: None)"
+
+
+@pytest.mark.processes
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize("code", [PRINT.format(length=1), PRINT.format(length=100_000), HELP, VERSION])
+def test_an_output_that_cannot_be_written_is_one_line(code: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, cwd=ROOT, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "x: the output cannot be written: No space left on device; valid: a place with room for it\n"
+    )

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from common.command.status import Status, StatusMode, Value
+from common.command.live_view import Value
+from common.command.status import Status, StatusMode
 
 
 def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
@@ -57,17 +58,12 @@ def test_events_do_not_wait_for_their_turn(capsys: pytest.CaptureFixture[str]) -
     assert [event["number"] for event in events(capsys)] == [0, 1, 2, 3, 4]
 
 
-def test_without_a_terminal_there_is_a_line_every_two_seconds(capsys: pytest.CaptureFixture[str]) -> None:
-    run("line", 5.0)
-    found = shown(capsys)
-    assert len(found) == 3
-    assert found[0] == "robot  tick 0"
-
-
-def test_values_are_written_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_terminal_only_what_changed_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with Status("line", "robot") as status:
-        status.show(0.0, {"L2": 0.5, "R2": 1 / 3, "n": 12, "held": None, "armed": True, "far": False, "at": "[up]"})
-    assert shown(capsys) == ["robot  L2 0.50  R2 0.33  n 12  held –  armed yes  far no  at [up]"]
+        for tick in range(5000):
+            armed = tick >= 3000
+            status.show(100.0 + tick / 1000, {"tick": tick, "link": "up", "state": "armed" if armed else "disarmed"})
+    assert shown(capsys) == ["   0.0 s  link up; disarmed", "   3.0 s  armed"]
 
 
 def test_notes_are_for_people_and_programs_and_events_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -92,11 +88,9 @@ def test_nothing_is_due_when_nothing_is_shown(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize(("mode", "period_s"), [("json", 0.2), ("line", 2.0)])
-def test_due_says_whether_show_would_show(
-    capsys: pytest.CaptureFixture[str], mode: StatusMode, period_s: float
-) -> None:
-    with Status(mode, "robot") as status:
+def test_due_says_whether_show_would_show(capsys: pytest.CaptureFixture[str]) -> None:
+    period_s = 0.2
+    with Status("json", "robot") as status:
         assert status.due(10.0)
         assert status.due(10.0)
         status.show(10.0, {"tick": 0})
@@ -116,14 +110,15 @@ def test_on_a_terminal_one_line_is_kept_up_to_date(
     monkeypatch.setenv("COLUMNS", "40")
     with Status("line", "robot") as status:
         for tick in range(1000):
-            status.show(tick / 1000, {"tick": tick, "what": "it does " * 20})
+            status.show(tick / 1000, {"state": f"tick {tick}", "nearest_mm": 5.0})
         status.note("a line that stays")
     written = capsys.readouterr().out
     updates = [tick for tick in range(1000) if f"tick {tick} " in written]
     assert updates == pytest.approx([0, 200, 400, 600, 800], abs=5)
     assert "a line that stays" in written
-    # The line is cut rather than wrapped, and the cursor that was hidden comes back.
-    assert "…" in written
+    # Whole facts only: there is no room for the distances.
+    assert "tick 0  L2/R2 pull –/–% resist 0/0%\r" in written
+    # The cursor that was hidden comes back.
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.processes import SideFailedError, SideProcess
 
 pytestmark = pytest.mark.processes
 
@@ -125,6 +125,24 @@ def test_the_operator_side_may_start_first() -> None:
         arguments = [f"--bind={listening['control']}", f"--view-bind={listening['view']}"]
         with SideProcess("robot_side.main", "robot", arguments):
             wait_for_link(operator_side)
+
+
+# Ends at a signal as the interpreter itself does before any of our handlers stands.
+UNPREPARED = [sys.executable, "-c", "import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); signal.pause()"]
+
+
+def test_our_own_interrupt_of_a_side_that_has_not_begun_is_no_failure() -> None:
+    with SideProcess("robot_side", "robot", [], before=UNPREPARED) as side:
+        assert side.stop() != 0
+        side.check()
+
+
+def test_anothers_interrupt_is_one() -> None:
+    with SideProcess("robot_side", "robot", [], before=UNPREPARED) as side:
+        os.kill(side.process_id, signal.SIGKILL)
+        side.wait(LIMIT_S)
+        with pytest.raises(SideFailedError, match="code -9"):
+            side.check()
 
 
 def test_a_side_that_fails_says_why() -> None:

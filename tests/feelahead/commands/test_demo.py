@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from common.command.command_line import given_fields, parse_settings
+from common.command.live_view import Value
 from common.errors import ConfigurationError
 from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
@@ -60,6 +61,28 @@ def test_errors_go_to_standard_error_in_every_mode(
 def test_a_side_that_refuses_its_settings_is_bad_input() -> None:
     with pytest.raises(ConfigurationError, match="probability"):
         demo(["--probability", "2", "--status", "none"])
+
+
+def test_a_link_over_which_the_sides_cannot_meet_is_the_reason() -> None:
+    with pytest.raises(ConfigurationError, match=r"--link 'delay 1e9ms'.* take 2e\+06 s; valid: below 30 s"):
+        demo(["--link", "delay 1e9ms", "--status", "none"])
+    assert module._too_slow(DemoSettings(link="delay 14s")) is None
+    assert module._too_slow(DemoSettings(link="to_robot: delay 31s")) is not None
+
+
+def test_a_sides_own_file_is_pointed_to_its_own_flag(tmp_path: Path) -> None:
+    config = tmp_path / "robot.toml"
+    config.write_text("[camera]\nsd_m = 0.01\n")
+    with pytest.raises(ConfigurationError, match=r"unknown key 'camera'.*--robot-config FILE\.toml"):
+        demo(["--config", str(config)])
+
+
+def test_each_side_says_what_it_knows_better() -> None:
+    robot: dict[str, Value] = {"link": "up", "L2": 0.1, "target": "carton", "stopped_because": "no command for 101 ms"}
+    operator: dict[str, Value] = {"link": "lost: all", "L2": None, "target": "?", "person": "done"}
+    operator["stopped_because"] = "no command for the gap limit"
+    assert module._together(robot, operator) == {**robot, "link": "lost: all", "L2": None, "person": "done"}
+    assert module._together(robot, {}) == robot
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

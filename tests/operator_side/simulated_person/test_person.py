@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import pytest
 
 from common.protocol.messages import Vector3
@@ -98,6 +99,16 @@ def test_the_task_goes_from_waiting_to_lifting() -> None:
         assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
         assert hands.buttons == {Button.L1, Button.CROSS}
         assert hands.phase == "done"
+
+
+def test_without_a_target_nobody_seems_to_advance() -> None:
+    desk = Desk()
+    assert desk.person.doing == "resting"
+    desk.arm()
+    desk.watch(armed((0.0, 0.0, 0.2)), 1.0)
+    assert desk.person.doing == "advancing"
+    desk.watch(msgspec.structs.replace(armed(), target=None, target_in_tool_m=None), 1.0)
+    assert (desk.person.phase, desk.person.doing) == ("advance", "no target")
 
 
 @pytest.mark.parametrize("start_s", [0.0, 5000.0, 1e6])

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
+from robot_side.assembly import build_robot_side
 from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.ground_truth import GroundTruth
@@ -225,7 +227,7 @@ def test_what_is_no_arm_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="no actuators"):
         load_scene(planar_arm(tmp_path, arm_actuators="", gripper_actuators=""), "tcp")
     only_shoulder = MOTORS.split("/>")[0] + "/>"
-    with pytest.raises(ConfigurationError, match="arm joint 'elbow' has no actuator; valid: a position"):
+    with pytest.raises(ConfigurationError, match="arm's joint 'elbow' has no actuator of its own: nothing would"):
         load_scene(planar_arm(tmp_path, arm_actuators=only_shoulder), "tcp")
     muscle = POSITION_SERVOS.split("/>")[0] + '/><muscle name="pull" joint="elbow" lengthrange="0 1"/>'
     with pytest.raises(ConfigurationError, match="'pull' of joint 'elbow' is of an unsupported kind; valid: position"):
@@ -238,7 +240,7 @@ def test_what_is_no_arm_is_named(tmp_path: Path) -> None:
         wrist='<body name="ball" pos="0.3 0 0"><joint name="b" type="ball"/>'
         '<geom size="0.01"/><site name="end"/></body>',
     )
-    with pytest.raises(ConfigurationError, match="joint 'b' is ball; valid: hinge or slide"):
+    with pytest.raises(ConfigurationError, match=r"joint 'b' is ball: no single motor .* valid: hinge or slide"):
         load_scene(floating, "end")
 
 
@@ -289,3 +291,73 @@ def test_a_keyframe_may_have_the_name_that_the_table_would_take(tmp_path: Path) 
     scene = load_scene(planar_arm(tmp_path, world=floor, extra_bottom=f"<keyframe>{keys}</keyframe>"), "tcp")
     assert scene.roles["target"] is Role.TARGET
     assert scene.data.qpos[0] == pytest.approx(0.1)
+
+
+KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{second}" qpos="0 0 0 0"/></keyframe>'
+
+
+@pytest.mark.parametrize(
+    ("extra_bottom", "said"),
+    [
+        (KEYS.format(first="rest", second="home"), "the keyframe 'home'"),
+        (KEYS.format(first="rest", second="up"), "the first keyframe, 'rest' ("),
+        ("", "the middle of the joints' ranges, as there is no keyframe ("),
+    ],
+)
+def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) -> None:
+    model = planar_arm(tmp_path, extra_bottom=extra_bottom)
+    assert load_scene(model, "tcp").start_pose.startswith(said)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[0].startswith(f"starts at {said}")
+    assert notes[1].startswith("objects: target: target; obstacle: ")
+
+
+def test_a_scene_without_a_target_says_how_to_name_one(tmp_path: Path) -> None:
+    world = '<geom name="tin" type="sphere" size="0.1" pos="1 1 0"/><geom name="table" type="sphere" size="0.1"/>'
+    model = planar_arm(tmp_path, world=world)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[1] == "objects: obstacle: tin; support: table"
+    assert "no object is a target" in notes[2]
+    assert '[roles] NAME = "target"' in notes[2]
+    settings = RobotSettings(model=model, site="tcp", roles={"tin": Role.TARGET})
+    assert build_robot_side(settings, 1, "clock").notes[1:] == ("objects: target: tin; support: table",)
+
+
+def test_a_body_and_a_geom_of_one_name_are_one_object_and_that_is_said(tmp_path: Path) -> None:
+    world = (
+        '<geom name="target" type="sphere" size="0.1" pos="1 1 0"/>'
+        '<body name="target" pos="1 0 0"><geom type="sphere" size="0.1"/></body>'
+    )
+    model = planar_arm(tmp_path, world=world)
+    assert load_scene(model, "tcp").shared_names == ("target",)
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    assert notes[2].startswith("'target' names more than one thing")
+    assert load_scene().shared_names == ()
+
+
+@pytest.mark.parametrize(
+    ("joint", "more", "said"),
+    [
+        ("<freejoint/>", "", "unnamed joint 0 of body 'arm' is free: the robot's base must stand fixed; valid: hinge"),
+        (
+            "<joint/>",
+            '<body mocap="true"/>',
+            "unnamed joint 0 of body 'arm' has no actuator of its own: the model is",
+        ),
+    ],
+)
+def test_a_kind_of_robot_that_is_refused_is_told_why(tmp_path: Path, joint: str, more: str, said: str) -> None:
+    (tmp_path / "arm.xml").write_text(
+        f"""<mujoco><worldbody>{more}<body name="arm">{joint}<geom size="0.1"/><site name="end"/>
+        <body><joint name="other"/><geom size="0.1"/></body></body></worldbody>
+        <actuator><motor joint="other"/></actuator></mujoco>"""
+    )
+    with pytest.raises(ConfigurationError) as caught:
+        load_scene(tmp_path / "arm.xml", "end")
+    assert said in one_line(caught)
+
+
+def test_an_arm_that_hangs_on_a_mocap_body_is_told_so(tmp_path: Path) -> None:
+    hand = '<body mocap="true"><geom size="0.1"/><site name="grip"/></body>'
+    with pytest.raises(ConfigurationError, match="'grip' hangs on no joint: a mocap body carries it"):
+        load_scene(planar_arm(tmp_path, world=hand), "grip")

@@ -324,7 +324,7 @@ def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
         "from robot_side.settings import RobotSettings\n"
         "robot = build_robot_side(RobotSettings(), 1, 'clock')\n"
         "robot.tick(0.0)\n"
-        "assert robot.notes == ()\n"
+        "assert not [note for note in robot.notes if 'perceived larger' in note]\n"
         "print(*(kernel.name for kernel in imported_kernels()))"
     )
     root = ROOT
@@ -352,7 +352,7 @@ def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path)
     world = '<geom name="post" type="cylinder" size="0.1 0.1" pos="1 1 0"/>'
     world += '<geom name="bowl" type="mesh" mesh="bowl" pos="1 0 0.3"/>'
     model = planar_arm(tmp_path, world=world, extra_top=mesh_asset("bowl", vertices, triangles[1:]))
-    (note,) = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    *_, note = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     assert "\n" not in note
     assert "bowl as its convex hull or bounding box, post by 0.9 %" in note
 
@@ -360,5 +360,5 @@ def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path)
 def test_a_note_about_many_things_names_the_worst(tmp_path: Path) -> None:
     world = "".join(f'<geom name="g{k}" type="cylinder" size="0.1 0.1" pos="{k} 1 0"/>' for k in range(12))
     model = planar_arm(tmp_path, world=world)
-    (note,) = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    *_, note = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     assert note.endswith("g7 by 0.9 %, and 4 more by no more than that")

@@ -1,0 +1,92 @@
+"""One line about what is going on, for a terminal of any width: whole facts only, the important ones first."""
+
+from rich.cells import cell_len
+
+from common.command.live_view import LiveView, TriggerView
+
+_BETWEEN = "  "
+_UNKNOWN = "–"
+_LONGEST_NAME = 12
+"""An object with a longer name is shown without it."""
+
+_Fact = tuple[int, str]
+"""(importance, text): 0 is the most important."""
+
+
+def live_line(view: LiveView, width: int) -> str:
+    """`view` in at most `width` columns: in long words, in short ones, or only the facts that have room."""
+    for facts in (_in_long_words(view), _in_short_words(view)):
+        line = _BETWEEN.join(text for _, text in facts)
+        if cell_len(line) <= width:
+            return line
+    left, kept = width + len(_BETWEEN), set()
+    for fact in sorted(facts):
+        needed = cell_len(fact[1]) + len(_BETWEEN)
+        if needed <= left:
+            left -= needed
+            kept.add(fact)
+    return _BETWEEN.join(fact[1] for fact in facts if fact in kept)
+
+
+def millimetres(value_mm: float | None, space: str = " ", digits: int = 0) -> str:
+    """A distance, in metres from one metre on; nothing is nearer than 0."""
+    if value_mm is None:
+        return f"{_UNKNOWN:>{digits}}{space}mm"
+    value_mm = max(0.0, value_mm)
+    if round(value_mm) >= 1000:
+        return f"{value_mm / 1000.0:.1f}{space}m"
+    return f"{value_mm:{digits}.0f}{space}mm"
+
+
+def percent(share: float | None, digits: int = 0) -> str:
+    """A share without its sign for per cent."""
+    return f"{_UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
+
+
+def _in_long_words(view: LiveView) -> list[_Fact]:
+    nearest = "nearest "
+    if view.nearest is not None and cell_len(view.nearest) <= _LONGEST_NAME:
+        nearest += f"{view.nearest} "
+    return [
+        *_what(view),
+        (2, f"L2 {_long_trigger(view.l2, view)}"),
+        (2, f"R2 {_long_trigger(view.r2, view)}"),
+        (4, nearest + millimetres(view.nearest_mm, " ", 3)),
+        (3, _target(view, " ", 3)),
+        *([(5, f"link up, {_delay(view, ' ')}")] if view.linked else []),
+    ]
+
+
+def _in_short_words(view: LiveView) -> list[_Fact]:
+    pulled = f"{percent(view.l2.pulled)}/{percent(view.r2.pulled)}%"
+    resist = f"{percent(view.l2.resists)}/{percent(view.r2.resists)}%"
+    return [
+        *_what(view),
+        (2, f"L2/R2 pull {pulled} {'resist' if view.haptics else 'danger'} {resist}"),
+        (4, f"near {millimetres(view.nearest_mm, '')}"),
+        (3, _target(view, "", 0)),
+        *([(5, f"link {_delay(view, '')}")] if view.linked else []),
+    ]
+
+
+def _what(view: LiveView) -> list[_Fact]:
+    return [(0, view.phase), *([(1, view.reason)] if view.reason is not None else [])]
+
+
+def _long_trigger(trigger: TriggerView, view: LiveView) -> str:
+    resists = "resists" if view.haptics else "danger"
+    return f"pulled {percent(trigger.pulled, 3)} % {resists} {percent(trigger.resists, 3)} %"
+
+
+def _target(view: LiveView, space: str, digits: int) -> str:
+    if view.holding is not None:
+        return f"holding {view.holding}" if cell_len(view.holding) <= _LONGEST_NAME else "holding"
+    if view.has_target is False:
+        return "no target"
+    if view.target_mm is None and view.target_centre_mm is not None:
+        return f"target centre {millimetres(view.target_centre_mm, space, digits)}"
+    return f"target {millimetres(view.target_mm, space, digits)}"
+
+
+def _delay(view: LiveView, space: str) -> str:
+    return f"{_UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}{space}ms"

@@ -1,0 +1,122 @@
+"""What a person is shown of a run: figures that each may be unknown, and in words what is going on.
+
+A side's status values are the keys of its JSON lines. They become one frozen record here, which `live_line` writes
+for a terminal and `live_story` for a file. All distances are perceived ones, never the simulation's truth.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+Value = float | int | str | bool | None
+
+LINK_UP = "up"
+LINK_LOST = "lost: "
+"""How the link's word begins when there was one; the reason follows."""
+LINK_REFUSED = "refused: "
+_BEFORE_ARMED = ("resting", "arming")
+"""What the simulated person does before they have seen that it is armed."""
+
+
+@dataclass(frozen=True)
+class TriggerView:
+    """One trigger of the controller; None is not known."""
+
+    pulled: float | None = None
+    """Calibrated travel, 0 to 1."""
+    resists: float | None = None
+    """Its stiffness, 0 to 1; 0 while the arm is not armed, as the trigger is free then."""
+
+
+@dataclass(frozen=True)
+class LiveView:
+    """What is shown; None is not known."""
+
+    phase: str = "starting"
+    """What is going on, in a word or two."""
+    reason: str | None = None
+    """Why, after a stop or a lost link."""
+    alarm: bool = False
+    """Whether that has stopped the arm against somebody's will."""
+    armed: bool = False
+    linked: bool | None = None
+    delay_ms: float | None = None
+    l2: TriggerView = TriggerView()
+    r2: TriggerView = TriggerView()
+    haptics: bool = True
+    """Whether the triggers are stiffened at all; else `resists` only says how near danger is."""
+    nearest: str | None = None
+    """The nearest object's name, supports aside."""
+    nearest_mm: float | None = None
+    """From the gripper's surface to it, as perceived."""
+    has_target: bool | None = None
+    target_mm: float | None = None
+    """From the gripper's surface to the target's, as perceived."""
+    target_centre_mm: float | None = None
+    """From the point between the fingertips to the target's centre, as perceived."""
+    holding: str | None = None
+    """What is between the fingers."""
+
+
+def live_view(values: Mapping[str, Value]) -> LiveView:
+    """The record of a side's status values, or of both sides' together; keys that are not there are not known."""
+    phase, reason, alarm = _phase(values)
+    armed, link = values.get("state") == "armed", _text(values, "link")
+    free = 0.0 if values.get("state") is not None and not armed else None
+    l2, r2 = (
+        TriggerView(_number(values, f"{name}_pulled"), _number(values, name) if free is None else free)
+        for name in ("L2", "R2")
+    )
+    holding = _text(values, "holding")
+    return LiveView(
+        phase=phase,
+        reason=reason,
+        alarm=alarm,
+        armed=armed,
+        linked=None if link is None else link == LINK_UP,
+        delay_ms=_number(values, "delay_ms"),
+        l2=l2,
+        r2=r2,
+        haptics=values.get("haptics") is not False,
+        nearest=_text(values, "nearest"),
+        nearest_mm=_number(values, "nearest_mm"),
+        has_target=values["target"] is not None if "target" in values else None,
+        target_mm=_number(values, "target_mm"),
+        target_centre_mm=_number(values, "target_centre_mm"),
+        holding=None if holding == "nothing" else holding,
+    )
+
+
+def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
+    """What is going on, why, and whether it is an alarm: what keeps the arm from moving comes first."""
+    link, state, person = _text(values, "link"), values.get("state"), _text(values, "person")
+    because, controller = _text(values, "stopped_because"), values.get("controller")
+    for beginning, word in ((LINK_LOST, "LINK LOST"), (LINK_REFUSED, "REFUSED")):
+        if link is not None and link.startswith(beginning):
+            return word, link.removeprefix(beginning), True
+    if state == "stopped":
+        return "STOPPED", because, True
+    if controller == "lost":
+        return "CONTROLLER LOST", None, True
+    if state == "disarmed" and because is not None:
+        return "DISARMED", because, True
+    if link not in (None, LINK_UP):
+        return str(link), None, False
+    if controller == "absent":
+        return "no controller", None, False
+    if state == "armed" and person in (None, *_BEFORE_ARMED):
+        return "armed", None, False
+    ready = state == "disarmed" and values.get("owner") == "ready"
+    return person or ("ready to arm" if ready else str(state or "starting")), None, False
+
+
+def _number(values: Mapping[str, Value], name: str) -> float | None:
+    value = values.get(name)
+    known = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+    return float(value) if known and value is not None else None
+
+
+def _text(values: Mapping[str, Value], name: str) -> str | None:
+    """A word for people; what cannot be printed, such as a terminal's control characters, becomes a question mark."""
+    value = values.get(name)
+    return "".join(sign if sign.isprintable() else "?" for sign in value) if isinstance(value, str) else None

@@ -1,0 +1,52 @@
+"""What is wrong with a value in a TOML file, in one line: the key, the value, and what would be valid."""
+
+import dataclasses
+import json
+import re
+import types
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+_LONGEST_VALUE = 100
+
+
+def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> str:
+    """The one line for msgspec's `complaint` about `content`, which was to become a `settings_type`."""
+    said, _, path = complaint.partition(" - at `$.")
+    keys = re.findall(r"\w+", path.partition("[")[0].rstrip("`"))
+    if not keys:
+        return complaint
+    value: Any = content
+    hint: Any = settings_type
+    for key in keys:
+        value, hint = value[key], get_type_hints(hint)[key]
+    if not said.startswith(("Expected", "Invalid enum value")):
+        # A dataclass's own complaint about its fields, which says what is valid.
+        return f"{'.'.join(keys)}: {said}"
+    shown = json.dumps(value, default=str, ensure_ascii=False)
+    if len(shown) > _LONGEST_VALUE:
+        shown = f"{shown[:_LONGEST_VALUE]}..."
+    return f"{'.'.join(keys)} = {shown}; valid: {_valid(hint)}"
+
+
+def _valid(hint: Any) -> str:
+    """In words what a key of the type `hint` may hold."""
+    words = {float: "a number", int: "a whole number", bool: "true or false", str: "a text", Path: "a path, as a text"}
+    if hint in words:
+        return words[hint]
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return " or ".join(json.dumps(choice) for choice in arguments)
+    if origin in (Union, types.UnionType):
+        return " or ".join(_valid(argument) for argument in arguments if argument is not type(None))
+    if origin is tuple:
+        return f"[{', '.join(_valid(argument) for argument in arguments)}]"
+    if origin is dict:
+        return f"a table of NAME = {_valid(arguments[1])}"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return " or ".join(json.dumps(choice.value) for choice in hint)
+    if dataclasses.is_dataclass(hint):
+        return f"a table with {', '.join(sorted(get_type_hints(hint)))}"
+    return getattr(hint, "__name__", str(hint))

@@ -1,0 +1,82 @@
+"""What leaves the robot side: stiffness for those who feel, telemetry for those who look."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.protocol.codec import encode
+from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
+from robot_side.arm.port import GripperPose
+from robot_side.operators.operator_session import Receiver
+from robot_side.sensing import Sensed
+from robot_side.stiffness.map import Stiffness
+from robot_side.stiffness.predicted_contact import Contact
+
+OutgoingStream = Literal["haptics", "telemetry"]
+
+SHOWN_NAME = 100
+"""Characters of an object's name that are sent and shown; a message has a limit."""
+_FASTEST_M_S, _LARGEST_M = 100.0, 100.0
+"""A simulation about to become unstable shows wild figures, and must get as far as saying so."""
+
+
+@dataclass(frozen=True)
+class Outgoing:
+    """One payload to send: haptics to `peer` over the control port, telemetry to whoever looks."""
+
+    stream: OutgoingStream
+    peer: bytes
+    payload: bytes
+
+
+def stiffness_message(receiver: Receiver, stiffness: Stiffness, contact: Contact, state: MotionState) -> Outgoing:
+    """What `receiver` is to feel."""
+    update = StiffnessUpdate(
+        receiver.header,
+        l2=stiffness.l2,
+        r2=stiffness.r2,
+        rumble=stiffness.rumble,
+        state=state,
+        l2_contact=contact[0],
+        r2_contact=contact[1],
+    )
+    return Outgoing("haptics", receiver.peer, encode(update))
+
+
+def telemetry_message(
+    header: Header,
+    state: MotionState,
+    pose: GripperPose,
+    sensed: Sensed,
+    *,
+    speed_m_s: float,
+    gripper_opening_m: float,
+    target: tuple[str, FloatArray] | None,
+    holding: bool,
+) -> Outgoing:
+    """What anyone who looks is shown; `target` is a name and where its centre (3,) is, in metres, NaN where unknown."""
+    target_in_tool = None
+    if target is not None and np.isfinite(target[1]).all():
+        target_in_tool = (target[1] - pose.tool_position_m) @ pose.tool_rotation
+    view = Telemetry(
+        header,
+        state=state,
+        tool_position_m=_vector3(pose.tool_position_m),
+        tool_speed_m_s=min(speed_m_s, _FASTEST_M_S),
+        target=None if target is None else target[0][:SHOWN_NAME],
+        target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
+        up_in_tool=_vector3(pose.tool_rotation[2]),
+        gripper_opening_m=max(0.0, gripper_opening_m),
+        holding=holding,
+        enlargement_m=min(float(sensed.enlargement_m.max()), _LARGEST_M),
+        l2=sensed.stiffness.l2,
+        r2=sensed.stiffness.r2,
+    )
+    return Outgoing("telemetry", b"", encode(view))
+
+
+def _vector3(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return (x, y, z)

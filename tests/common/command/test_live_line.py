@@ -1,0 +1,156 @@
+"""The live line without a terminal: what it says, and that it never says half of something."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from common.command.live_line import _in_long_words, _in_short_words, live_line
+from common.command.live_view import LiveView, TriggerView, live_view
+
+APPROACH: dict[str, Any] = {
+    **{"link": "up", "state": "armed", "person": "advancing", "delay_ms": 12.4, "haptics": True},
+    **{"L2": 0.0, "R2": 0.34, "L2_pulled": 0.0, "R2_pulled": 0.62},
+    **{"nearest": "tin", "nearest_mm": 84.2, "target": "carton", "target_mm": 120.4, "holding": "nothing"},
+}
+
+names = st.one_of(st.none(), st.text(max_size=40))
+shares = st.one_of(st.none(), st.floats(0.0, 1.0))
+distances_mm = st.one_of(st.none(), st.floats(-1e3, 1e7))
+triggers = st.builds(TriggerView, shares, shares)
+views = st.builds(
+    LiveView,
+    phase=st.one_of(st.sampled_from(["advancing", "STOPPED", "LINK LOST"]), st.text(max_size=90)),
+    reason=names,
+    alarm=st.booleans(),
+    linked=st.one_of(st.none(), st.booleans()),
+    delay_ms=distances_mm,
+    l2=triggers,
+    r2=triggers,
+    haptics=st.booleans(),
+    nearest=names,
+    nearest_mm=distances_mm,
+    has_target=st.one_of(st.none(), st.booleans()),
+    target_mm=distances_mm,
+    target_centre_mm=distances_mm,
+    holding=names,
+)
+
+
+def test_eighty_columns_tell_everything() -> None:
+    assert live_line(live_view(APPROACH), 79) == (
+        "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
+    )
+
+
+def test_a_wide_terminal_has_room_for_words() -> None:
+    assert live_line(live_view(APPROACH), 130) == (
+        "advancing  L2 pulled   0 % resists   0 %  R2 pulled  62 % resists  34 %"
+        "  nearest tin  84 mm  target 120 mm  link up, 12 ms"
+    )
+
+
+@pytest.mark.parametrize(
+    ("width", "expected"),
+    [
+        (70, "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm"),
+        (60, "advancing  L2/R2 pull 0/62% resist 0/34%  target 120mm"),
+        (45, "advancing  L2/R2 pull 0/62% resist 0/34%"),
+        (20, "advancing  near 84mm"),
+        (8, ""),
+    ],
+)
+def test_a_narrow_one_drops_the_least_important_facts(width: int, expected: str) -> None:
+    assert live_line(live_view(APPROACH), width) == expected
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"state": "stopped", "stopped_because": "emergency stop"}, "STOPPED  emergency stop  "),
+        ({"state": "stopped"}, "STOPPED  "),
+        ({"state": "disarmed", "stopped_because": "no command for 312 ms"}, "DISARMED  no command for 312 ms  "),
+        ({"link": "lost: nothing heard from the robot", "state": None}, "LINK LOST  nothing heard from the robot  "),
+        ({"link": "refused: 8 others observe already"}, "REFUSED  8 others observe already  "),
+        ({"controller": "lost", "state": "disarmed"}, "CONTROLLER LOST  "),
+        ({"state": "disarmed", "person": None}, "disarmed  "),
+        ({"state": "disarmed", "person": None, "owner": "ready"}, "ready to arm  "),
+        ({"state": "disarmed", "controller": "absent"}, "no controller  "),
+        ({"link": "waiting for the robot side", "state": None}, "waiting for the robot side  "),
+        ({"person": "no target", "target": None, "target_mm": None}, "no target  "),
+        ({"person": None}, "armed  "),
+        ({"person": "arming"}, "armed  "),
+        ({"person": "arming", "state": "disarmed"}, "arming  "),
+    ],
+)
+def test_what_keeps_the_arm_from_moving_comes_first_and_in_words(changed: dict[str, Any], expected: str) -> None:
+    view = live_view(APPROACH | changed)
+    assert live_line(view, 79).startswith(expected)
+    assert view.alarm is expected.partition("  ")[0].isupper()
+
+
+def test_what_is_not_known_is_no_zero() -> None:
+    line = live_line(live_view({"link": "up"}), 79)
+    assert line == "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm  link –ms"
+    assert live_line(live_view({"nearest_mm": math.nan, "R2": math.inf, "L2": True}), 79) == (
+        "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm"
+    )
+
+
+def test_a_trigger_is_free_while_the_arm_is_not_armed() -> None:
+    view = live_view(APPROACH | {"state": "disarmed"})
+    assert (view.r2.resists, view.r2.pulled) == (0.0, 0.62)
+
+
+def test_without_haptics_nothing_resists() -> None:
+    for width in (79, 130):
+        line = live_line(live_view(APPROACH | {"haptics": False}), width)
+        assert "resist" not in line
+        assert "danger" in line
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"holding": "carton"}, "holding carton"),
+        ({"holding": "an object with a long name"}, "  holding  "),
+        ({"target": None, "target_mm": None}, "no target"),
+        ({"target_mm": None, "target_centre_mm": 1234.0}, "target centre 1.2m"),
+        ({"target_mm": -3.0}, "target 0mm"),
+    ],
+)
+def test_the_target_in_other_words(changed: dict[str, Any], expected: str) -> None:
+    assert expected in live_line(live_view(APPROACH | changed), 79)
+
+
+def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
+    view = live_view({"link": "refused: \x1b[2J\nhello", "nearest": "a\rb", "holding": "\x07"})
+    assert (view.reason, view.nearest, view.holding) == ("?[2J?hello", "a?b", "?")
+
+
+@given(view=views, width=st.integers(0, 200))
+@example(view=live_view(APPROACH), width=79)
+@example(view=replace(LiveView(), phase="界" * 5), width=9)
+def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
+    line = live_line(view, width)
+    assert cell_len(line) <= width
+    for facts in (_in_long_words(view), _in_short_words(view)):
+        left = line
+        # Each fact is there as a whole, in its place, or not at all.
+        for _, text in facts:
+            if left == text or left.startswith(f"{text}  "):
+                left = left[len(text) + 2 :]
+        if left == "":
+            return
+    raise AssertionError(f"{line!r} holds {left!r}")
+
+
+@given(view=views, width=st.integers(0, 200))
+def test_more_room_never_shows_less(view: LiveView, width: int) -> None:
+    """What is most important is there as soon as it fits by itself."""
+    if cell_len(view.phase) <= width:
+        assert live_line(view, width).startswith(view.phase)
