@@ -128,9 +128,11 @@ def test_a_reader_that_goes_away_is_no_fault() -> None:
         assert process.stderr.read() == ""
 
 
-PRINT = "from common.command_line import run_command\nrun_command('x', lambda _: print('a' * {length}) or 0)"
-HELP = "from common.command_line import run_command\nrun_command('x', lambda _: print('help') or exit(0))"
-VERSION = "import sys; sys.argv = ['x', '--version']\nfrom common.launch import launch\nlaunch('x', lambda: None)"
+PRINT = "from common.command.command_line import run_command\nrun_command('x', lambda _: print('a' * {length}) or 0)"
+HELP = "from common.command.command_line import run_command\nrun_command('x', lambda _: print('help') or exit(0))"
+VERSION = (
+    "import sys; sys.argv = ['x', '--version']\nfrom common.command.launch import launch\nlaunch('x', lambda: None)"
+)
 
 
 @pytest.mark.processes
