@@ -7,7 +7,7 @@ from feelahead.experiments.rig import Rig
 from feelahead.processes import SideProcess
 
 _LIMIT_S = 1.0
-_PATIENCE_S = 30.0
+_PATIENCE_S = 120.0
 
 
 def either_side_first() -> Outcome:
