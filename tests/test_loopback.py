@@ -20,7 +20,8 @@ def loopback(link: str, *, haptics: bool = True, seed: int = 0) -> Loopback:
 @functools.cache
 def episode(delay_ms: int, *, haptics: bool) -> dict[str, Any]:
     run = loopback(f"delay {delay_ms}ms 10ms distribution normal" if delay_ms else "", haptics=haptics)
-    run.run_until(14.0 if haptics else 9.0)
+    # By then the target is lifted, or without haptics, where only the way there counts, approached.
+    run.run_until((11.0 if delay_ms else 7.0) if haptics else 4.5)
     return run.summary()
 
 

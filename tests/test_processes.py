@@ -15,7 +15,7 @@ from feelahead.processes import SideProcess
 
 pytestmark = pytest.mark.processes
 
-LIMIT_S = 60.0
+LIMIT_S = 240.0
 
 
 def demo(*arguments: str) -> subprocess.Popen[str]:
@@ -28,10 +28,11 @@ def demo(*arguments: str) -> subprocess.Popen[str]:
 
 
 def wait_for_link(side: SideProcess) -> dict[str, Any]:
-    while True:
+    for _ in range(5000):
         status = side.wait_for("status", LIMIT_S)
         if status.get("link") == "up":
             return status
+    return pytest.fail("the link never came up")
 
 
 def robot(*arguments: str) -> SideProcess:

@@ -53,7 +53,9 @@ class Onsets:
     def outcome(self, *, safe: bool = True) -> Outcome:
         """Not before T; by T + 5 ms (p99) and T + 20 ms (max)."""
         if not self.slowed_s:
-            return Outcome(safe, "the stream broke by itself each time: the machine is too busy", in_time=False, judged=not safe)
+            return Outcome(
+                safe, "the stream broke by itself each time: the machine is too busy", in_time=False, judged=not safe
+            )
         in_time = min(self.slowed_s) >= T_S - 1e-3 and all(
             np.quantile(values, 0.99) <= P99_S and max(values) <= MOST_S for values in (self.slowed_s, self.disarmed_s)
         )
