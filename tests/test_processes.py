@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from common.errors import ConfigurationError
+from feelahead.experiments.first_side import free_ports
 from feelahead.processes import SideProcess
 
 pytestmark = pytest.mark.processes
@@ -119,8 +120,8 @@ def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:
 
 
 def test_the_operator_side_may_start_first() -> None:
-    with robot() as placeholder:
-        listening = placeholder.wait_for("listening", LIMIT_S)
+    control, view = free_ports(2)
+    listening = {"control": f"tcp://127.0.0.1:{control}", "view": f"tcp://127.0.0.1:{view}"}
     with operator(listening) as operator_side:
         assert operator_side.wait_for("status", LIMIT_S)["link"] == "waiting for the robot side"
         arguments = [f"--bind={listening['control']}", f"--view-bind={listening['view']}"]
