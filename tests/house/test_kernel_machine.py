@@ -28,17 +28,20 @@ def run(folder: Path, script: str, limit_s: float = 30.0) -> tuple[int, list[str
     return run_machine(machine(folder, script), folder / "ramdisk", folder / "console", limit_s, lines.append), lines
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("code", [0, 1, 139])
 def test_the_programs_exit_code_is_the_machines(tmp_path: Path, code: int) -> None:
     said = f"printf 'one\\r\\ntwo\\nkernel test: exit code {code}\\n'"
     assert run(tmp_path, said) == (code, ["one", "two"])
 
 
+@pytest.mark.processes
 def test_a_machine_without_a_result_has_failed(tmp_path: Path) -> None:
     with pytest.raises(MachineError, match="ended with code 7 and without a result"):
         run(tmp_path, "echo half a line; exit 7")
 
 
+@pytest.mark.processes
 def test_a_machine_that_hangs_has_failed(tmp_path: Path) -> None:
     with pytest.raises(MachineError, match=r"no result within 0\.2 s"):
         run(tmp_path, "exec sleep 60", limit_s=0.2)
@@ -50,6 +53,7 @@ def test_without_the_programs_of_debian_it_is_skipped(tmp_path: Path, monkeypatc
         provide(tmp_path / "cache")
 
 
+@pytest.mark.processes
 def test_packages_that_cannot_be_had_are_skipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for program in ("apt-get", "apt-cache", "dpkg-deb"):
         (tmp_path / program).write_text("#!/bin/sh\necho 'E: Unable to fetch' >&2; exit 100\n")
@@ -59,6 +63,7 @@ def test_packages_that_cannot_be_had_are_skipped(tmp_path: Path, monkeypatch: py
         provide(tmp_path / "cache")
 
 
+@pytest.mark.processes
 def test_the_command_says_why_it_is_skipped_and_ends_well(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.kernel", "--cache", str(tmp_path)],

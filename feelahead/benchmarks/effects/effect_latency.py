@@ -38,7 +38,7 @@ _LEVELS: Final = (0.2, 0.8)
 _SHORTEST_HOLD_S, _LONGEST_HOLD_S = 0.03, 0.06
 """A stiffness holds for so long: at random, so that no beat with the loop's own periods is mistaken for speed."""
 _REST_S: Final = 3.0
-_PATIENCE_S: Final = 20.0
+_PATIENCE_S: Final = 120.0
 
 Stamps = list[tuple[float, bytes]]
 
@@ -78,15 +78,20 @@ class Outcome:
     writes_at_rest: int
     """While it did not, for `rest_s`."""
     rest_s: float
+    longest_pause_s: float
+    """From one turn to the next of either end: a busy machine may keep them so long that the effect is let go."""
 
 
 class StampingHandle:
     """hidapi's handle on a controller that nobody touches; notes when it is written to."""
 
+    longest_pause_s = 0.0
+    """From one look for a report to the next."""
+
     def __init__(self, transport: Transport, stamps: Stamps) -> None:
         self._clock = MonotonicClock()
         self._report = list(build_input_report(ControllerState(), transport))
-        self._reported_s = self._clock.now()
+        self._reported_s = self._looked_s = self._clock.now()
         self._stamps = stamps
 
     def open_path(self, path: bytes) -> None:
@@ -100,6 +105,8 @@ class StampingHandle:
     def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
         """A report every 4 ms."""
         now_s = self._clock.now()
+        StampingHandle.longest_pause_s = max(StampingHandle.longest_pause_s, now_s - self._looked_s)
+        self._looked_s = now_s
         if timeout_ms == 0 and now_s - self._reported_s < _REPORT_PERIOD_S:
             return []
         self._reported_s = now_s
@@ -168,7 +175,8 @@ def measure(settings: EffectLatencySettings) -> Outcome:
             operator.terminate()
             if not here.poll(_PATIENCE_S):
                 raise FeelaheadError(f"the operator side did not report within {_PATIENCE_S:g} s")
-            stamps: Stamps = here.recv()
+            stamps: Stamps
+            stamps, pause_s = here.recv()
         finally:
             operator.terminate()
             operator.join(_PATIENCE_S)
@@ -178,6 +186,7 @@ def measure(settings: EffectLatencySettings) -> Outcome:
         writes=int(np.sum((written_s >= changed_s[0]) & (written_s <= end_s))),
         writes_at_rest=int(np.sum((written_s >= rest_from_s) & (written_s <= rest_to_s))),
         rest_s=rest_to_s - rest_from_s,
+        longest_pause_s=max(pause_s, source.longest_pause_s),
     )
 
 
@@ -228,7 +237,7 @@ def first_writes(changed_s: np.ndarray, written_s: np.ndarray, end_s: float) -> 
 def _operator_process(arguments: list[str], transport: Transport, pipe: Connection) -> None:
     backend = StampingBackend(transport)
     operator_command(arguments, backend)
-    pipe.send(backend.stamps)
+    pipe.send((backend.stamps, StampingHandle.longest_pause_s))
 
 
 def _title(settings: EffectLatencySettings) -> str:

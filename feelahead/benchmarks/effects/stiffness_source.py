@@ -28,6 +28,8 @@ class StiffnessSource:
         self.hellos = 0
         self.sent_s = 0.0
         """When the last stiffness was sent, on the machine's monotonic clock."""
+        self.longest_pause_s = 0.0
+        """From one stiffness to the next while it ran."""
         self._clock = MonotonicClock()
         self._sockets = RobotSockets("tcp://127.0.0.1:0")
         self._link = LinkEnd("robot", 1, clock_domain())
@@ -66,12 +68,14 @@ class StiffnessSource:
     def run(self, duration_s: float) -> None:
         """Answer, and send a stiffness every millisecond, for so long."""
         self._pacer.restart(self._clock.now())
+        last_s = self._clock.now()
         end_s = self._clock.now() + duration_s
         while (now_s := self._clock.now()) < end_s:
             self._receive(now_s)
             if self._pacer.due(now_s):
                 self._pacer.begin(now_s)
                 self._send(now_s)
+                self.longest_pause_s, last_s = max(self.longest_pause_s, now_s - last_s), now_s
             wait_for_turn(self._pacer, self._clock, self._sockets.wait)
 
     def _receive(self, now_s: float) -> None:

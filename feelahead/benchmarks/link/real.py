@@ -32,7 +32,7 @@ HEADER = struct.Struct("<qd")
 """Number and time of sending; the number −1 says hello, −2 that nothing more will come."""
 _HELLO, _END = -1, -2
 _START_DELAY_S = 0.3
-_PATIENCE_S = 10.0
+_PATIENCE_S = 60.0
 _GLANCE_S = 0.2
 
 

@@ -13,8 +13,8 @@ class Outcome:
     measured: str
     in_time: bool = True
     """Whether the times hold, too; on a busy machine they may not."""
-    tried: bool = True
-    """False when the machine did not let it come so far."""
+    judged: bool = True
+    """False when the machine did not let it come so far; what came of it is safe or not all the same."""
 
 
 @dataclass(frozen=True)

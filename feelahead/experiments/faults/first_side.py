@@ -1,5 +1,7 @@
 """Either side first: how long after the robot side listens the operator side stands where it should."""
 
+import contextlib
+import secrets
 import socket
 
 from feelahead.both_sides.processes import SideProcess
@@ -7,12 +9,12 @@ from feelahead.experiments.faults.fault import Outcome
 from feelahead.experiments.faults.rig import Rig
 
 _LIMIT_S = 1.0
-_PATIENCE_S = 30.0
+_PATIENCE_S = 120.0
 
 
 def either_side_first() -> Outcome:
     """The operator side first, then another one that finds the robot side there."""
-    control, view = _free_ports()
+    control, view = free_ports(2)
     endpoints = [f"--connect=tcp://127.0.0.1:{control}", f"--view-connect=tcp://127.0.0.1:{view}"]
     with (
         SideProcess("feelahead.experiments.faults.driver", "driver", endpoints) as early,
@@ -30,6 +32,12 @@ def either_side_first() -> Outcome:
     return Outcome(disarmed, measured, in_time=max(first_s, second_s) < _LIMIT_S)
 
 
-def _free_ports() -> tuple[int, int]:
-    with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as other:
-        return int(one.getsockname()[1]), int(other.getsockname()[1])
+def free_ports(count: int) -> list[int]:
+    """Ports for later: below those that Linux hands out by itself (32768 and up), so that nobody gets one meanwhile."""
+    ports: list[int] = []
+    for port in secrets.SystemRandom().sample(range(20_000, 30_000), 1000):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            ports.append(port)
+        if len(ports) == count:
+            break
+    return ports

@@ -3,6 +3,7 @@
 import secrets
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,12 +19,12 @@ from common.sockets.operator import OperatorSockets
 from feelahead.both_sides.processes import SideProcess
 from feelahead.experiments.faults.cable import Cable
 from feelahead.experiments.faults.fault import Outcome
-from feelahead.experiments.faults.rig import Rig
+from feelahead.experiments.faults.rig import Rig, stands
 from robot_side.operators.safety import SafetySettings
 
 T_S = SafetySettings().gap_s
 _AGE_LIMIT_S = SafetySettings().age_s + SafetySettings().jitter_s
-_RESTING_RAD_S = 0.01
+_ARRIVAL_S = 30.0
 P99_S, MOST_S = T_S + 0.005, T_S + 0.020
 
 Advance = Callable[[], None]
@@ -39,27 +40,29 @@ class Onsets:
         """By the robot side's clock, which needs the processor to notice."""
         self.missed = 0
 
-    def take(self, rig: Rig) -> None:
-        """Wait for one."""
-        slowed_s, disarmed_s = rig.stop_of()
+    def take(self, rig: Rig, *, evenly: bool) -> dict[str, Any]:
+        """Wait for one, if the arm was driven evenly, and in any case until it stands; the counters then."""
+        slowed_s, disarmed_s = rig.stop_of() if evenly else (None, None)
         if slowed_s is None or disarmed_s is None:
             self.missed += 1
-            return
+            return rig.rest()
         self.slowed_s.append(slowed_s)
         self.disarmed_s.append(disarmed_s)
+        return rig.rest()
 
     def outcome(self, *, safe: bool = True) -> Outcome:
         """Not before T; by T + 5 ms (p99) and T + 20 ms (max)."""
         if not self.slowed_s:
-            return Outcome(safe, "the stream broke by itself each time: the machine is too busy", in_time=False)
-        early = sum(one < T_S - 1e-3 for one in self.slowed_s)
-        in_time = all(
+            return Outcome(
+                safe, "the stream broke by itself each time: the machine is too busy", in_time=False, judged=not safe
+            )
+        in_time = min(self.slowed_s) >= T_S - 1e-3 and all(
             np.quantile(values, 0.99) <= P99_S and max(values) <= MOST_S for values in (self.slowed_s, self.disarmed_s)
         )
         measured = f"arm {_spread(self.slowed_s)}; robot side {_spread(self.disarmed_s)} ms; n = {len(self.slowed_s)}"
         if self.missed:
             measured += f", and {self.missed} in which the machine was too busy to drive evenly before"
-        return Outcome(safe and early == 0, measured, in_time)
+        return Outcome(safe, measured, in_time)
 
 
 def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
@@ -71,12 +74,11 @@ def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
         rig.until(driver, "session", *OWNING)
         successor = rig.driver()
         rig.until(successor, "session", "observing")
-        rig.drive(driver)
+        evenly = rig.drive(driver)
         rig.lines()
         killed_s = rig.clock.now()
         rig.signal(driver, signal.SIGKILL)
-        onsets.take(rig)
-        rig.wait(0.1)
+        safe &= stands(onsets.take(rig, evenly=evenly))
         rig.until(successor, "session", *OWNING)
         passed_s.append(rig.owned_s[successor.process_id] - killed_s)
         safe &= stands(rig.figures())
@@ -84,7 +86,7 @@ def killed(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     _end(rig, driver)
     outcome = onsets.outcome(safe=safe)
     lease = f"; lease passed on within {max(passed_s):.2f} s"
-    return Outcome(outcome.safe, outcome.measured + lease, outcome.in_time and max(passed_s) < 1.0)
+    return replace(outcome, measured=outcome.measured + lease, in_time=outcome.in_time and max(passed_s) < 1.0)
 
 
 def stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
@@ -92,12 +94,11 @@ def stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     onsets, safe = Onsets(), True
     driver = rig.driver()
     for _ in rig.rounds(repeats, advance, 180.0):
-        rig.drive(driver)
+        evenly = rig.drive(driver)
         rig.lines()
         rig.signal(driver, signal.SIGSTOP)
-        onsets.take(rig)
+        told = onsets.take(rig, evenly=evenly)["told_to_move"]
         rig.wait(0.2)
-        told = rig.figures()["told_to_move"]
         rig.signal(driver, signal.SIGCONT)
         rig.until(driver, "phase", "rest")
         figures = rig.figures()
@@ -114,44 +115,49 @@ def cut(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     with Cable(ports[0]) as control, Cable(ports[1]) as view:
         driver = rig.driver(f"tcp://127.0.0.1:{control.port}", f"tcp://127.0.0.1:{view.port}")
         for _ in rig.rounds(repeats, advance, 120.0):
-            rig.drive(driver)
+            evenly = rig.drive(driver)
             rig.lines()
             control.cut()
-            onsets.take(rig)
+            told = onsets.take(rig, evenly=evenly)["told_to_move"]
             rig.wait(0.45)
-            told = rig.figures()["told_to_move"]
             control.mend()
             rig.wait(0.15)
+            rig.until(driver, "phase", "rest")
             figures = rig.figures()
             oldest_s = max(oldest_s, figures["oldest_accepted_s"])
             safe &= figures["told_to_move"] == told and stands(figures)
-            rig.until(driver, "phase", "rest")
         _end(rig, driver)
     outcome = onsets.outcome(safe=safe and oldest_s <= _AGE_LIMIT_S)
-    return Outcome(outcome.safe, f"{outcome.measured}; oldest accepted {1e3 * oldest_s:.0f} ms", outcome.in_time)
+    return replace(outcome, measured=f"{outcome.measured}; oldest accepted {1e3 * oldest_s:.0f} ms")
 
 
 def robot_stopped(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     """SIGSTOP of the robot side for two seconds while the operator goes on pulling, then SIGCONT."""
-    applied, safe, oldest_s = 0, True, 0.0
+    applied, safe, oldest_s, in_motion = 0, True, 0.0, 0
     for _ in rig.rounds(repeats, advance, 30.0):
         driver = rig.driver()
-        rig.drive(driver)
+        rig.lines()
+        evenly = rig.drive(driver)
+        drove_s = rig.phase(driver)["time_s"]
         rig.signal(rig.robot, signal.SIGSTOP)
         rig.wait(2.0)
-        rig.lines()
+        broke = any("stop" in line and line["stop"] >= drove_s for line in rig.lines())
         resumed_s = rig.clock.now()
         rig.signal(rig.robot, signal.SIGCONT)
-        stop = rig.until_line("stop")
+        if evenly and not broke:
+            in_motion += 1
+            safe &= rig.until_line("stop")["stop"] >= resumed_s - 0.1
         rig.wait(0.3)
-        figures = rig.figures()
+        figures = rig.rest()
         oldest_s = max(oldest_s, figures["oldest_accepted_s"])
         applied += figures["told_since_pause"]
         safe &= stands(figures)
-        safe &= stop["stop"] >= resumed_s - 0.1
         _end(rig, driver)
     safe &= applied == 0 and oldest_s <= _AGE_LIMIT_S
-    return Outcome(safe, f"{applied} old commands applied, disarmed; oldest accepted {1e3 * oldest_s:.0f} ms")
+    measured = f"{applied} old commands applied, disarmed; oldest accepted {1e3 * oldest_s:.0f} ms"
+    if not in_motion:
+        measured += "; the stream broke by itself each time: the machine is too busy"
+    return Outcome(safe, measured, judged=in_motion > 0 or not safe)
 
 
 def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
@@ -161,7 +167,8 @@ def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     before = rig.figures()
     link = LinkEnd("operator", secrets.randbits(53), clock_domain())
     sent = 0
-    with OperatorSockets(rig.listening["control"], rig.listening["view"]) as sockets:
+    # What is sent is to arrive, however late: no heartbeat of a busy machine ends the connection.
+    with OperatorSockets(rig.listening["control"], rig.listening["view"], heartbeat_timeout_s=60.0) as sockets:
         token = 0
         for number in range(50 * repeats):
             now_s = rig.clock.now()
@@ -179,11 +186,15 @@ def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
             )
             sent += sockets.send(encode(command)) + sockets.send(encode(stranger))
             rig.wait(0.004)
-        advance()
-    figures = rig.figures()
-    # What comes too fast for a tick is dropped unread, and counted as such.
-    counters = ("commands_of_non_owners", "rejected", "unread")
-    counted = sum(figures[name] - before[name] for name in counters)
+            if number % 50 == 49:
+                advance()
+        # What comes too fast for a tick is dropped unread, and counted as such.
+        counters = ("commands_of_non_owners", "rejected", "unread")
+        arrived_by_s = rig.clock.now() + _ARRIVAL_S
+        while (
+            counted := sum((figures := rig.figures())[name] - before[name] for name in counters)
+        ) < sent and rig.clock.now() < arrived_by_s:
+            pass
     driving = rig.phase(driver)["phase"] == "drive" and figures["state"] == "armed"
     _end(rig, driver)
     # The owner's epoch is known since it began to drive.
@@ -191,9 +202,8 @@ def intruders(rig: Rig, repeats: int, advance: Advance) -> Outcome:
     measured = f"{sent} sent, {counted} counted, {applied} applied; the owner drove on: {driving}"
     if figures["granted"] != before["granted"]:
         # Starved by the machine, the owner lost its lease, and the observer owns it rightly.
-        return Outcome(True, "the owner fell silent by itself: the machine is too busy", in_time=False, tried=False)
-    # The last ones may still be under way.
-    return Outcome(sent > 0 and applied == 0 and counted >= sent - 2, measured, in_time=driving)
+        return Outcome(True, "the owner fell silent by itself: the machine is too busy", in_time=False, judged=False)
+    return Outcome(sent > 0 and applied == 0 and counted >= sent, measured, in_time=driving)
 
 
 def storm(rig: Rig, repeats: int, advance: Advance) -> Outcome:
@@ -225,11 +235,6 @@ def resident_kb(process: SideProcess) -> int:
         if line.startswith("VmRSS:"):
             return int(line.split()[1])
     raise ValueError(f"process {process.process_id} tells no VmRSS; valid: a running process on Linux")
-
-
-def stands(figures: dict[str, Any]) -> bool:
-    """Whether the robot is disarmed and at rest."""
-    return bool(figures["state"] == "disarmed" and figures["speed_rad_s"] < _RESTING_RAD_S)
 
 
 def _end(rig: Rig, driver: SideProcess) -> None:

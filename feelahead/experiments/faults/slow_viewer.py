@@ -8,10 +8,12 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from feelahead.experiments.faults.fault import Outcome
-from feelahead.experiments.faults.rig import Rig
+from feelahead.experiments.faults.rig import Rig, stands
 
 _VIEWERS = 20
 _WINDOW_S = 3.0
+_TICKED_WINDOWS = 5
+"""Tenths of a second that must have been counted, however slowly a busy machine does so."""
 _MOST_CHANGE = 0.10
 
 # A subscriber's part of the handshake without security, as ZMTP 3.0 (rfc.zeromq.org/spec/23) lays it down.
@@ -38,28 +40,31 @@ def slow_viewer(rig: Rig, repeats: int, advance: Callable[[], None]) -> Outcome:
     driving = rig.phase(driver)["phase"] == "drive" and rig.figures()["state"] == "armed"
     stops = "; ".join(rig.stops) or "none"
     driver.stop()
-    rig.wait(1.0)
+    rested = stands(rig.rest())
     before_us, during_us = float(np.median(alone_us)), float(np.median(watched_us))
     change = during_us / before_us - 1.0
     measured = (
         f"tick p99 {before_us:.0f} us alone, {during_us:.0f} us with {_VIEWERS} of them ({100.0 * change:+.0f} %)"
     )
-    # A stop is safe, whatever broke the stream.
+    # A stop is safe, whatever broke the stream; to be deaf to the owner's silence would not be.
     in_time = driving and stops == "none" and change < _MOST_CHANGE
-    return Outcome(True, f"{measured}; stops: {stops}", in_time)
+    return Outcome(rested, f"{measured}; stops: {stops}", in_time)
 
 
 def _ticks_us(rig: Rig) -> list[float]:
     """The p99 of each tenth of a second in a window."""
     rig.lines()
     rig.wait(_WINDOW_S)
-    return [line["figures"]["tick_p99_us"] for line in rig.lines() if "figures" in line]
+    ticks_us = [line["figures"]["tick_p99_us"] for line in rig.lines() if "figures" in line]
+    while len(ticks_us) < _TICKED_WINDOWS:
+        ticks_us.append(rig.figures()["tick_p99_us"])
+    return ticks_us
 
 
 def _deaf_subscriber(port: int) -> socket.socket:
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-    connection.settimeout(2.0)
+    connection.settimeout(60.0)
     connection.connect(("127.0.0.1", port))
     connection.sendall(_GREETING)
     received = 0

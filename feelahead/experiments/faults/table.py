@@ -97,9 +97,9 @@ def try_faults(arguments: Sequence[str]) -> int:
 
 
 def verdict(outcome: Outcome) -> str:
-    """Holds, late, unsafe, or not tried, which is no success either."""
-    if not outcome.tried:
-        return "not tried"
+    """Holds, late, unsafe, or not judged, which is no success either."""
+    if not outcome.judged:
+        return "not judged"
     if not outcome.safe:
         return "UNSAFE"
     return "holds" if outcome.in_time else "safe, but late"
@@ -119,18 +119,18 @@ def _try_real(repeats: int, progress: Progress, add: Callable[[str, str, str, Ou
     bar = progress.add_task("real processes", total=1 + sum(counts) + pulls)
     add("either side starts first", "disarmed until healthy", "link up in 1 s", either_side_first())
     progress.advance(bar)
-    with Rig() as rig:
-        for (name, behaviour, number, run, _), count in zip(REAL_ROWS, counts, strict=True):
-            progress.update(bar, description=f"real processes: {name}")
-            try:
+    for (name, behaviour, number, run, _), count in zip(REAL_ROWS, counts, strict=True):
+        progress.update(bar, description=f"real processes: {name}")
+        try:
+            # Each row has a rig of its own: what one leaves behind is nothing to the next.
+            with Rig() as rig:
                 outcome = run(rig, count, lambda: progress.advance(bar))
-            except RigError as error:
-                outcome = Outcome(False, str(error), tried=False)
-                rig.end_drivers()
-            add(name, behaviour, number, outcome)
+        except RigError as error:
+            outcome = Outcome(False, str(error), judged=False)
+        add(name, behaviour, number, outcome)
     progress.update(bar, description="real processes: cable pulled")
     try:
         outcome = unplugged(pulls, lambda: progress.advance(bar))
     except RigError as error:
-        outcome = Outcome(False, str(error), tried=False)
+        outcome = Outcome(False, str(error), judged=False)
     add("cable pulled (network namespaces)", "the same as kill -9; the same once it is back", _DECELERATION, outcome)

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from common.errors import FeelaheadError
 from feelahead.experiments.faults.fault import Outcome
-from feelahead.experiments.faults.real_faults import Advance, Onsets, stands
-from feelahead.experiments.faults.rig import Rig, RigError
+from feelahead.experiments.faults.real_faults import Advance, Onsets
+from feelahead.experiments.faults.rig import Rig, RigError, stands
 
 _ROBOT, _OPERATOR = "10.91.83.1", "10.91.83.2"
 """Inside namespaces of our own, where no other network is."""
@@ -30,18 +30,17 @@ def unplugged(repeats: int, advance: Advance) -> Outcome:
         with _namespaces() as (robot, operator), Rig(f"tcp://{_ROBOT}:5555", ["--insecure"], robot) as rig:
             driver = rig.driver(before=operator)
             for _ in rig.rounds(repeats, advance, 120.0):
-                rig.drive(driver)
+                evenly = rig.drive(driver)
                 rig.lines()
                 _ip("-n", robot[-1], "link", "set", "robot0", "down")
-                onsets.take(rig)
+                told = onsets.take(rig, evenly=evenly)["told_to_move"]
                 rig.wait(0.5)
-                told = rig.figures()["told_to_move"]
                 _ip("-n", robot[-1], "link", "set", "robot0", "up")
                 rig.until(driver, "phase", "rest")
                 figures = rig.figures()
                 safe &= figures["told_to_move"] == told and stands(figures)
     except NotPermittedError as error:
-        return Outcome(True, f"skipped: {error}", tried=False)
+        return Outcome(True, f"skipped: {error}", judged=False)
     return onsets.outcome(safe=safe)
 
 

@@ -9,7 +9,8 @@ from types import TracebackType
 from typing import Final, Protocol
 
 _WATCHDOG = "operator_side.dualsense.hid.release_watchdog"
-_END_TIMEOUT_S = 0.5
+_END_TIMEOUT_S = 2.0
+"""It releases what it holds and ends within milliseconds, but on a busy machine its turn may be late."""
 MOST_REPLACEMENTS: Final = 3
 """Whatever ends so many watchdogs will end the next one, too."""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"

@@ -117,6 +117,7 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert "--probability" in capsys.readouterr().out
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_the_line_is_the_same_where_no_box_can_be_drawn(encoding: str) -> None:
     code = (

@@ -11,6 +11,7 @@ import pytest
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")
+LIMIT_S = 120.0
 
 
 def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
@@ -31,7 +32,7 @@ sys.argv = ["command"]
 from common.command.launch import launch
 def load():
     print("importing", flush=True)
-    time.sleep(60)
+    time.sleep(300)
 launch("command", load)
 """
 SLOW_START = """
@@ -40,7 +41,7 @@ sys.argv = ["command"]
 from common.command.launch import launch
 def command(arguments):
     print("building", flush=True)
-    time.sleep(60)
+    time.sleep(300)
 launch("command", lambda: command)
 """
 
@@ -52,7 +53,7 @@ import common.command.command_line
 from common.command.launch import launch
 def run_command(program, command):
     print("ending", flush=True)
-    time.sleep(60)
+    time.sleep(300)
 common.command.command_line.run_command = run_command
 launch("command", lambda: None)
 """
@@ -66,7 +67,7 @@ def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Sign
         assert process.stdout is not None
         assert process.stdout.readline() in ("importing\n", "building\n", "ending\n")
         process.send_signal(number)
-        _, complaint = process.communicate(timeout=20)
+        _, complaint = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, complaint) == (0, "")
 
 
@@ -74,7 +75,7 @@ def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Sign
 @pytest.mark.parametrize("module", MODULES)
 def test_every_command_says_its_version(module: str) -> None:
     with start("-m", module, "--version") as process:
-        said, complaint = process.communicate(timeout=20)
+        said, complaint = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, complaint) == (0, "")
     assert said.split()[1].count(".") == 2
 
@@ -91,17 +92,18 @@ main()
 @pytest.mark.processes
 def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
     with start("-c", WITHOUT_MUJOCO) as process:
-        _, complaint = process.communicate(timeout=60)
+        _, complaint = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 2
     assert complaint == (
         "feelahead-robot: mujoco is not installed on this machine; valid: pip install 'feelahead[robot]'\n"
     )
 
 
+@pytest.mark.processes
 def test_a_module_of_ours_that_is_missing_is_a_fault_and_not_an_installation() -> None:
     code = "import sys\nfrom common.command.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
     with start("-c", code) as process:
-        _, complaint = process.communicate(timeout=20)
+        _, complaint = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 1
     assert "ModuleNotFoundError" in complaint
 
@@ -113,7 +115,7 @@ def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
         "launch('x', lambda: lambda arguments: print('5 \\u00b1 1 \\u00b5s') or 0)"
     )
     with start("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") as process:
-        said, complaint = process.communicate(timeout=20)
+        said, complaint = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, said, complaint) == (0, "5 ? 1 ?s\n", "")
 
 
@@ -124,7 +126,7 @@ def test_a_reader_that_goes_away_is_no_fault() -> None:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
-        assert process.wait(20) == 0
+        assert process.wait(LIMIT_S) == 0
         assert process.stderr.read() == ""
 
 

@@ -123,6 +123,7 @@ def test_a_document_without_marks_is_refused() -> None:
         with_generated_part(f"{END} the wrong way round {BEGIN}", "text")
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize(("flag", "code"), [("--writ", 2), ("--help", 0)])
 def test_the_command_says_what_it_takes(flag: str, code: int) -> None:
     done = subprocess.run(

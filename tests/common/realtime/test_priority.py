@@ -13,6 +13,7 @@ def run(code: str) -> str:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
+@pytest.mark.processes
 def test_it_says_whether_the_priority_was_granted() -> None:
     granted, niceness = run(
         "from common.realtime.priority import raise_priority; import os;"
@@ -22,17 +23,21 @@ def test_it_says_whether_the_priority_was_granted() -> None:
     assert int(niceness) <= os.getpriority(os.PRIO_PROCESS, 0)
 
 
+@pytest.mark.processes
 def test_every_thread_is_raised_not_only_the_one_that_asks() -> None:
     said = run(
-        "import os, threading, time\nfrom common.realtime.priority import raise_priority\n"
-        "threading.Thread(target=time.sleep, args=(0.5,)).start()\n"
+        "import os, threading\nfrom common.realtime.priority import raise_priority\n"
+        "waits = threading.Event()\n"
+        "threading.Thread(target=waits.wait).start()\n"
         "granted = raise_priority()\n"
         "levels = {os.getpriority(os.PRIO_PROCESS, int(thread)) for thread in os.listdir('/proc/self/task')}\n"
-        "print(granted, len(os.listdir('/proc/self/task')), len(levels))"
+        "print(granted, len(os.listdir('/proc/self/task')), len(levels))\n"
+        "waits.set()"
     )
     assert said.endswith("2 1")
 
 
+@pytest.mark.processes
 def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
     said = run(
         "import os\nfrom common.realtime.priority import make_realtime\n"

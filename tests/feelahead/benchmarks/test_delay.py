@@ -131,6 +131,7 @@ def test_bad_arguments_are_one_line(arguments: list[str], complaint: str) -> Non
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.processes
 def test_it_runs_as_a_module_and_refuses_with_code_2() -> None:
     run = subprocess.run(
         [sys.executable, "-m", "feelahead", "bench", "delay", "--runs", "-3"],

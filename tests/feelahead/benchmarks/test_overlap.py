@@ -207,6 +207,7 @@ def test_corners_for_the_package_are_in_its_order() -> None:
         assert np.all(np.einsum("ni,ni->n", np.cross(sides[0], sides[1]), sides[2]) >= 0.0), name
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(
     all(shutil.which(name) is None for name in ("c++", "g++", "clang++")), reason="needs a C++ compiler"
 )

@@ -154,6 +154,8 @@ def operator(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[TravelCalibr
     """Runs the operator side for a moment; what it read its controller through."""
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
     monkeypatch.setattr(operator_side.main, "load_backend", lambda: backend)
+    # It would be this process's, and stay so.
+    monkeypatch.setattr(operator_side.main, "raise_priority", lambda: False)
     taken: list[TravelCalibration] = []
     monkeypatch.setattr(OperatorSide, "calibrate", lambda _, calibration: taken.append(calibration))
 

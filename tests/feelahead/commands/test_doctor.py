@@ -200,6 +200,7 @@ def test_a_port_that_is_taken_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         assert facts.port_troubles() == {port: "Address already in use"}
 
 
+@pytest.mark.processes
 def test_what_cannot_be_imported_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(facts, "EXTRAS", {"robot": ()})
     monkeypatch.setattr(facts, "modules_of", lambda *_: ("json", "no_such_module"))
@@ -257,6 +258,7 @@ def test_what_is_to_be_copied_is_not_wrapped() -> None:
     assert any("numba [gone]" in line for line in lines)
 
 
+@pytest.mark.processes
 def test_here_it_tells_of_everything(capsys: pytest.CaptureFixture[str]) -> None:
     code = command(["doctor", "--json"])
     told = json.loads(capsys.readouterr().out)

@@ -149,6 +149,7 @@ def test_the_command_is_one_of_feelaheads(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert opened == [UHID_PATH]
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(UHID_PATH.exists(), reason="this machine has /dev/uhid")
 def test_without_uhid_it_says_in_one_line_what_to_do() -> None:
     done = subprocess.run(

@@ -40,6 +40,7 @@ def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None
     assert 250 < int(sent[1]) <= 300
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize(
     "arguments", [["--minutes", "0"], ["--minutes", "nan"], ["--link", "delay fast"], ["--seed", "-1"]]
 )

@@ -316,6 +316,7 @@ def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch
     assert rows == []
 
 
+@pytest.mark.processes
 def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     program = (
         "import feelahead.both_sides.loopback, robot_side.main\n"

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 
 import pytest
 
+import operator_side.dualsense.hid.background_writes
 from common.errors import DeviceError
 from operator_side.dualsense.effects.official import Feedback, Off
-from operator_side.dualsense.hid.background_writes import STALL_S, BackgroundWrites
+from operator_side.dualsense.hid.background_writes import CLOSE_TIMEOUT_S, STALL_S, BackgroundWrites
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
@@ -16,7 +17,7 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
 )
 
-LIMIT_S = 10.0
+LIMIT_S = 60.0
 L2 = build_output_report(OutputReport(l2=Feedback(3, 6)))
 
 
@@ -52,7 +53,9 @@ class SlowDevice:
 
 
 @pytest.fixture
-def device() -> Iterator[SlowDevice]:
+def device(monkeypatch: pytest.MonkeyPatch) -> Iterator[SlowDevice]:
+    # However late the machine lets the thread end.
+    monkeypatch.setattr(operator_side.dualsense.hid.background_writes, "CLOSE_TIMEOUT_S", LIMIT_S)
     slow = SlowDevice()
     yield slow
     slow.let.release(1000)
@@ -114,7 +117,10 @@ def test_a_close_drops_what_waits_and_releases(device: SlowDevice) -> None:
     assert writes.released
 
 
-def test_a_write_that_never_returns_keeps_nobody_and_is_not_called_released(device: SlowDevice) -> None:
+def test_a_write_that_never_returns_keeps_nobody_and_is_not_called_released(
+    device: SlowDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(operator_side.dualsense.hid.background_writes, "CLOSE_TIMEOUT_S", CLOSE_TIMEOUT_S)
     writes = BackgroundWrites(device)
     writes.write(L2, 0.0)
     assert device.entered.acquire(timeout=LIMIT_S)

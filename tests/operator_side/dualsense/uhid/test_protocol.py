@@ -160,6 +160,7 @@ int main(void) {
 """
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(not HEADER.exists(), reason="no linux/uhid.h")
 def test_the_layout_is_that_of_the_header(tmp_path: Path) -> None:
     (tmp_path / "layout.c").write_text(_PROGRAM)

@@ -1,0 +1,34 @@
+"""What holds for every test: no time of a busy machine fails it, and whoever starts a process carries the marker."""
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+# The same examples each time, however long the machine takes for one.
+settings.register_profile("here", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("here")
+
+STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
+unmarked: list[str] = []
+"""The test that runs, unless it carries the marker."""
+
+
+def refuse_processes(event: str, _: tuple[Any, ...]) -> None:
+    if unmarked and event in STARTS:
+        raise AssertionError(f"{unmarked[0]} starts a process and carries neither marker, processes nor install")
+
+
+sys.addaudithook(refuse_processes)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    if item.get_closest_marker("processes") is None and item.get_closest_marker("install") is None:
+        unmarked.append(item.nodeid)
+    try:
+        return (yield)
+    finally:
+        unmarked.clear()
