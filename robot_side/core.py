@@ -23,7 +23,7 @@ from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
 from robot_side.objects.target import next_target, object_centers, target_index
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
-from robot_side.outgoing import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
+from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
 from robot_side.sensing import AheadSensing, Sensed
 from robot_side.stiffness.predicted_contact import Contact, ContactPredictor
 

@@ -26,7 +26,7 @@ from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
-from robot_side.outgoing import Outgoing
+from robot_side.outgoing_messages import Outgoing
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3

@@ -19,12 +19,12 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
+from robot_side.overlap.closed_forms.ball import sphere_overlap
+from robot_side.overlap.closed_forms.half_space import half_space_overlap
+from robot_side.overlap.closed_forms.solid import Overlap, Overlaps
 from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
-from robot_side.overlap.primitives.ball import sphere_overlap
-from robot_side.overlap.primitives.half_space import half_space_overlap
-from robot_side.overlap.primitives.solid import Overlap, Overlaps
 
 PAIRS_PER_THREAD = 8192
 """A thread is worth starting for so many boxes or tetrahedra, nearly a millisecond of work."""

@@ -25,8 +25,8 @@ import numpy.typing as npt
 
 from common.arrays import FloatArray
 from robot_side.overlap.checks.arguments import broadcast, directions, lengths, numbers, rotations
+from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
-from robot_side.overlap.primitives.solid import Overlaps
 
 Array = npt.ArrayLike
 

@@ -29,12 +29,12 @@ ARROWS = """
     robot_side/compiled: common
     robot_side/overlap/checks: common robot_side/compiled
     robot_side/overlap/digits: common robot_side/compiled
-    robot_side/overlap/primitives: common robot_side/compiled robot_side/overlap/digits
-    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/primitives
-    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/primitives
+    robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
+    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
+    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
     robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
-        robot_side/overlap/primitives
-    robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/primitives
+        robot_side/overlap/closed_forms
+    robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
         robot_side/overlap/lanes robot_side/overlap/precise robot_side/overlap/meshes
     robot_side/operators: common common/protocol
     robot_side/arm: common common/protocol robot_side/compiled

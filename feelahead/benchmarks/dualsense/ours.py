@@ -18,7 +18,8 @@ from feelahead.benchmarks.dualsense.conduct import (
 )
 from feelahead.benchmarks.dualsense.player import CythonBackend, Player
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects.official import DEBUG_CODES, Feedback
+from operator_side.dualsense.effects.effect_codes import DEBUG_CODES
+from operator_side.dualsense.effects.official import Feedback
 from operator_side.dualsense.hid.connection import Connection, ConnectionState
 from operator_side.dualsense.hid.device import HidDualSense
 from operator_side.dualsense.hid.port import OpenController

@@ -18,7 +18,7 @@ from feelahead.benchmarks.dualsense.conduct import (
     varied_reports,
 )
 from feelahead.benchmarks.dualsense.player import Player, ctypes_binding
-from operator_side.dualsense.effects.official import DEBUG_CODES
+from operator_side.dualsense.effects.effect_codes import DEBUG_CODES
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.transport import Transport

@@ -17,10 +17,10 @@ from common.errors import ConfigurationError
 from feelahead.benchmarks.overlap.accuracy import draw_samples, measure_accuracy
 from feelahead.benchmarks.overlap.classes import MAKERS, frozen_classes
 from feelahead.benchmarks.overlap.distances import measure_distances
-from feelahead.benchmarks.overlap.figures import draw
 from feelahead.benchmarks.overlap.goals import judge
 from feelahead.benchmarks.overlap.meshes import measure_meshes
 from feelahead.benchmarks.overlap.peers import SDIST, HeaderPeer, PythonPeer
+from feelahead.benchmarks.overlap.plots import draw
 from feelahead.benchmarks.overlap.speed import measure_speed, partial_pairs
 from feelahead.benchmarks.overlap.stress import count_failures
 from feelahead.benchmarks.overlap.timing import available_cores

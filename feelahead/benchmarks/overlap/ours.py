@@ -13,7 +13,7 @@ from common.arrays import FloatArray
 from feelahead.benchmarks.overlap.pairs import Pairs, Solid
 from robot_side import overlap
 from robot_side.overlap import kernels
-from robot_side.overlap.primitives.solid import Overlaps
+from robot_side.overlap.closed_forms.solid import Overlaps
 
 _PUBLIC: dict[Solid, Callable[..., Any]] = {
     "tetrahedron": overlap.sphere_tetrahedron,

@@ -24,7 +24,7 @@ from feelahead.experiments.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
-from robot_side.outgoing import Outgoing
+from robot_side.outgoing_messages import Outgoing
 from robot_side.settings import RobotSettings
 
 PROGRAM = "python -m feelahead.experiments.faults.watched_robot"

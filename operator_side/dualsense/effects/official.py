@@ -8,8 +8,17 @@ from collections.abc import Callable
 from typing import Final, Literal, overload
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects.effect_packing import (
-    DEBUG_CODES,
+from operator_side.dualsense.effects.effect_codes import FEEDBACK_CODE, OFF_CODE, VIBRATION_CODE, WEAPON_CODE
+from operator_side.dualsense.effects.resisting_effects import (
+    Feedback,
+    MultiPositionFeedback,
+    Off,
+    SlopeFeedback,
+    Weapon,
+)
+from operator_side.dualsense.effects.unofficial_effects import UNOFFICIAL_DECODERS, UnofficialEffect
+from operator_side.dualsense.effects.vibration_effects import MultiPositionVibration, Vibration
+from operator_side.dualsense.effects.zone_packing import (
     EFFECT_LENGTH,
     MAX_STRENGTH,
     ZONE_COUNT,
@@ -18,21 +27,8 @@ from operator_side.dualsense.effects.effect_packing import (
     unpack_ends,
     unpack_zones,
 )
-from operator_side.dualsense.effects.resisting_effects import (
-    FEEDBACK_CODE,
-    OFF_CODE,
-    WEAPON_CODE,
-    Feedback,
-    MultiPositionFeedback,
-    Off,
-    SlopeFeedback,
-    Weapon,
-)
-from operator_side.dualsense.effects.unofficial_effects import UNOFFICIAL_DECODERS, UnofficialEffect
-from operator_side.dualsense.effects.vibration_effects import VIBRATION_CODE, MultiPositionVibration, Vibration
 
 __all__ = [
-    "DEBUG_CODES",
     "EFFECT_LENGTH",
     "MAX_STRENGTH",
     "ZONE_COUNT",

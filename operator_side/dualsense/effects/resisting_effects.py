@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
 from common.checks import check_integer, check_integers
-from operator_side.dualsense.effects.effect_packing import (
+from operator_side.dualsense.effects.effect_codes import FEEDBACK_CODE, OFF_CODE, WEAPON_CODE
+from operator_side.dualsense.effects.zone_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
@@ -19,9 +20,6 @@ from operator_side.dualsense.effects.effect_packing import (
     stepped,
 )
 
-OFF_CODE: Final = 0x05
-FEEDBACK_CODE: Final = 0x21
-WEAPON_CODE: Final = 0x25
 _LAST_ZONE: Final = ZONE_COUNT - 1
 
 

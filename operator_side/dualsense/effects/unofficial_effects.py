@@ -9,7 +9,15 @@ from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
 from common.checks import check_integer
-from operator_side.dualsense.effects.effect_packing import (
+from operator_side.dualsense.effects.effect_codes import (
+    BOW_CODE,
+    GALLOPING_CODE,
+    MACHINE_CODE,
+    SIMPLE_FEEDBACK_CODE,
+    SIMPLE_VIBRATION_CODE,
+    SIMPLE_WEAPON_CODE,
+)
+from operator_side.dualsense.effects.zone_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     between,
@@ -17,9 +25,6 @@ from operator_side.dualsense.effects.effect_packing import (
     packed,
     unpack_ends,
 )
-
-_BOW_CODE, _GALLOPING_CODE, _MACHINE_CODE = 0x22, 0x23, 0x27
-_SIMPLE_FEEDBACK_CODE, _SIMPLE_WEAPON_CODE, _SIMPLE_VIBRATION_CODE = 0x01, 0x02, 0x06
 
 
 def _check_ends(start: int, end: int, highest: int) -> None:
@@ -58,7 +63,7 @@ class Bow:
 
     def encode(self) -> bytes:
         """The code, the mask of the two zones and both forces less one: 11 bytes."""
-        return packed(_BOW_CODE, *pack_ends(self.start, self.end), (self.snap - 1) << 3 | self.strength - 1)
+        return packed(BOW_CODE, *pack_ends(self.start, self.end), (self.snap - 1) << 3 | self.strength - 1)
 
 
 @final
@@ -88,7 +93,7 @@ class Galloping:
     def encode(self) -> bytes:
         """The code, the mask of the two zones, both beats and the frequency: 11 bytes."""
         feet = self.first_foot << 3 | self.second_foot
-        return packed(_GALLOPING_CODE, *pack_ends(self.start, self.end), feet, self.frequency_hz)
+        return packed(GALLOPING_CODE, *pack_ends(self.start, self.end), feet, self.frequency_hz)
 
 
 @final
@@ -121,7 +126,7 @@ class Machine:
     def encode(self) -> bytes:
         """The code, the mask of the two zones, both amplitudes, the frequency and the period: 11 bytes."""
         both = self.amplitude_b << 3 | self.amplitude_a
-        return packed(_MACHINE_CODE, *pack_ends(self.start, self.end), both, self.frequency_hz, self.period_ds)
+        return packed(MACHINE_CODE, *pack_ends(self.start, self.end), both, self.frequency_hz, self.period_ds)
 
 
 @final
@@ -139,7 +144,7 @@ class SimpleFeedback:
 
     def encode(self) -> bytes:
         """The code, the position and the strength: 11 bytes."""
-        return packed(_SIMPLE_FEEDBACK_CODE, self.position, self.strength)
+        return packed(SIMPLE_FEEDBACK_CODE, self.position, self.strength)
 
 
 @final
@@ -158,7 +163,7 @@ class SimpleWeapon:
 
     def encode(self) -> bytes:
         """The code, both positions and the strength: 11 bytes."""
-        return packed(_SIMPLE_WEAPON_CODE, self.start, self.end, self.strength)
+        return packed(SIMPLE_WEAPON_CODE, self.start, self.end, self.strength)
 
 
 @final
@@ -177,7 +182,7 @@ class SimpleVibration:
 
     def encode(self) -> bytes:
         """The code, the frequency, the amplitude and the position: 11 bytes."""
-        return packed(_SIMPLE_VIBRATION_CODE, self.frequency_hz, self.amplitude, self.position)
+        return packed(SIMPLE_VIBRATION_CODE, self.frequency_hz, self.amplitude, self.position)
 
 
 UnofficialEffect = Bow | Galloping | Machine | SimpleFeedback | SimpleWeapon | SimpleVibration
@@ -196,11 +201,11 @@ def _decode_machine(encoded: bytes) -> Machine:
 
 
 UNOFFICIAL_DECODERS: Final[dict[int, Callable[[bytes], UnofficialEffect]]] = {
-    _BOW_CODE: _decode_bow,
-    _GALLOPING_CODE: _decode_galloping,
-    _MACHINE_CODE: _decode_machine,
-    _SIMPLE_FEEDBACK_CODE: lambda encoded: SimpleFeedback(*encoded[1:3]),
-    _SIMPLE_WEAPON_CODE: lambda encoded: SimpleWeapon(*encoded[1:4]),
-    _SIMPLE_VIBRATION_CODE: lambda encoded: SimpleVibration(*encoded[1:4]),
+    BOW_CODE: _decode_bow,
+    GALLOPING_CODE: _decode_galloping,
+    MACHINE_CODE: _decode_machine,
+    SIMPLE_FEEDBACK_CODE: lambda encoded: SimpleFeedback(*encoded[1:3]),
+    SIMPLE_WEAPON_CODE: lambda encoded: SimpleWeapon(*encoded[1:4]),
+    SIMPLE_VIBRATION_CODE: lambda encoded: SimpleVibration(*encoded[1:4]),
 }
 """What reads each code; ValueError for a field out of its range. decode_effect checks the rest."""

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import ClassVar, Final, final
 
 from common.checks import check_integer, check_integers
-from operator_side.dualsense.effects.effect_packing import (
+from operator_side.dualsense.effects.effect_codes import VIBRATION_CODE
+from operator_side.dualsense.effects.resisting_effects import Off
+from operator_side.dualsense.effects.zone_packing import (
     MAX_STRENGTH,
     NO_ZONES,
     ZONE_COUNT,
     pack_zones,
     stepped,
 )
-from operator_side.dualsense.effects.resisting_effects import Off
 
-VIBRATION_CODE: Final = 0x26
 _LAST_ZONE: Final = ZONE_COUNT - 1
 _MAX_FREQUENCY_HZ: Final = 255
 

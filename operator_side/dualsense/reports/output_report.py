@@ -11,7 +11,8 @@ from typing import Final
 
 from common.checks import check_integer, check_integers, check_kind, check_number
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects.official import DEBUG_CODES, EFFECT_LENGTH, AnyEffect, Off, decode_effect
+from operator_side.dualsense.effects.effect_codes import DEBUG_CODES
+from operator_side.dualsense.effects.official import EFFECT_LENGTH, AnyEffect, Off, decode_effect
 from operator_side.dualsense.effects.unofficial_effects import UnofficialEffect
 from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.reports.transport import OUTPUT_FRAMING, Transport, described

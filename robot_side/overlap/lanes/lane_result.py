@@ -1,7 +1,7 @@
 """What becomes of a lane's sums: bounds, exact answers where nothing is cut, and which pairs need precise forms."""
 
 from robot_side.compiled.kernel import inlined
-from robot_side.overlap.primitives.solid import Overlap, sphere_area, sphere_volume
+from robot_side.overlap.closed_forms.solid import Overlap, sphere_area, sphere_volume
 
 LaneResult = tuple[Overlap, float]
 """(overlap, 1 where doubles do not settle it, so that the pair needs precise forms, else 0)"""

@@ -14,6 +14,7 @@ from robot_side.compiled.kernel import (
     power_of_two_below,
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
 from robot_side.overlap.lanes.lanes import (
     LANES,
     NOTHING,
@@ -34,7 +35,6 @@ from robot_side.overlap.lanes.lanes import (
     weight,
 )
 from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
-from robot_side.overlap.primitives.solid import sphere_area, sphere_volume
 
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16

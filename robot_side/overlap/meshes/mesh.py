@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.checks.arguments import broadcast, lengths, numbers
+from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.closed_surface import (
     checked_triangles,
     checked_vertices,
@@ -20,7 +21,6 @@ from robot_side.overlap.meshes.closed_surface import (
 )
 from robot_side.overlap.meshes.mesh_kernels import overlap_loop
 from robot_side.overlap.meshes.mesh_tables import mesh_tables
-from robot_side.overlap.primitives.solid import Overlaps
 
 Array = npt.ArrayLike
 

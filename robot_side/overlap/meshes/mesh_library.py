@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
 from robot_side.overlap.meshes.mesh_tables import joined
-from robot_side.overlap.primitives.solid import Overlaps
 
 
 class MeshLibrary:

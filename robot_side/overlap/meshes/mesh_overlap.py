@@ -5,6 +5,7 @@ import math
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, scale
+from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
 from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
@@ -28,7 +29,6 @@ from robot_side.overlap.meshes.triangle_lanes import (
     triangle_geometry,
     triangle_terms,
 )
-from robot_side.overlap.primitives.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 
 _WHOLE = 4.0 * math.pi
 _UNDECIDED_AREA = 1e-11

@@ -13,6 +13,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import negative
+from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.overlap.digits.double_double import (
     PI,
     ZERO,
@@ -54,7 +55,6 @@ from robot_side.overlap.precise.features import (
     STARTS,
     distance_in_face,
 )
-from robot_side.overlap.primitives.solid import Overlap
 
 
 @building_block

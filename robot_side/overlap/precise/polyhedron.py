@@ -12,6 +12,8 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import scale
+from robot_side.overlap.closed_forms.half_space import cap
+from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import rounded, times
 from robot_side.overlap.digits.double_double_vectors import (
     PreciseVector,
@@ -50,8 +52,6 @@ from robot_side.overlap.precise.features import (
 )
 from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, corner_overlap, edge_overlap
 from robot_side.overlap.precise.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
-from robot_side.overlap.primitives.half_space import cap
-from robot_side.overlap.primitives.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 
 NOISE = 1e-29
 """What rounding may leave of a sum over faces, in R³, or in R² times the size of the solid if that is larger."""

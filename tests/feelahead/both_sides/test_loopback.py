@@ -70,7 +70,7 @@ def test_a_bump_where_contact_begins_comes_to_meet_the_finger() -> None:
 def test_a_person_whose_left_hand_advances_gets_there_as_well() -> None:
     operator = OperatorSettings(swap_sides=True)
     run = Loopback(LoopbackSettings(RobotSettings(), operator))
-    run.run_until(5.5)
+    run.run_until(6.5)
     assert run.summary()["task"]["time_to_grasp_s"] == episode(0, haptics=True)["task"]["time_to_grasp_s"]
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.overlap import kernels
+from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.kernels import PairCounts
 from robot_side.overlap.lanes.lanes import LANES
-from robot_side.overlap.primitives.solid import Overlaps
 from tests.helpers.repository import ROOT
 
 Arrays = tuple[FloatArray, ...]

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
+from operator_side.dualsense.effects.effect_codes import DEBUG_CODES
 from operator_side.dualsense.effects.official import (
-    DEBUG_CODES,
     EFFECT_LENGTH,
     Feedback,
     MultiPositionFeedback,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from common.errors import RemoteProtocolError
+from operator_side.dualsense.effects.effect_codes import DEBUG_CODES
 from operator_side.dualsense.effects.official import (
-    DEBUG_CODES,
     AnyEffect,
     Feedback,
     MultiPositionFeedback,

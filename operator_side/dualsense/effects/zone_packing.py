@@ -12,9 +12,6 @@ ZONE_COUNT: Final = 10
 MAX_STRENGTH: Final = 8
 EFFECT_LENGTH: Final = 11
 """Bytes of one encoded effect: the code and ten parameters."""
-DEBUG_CODES: Final = frozenset({0xFC, 0xFD, 0xFE})
-"""Never to reach a controller: they corrupt a trigger until it is reset."""
-
 NO_ZONES: Final = (0,) * ZONE_COUNT
 _FREQUENCY_AT: Final = 9
 
