@@ -6,6 +6,8 @@ from common.command.live_view import LiveView, TriggerView
 
 _BETWEEN = "  "
 _UNKNOWN = "–"
+_ROOM_FOR_NAMES = 129
+"""So many columns hold every usual line in long words and with a name; one that is there only at times would jump."""
 _LONGEST_NAME = 12
 """An object with a longer name is shown without it."""
 
@@ -15,7 +17,7 @@ _Fact = tuple[int, str]
 
 def live_line(view: LiveView, width: int) -> str:
     """`view` in at most `width` columns: in long words, in short ones, or only the facts that have room."""
-    for facts in (_in_long_words(view), _in_short_words(view)):
+    for facts in (_in_long_words(view, named=width >= _ROOM_FOR_NAMES), _in_short_words(view)):
         line = _BETWEEN.join(text for _, text in facts)
         if cell_len(line) <= width:
             return line
@@ -43,9 +45,9 @@ def percent(share: float | None, digits: int = 0) -> str:
     return f"{_UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
 
 
-def _in_long_words(view: LiveView) -> list[_Fact]:
+def _in_long_words(view: LiveView, *, named: bool) -> list[_Fact]:
     nearest = "nearest "
-    if view.nearest is not None and cell_len(view.nearest) <= _LONGEST_NAME:
+    if named and view.nearest is not None and cell_len(view.nearest) <= _LONGEST_NAME:
         nearest += f"{view.nearest} "
     return [
         *_what(view),
@@ -53,7 +55,7 @@ def _in_long_words(view: LiveView) -> list[_Fact]:
         (2, f"R2 {_long_trigger(view.r2, view)}"),
         (4, nearest + millimetres(view.nearest_mm, " ", 3)),
         (3, _target(view, " ", 3)),
-        *([(5, f"link up, {_delay(view, ' ')}")] if view.linked else []),
+        *([(5, f"link {_delay(view, ' ')}")] if view.linked else []),
     ]
 
 

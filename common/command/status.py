@@ -75,4 +75,6 @@ class Status:
         if self._mode == "json":
             self.event("note", text=text)
         elif self._mode == "line":
-            self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=True)
+            # Wrapped between words for a person, left whole for whoever searches a file.
+            whole = not self._console.is_terminal
+            self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=whole)

@@ -13,13 +13,15 @@ def warm_up(announce: Callable[[], None] | None = None) -> float:
     """Compile every kernel of the imported modules, or load it from the cache on disk; how long that took (s).
 
     Without it the first call of each kernel does so, which takes up to seconds. `announce` is called once, as soon as
-    that has taken more than a second, so that a person learns what they wait for.
+    compiling has taken more than a second, so that a person learns what they wait for.
     """
     clock = MonotonicClock()
     start_s = clock.now()
+    compiled = False
     for kernel in imported_kernels():
         kernel.prepare()
-        if announce is not None and clock.now() - start_s > NOTEWORTHY_WARM_UP_S:
+        compiled |= kernel.cache_hits == 0
+        if announce is not None and compiled and clock.now() - start_s > NOTEWORTHY_WARM_UP_S:
             announce()
             announce = None
     return clock.now() - start_s

@@ -50,7 +50,7 @@ def test_eighty_columns_tell_everything() -> None:
 def test_a_wide_terminal_has_room_for_words() -> None:
     assert live_line(live_view(APPROACH), 130) == (
         "advancing  L2 pulled   0 % resists   0 %  R2 pulled  62 % resists  34 %"
-        "  nearest tin  84 mm  target 120 mm  link up, 12 ms"
+        "  nearest tin  84 mm  target 120 mm  link 12 ms"
     )
 
 
@@ -138,7 +138,7 @@ def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
 def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     line = live_line(view, width)
     assert cell_len(line) <= width
-    for facts in (_in_long_words(view), _in_short_words(view)):
+    for facts in (_in_long_words(view, named=True), _in_long_words(view, named=False), _in_short_words(view)):
         left = line
         # Each fact is there as a whole, in its place, or not at all.
         for _, text in facts:

@@ -173,11 +173,12 @@ def test_the_old_epoch_of_a_restarted_operator_is_over(bench: Bench) -> None:
 
 
 def test_only_so_many_that_went_away_are_remembered(bench: Bench) -> None:
-    for k in range(3 * MOST_AWAY):
+    joined = MOST_AWAY + 2
+    for k in range(joined):
         bench.join(2 + k, b"%d" % k)
         bench.silence(QUICK.safety.lease_s + 0.05)
     assert sum(1 for _ in bench.robot.session.lease.known()) == MOST_AWAY
-    returning, forgotten = Operator(2 + 3 * MOST_AWAY - 1, b"returning"), Operator(2, b"forgotten")
+    returning, forgotten = Operator(2 + joined - 1, b"returning"), Operator(2, b"forgotten")
     bench.operators = {one.peer: one for one in (returning, forgotten)}
     bench.say_hello(returning)
     bench.tick(101)
