@@ -22,8 +22,8 @@ from common.errors import ConfigurationError
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
 
-_START_TIMEOUT_S = 90.0
-"""The first start compiles the overlap kernels."""
+_START_TIMEOUT_S = 600.0
+"""The first start compiles the overlap kernels, which a busy machine takes minutes for."""
 _LINK_TIMEOUT_S = 30.0
 _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_robot", "haptics"),
@@ -174,17 +174,12 @@ def _watch(
     settings: DemoSettings, robot: SideProcess, operator: SideProcess, stop: StopSignal, status: Status
 ) -> list[str]:
     """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
-    start_s = time.monotonic()
-    linked_s: float | None = None
+    waiting_since_s, linked_s = 0.0, None
     said: dict[str, dict[str, Value]] = {"robot": {}, "operator": {}}
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
-            for event in side.events():
-                if event["event"] == "status":
-                    said[side.name] = {name: value for name, value in event.items() if name != "event"}
-                elif event["event"] == "note":
-                    status.note(f"{side.name}: {event['text']}")
+            _take_events(side, said, status)
             if not side.running:
                 try:
                     side.check()
@@ -194,7 +189,10 @@ def _watch(
         if linked_s is None:
             if said["operator"].get("link") == LINK_UP:
                 linked_s = now_s
-            elif now_s - start_s > _LINK_TIMEOUT_S:
+            elif not said["operator"]:
+                # A busy machine may take long to start a process, which says nothing about the link.
+                waiting_since_s = now_s
+            elif now_s - waiting_since_s > _LINK_TIMEOUT_S:
                 asked = f"; the link that was asked for may be why: --link {settings.link!r}" if settings.link else ""
                 return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
@@ -203,6 +201,15 @@ def _watch(
             status.show(now_s, _together(said["robot"], said["operator"]))
         time.sleep(0.02)
     return []
+
+
+def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: Status) -> None:
+    """Keep the newest status of `side`, and show the notes that it has sent."""
+    for event in side.events():
+        if event["event"] == "status":
+            said[side.name] = {name: value for name, value in event.items() if name != "event"}
+        elif event["event"] == "note":
+            status.note(f"{side.name}: {event['text']}")
 
 
 def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:

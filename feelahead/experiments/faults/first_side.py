@@ -9,7 +9,7 @@ from feelahead.experiments.faults.fault import Outcome
 from feelahead.experiments.faults.rig import Rig
 
 _LIMIT_S = 1.0
-_PATIENCE_S = 120.0
+_PATIENCE_S = 300.0
 
 
 def either_side_first() -> Outcome:

@@ -17,7 +17,7 @@ from feelahead.both_sides.processes import SideProcess
 
 HEALTHY_S = 0.2
 _START_S = 300.0
-_PATIENCE_S = 60.0
+_PATIENCE_S = 300.0
 """What takes longer does not come, however busy the machine is."""
 _CRUISE_S = 0.15
 _ATTEMPTS = 20

@@ -11,7 +11,7 @@ import pytest
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")
-LIMIT_S = 120.0
+LIMIT_S = 600.0
 
 
 def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:

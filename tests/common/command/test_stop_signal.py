@@ -82,7 +82,7 @@ def test_a_process_ends_its_loop_the_clean_way(number: signal.Signals) -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         process.send_signal(number)
-        rest, _ = process.communicate(timeout=120)
+        rest, _ = process.communicate(timeout=600)
     assert rest == "clean\n"
     assert process.returncode == 0
 
@@ -121,7 +121,7 @@ def test_a_reader_that_went_away_leaves_no_complaint(handling: str, quiet: bool)
         process.stdin.write("gone\n")
         process.stdin.close()
         complaint = process.stderr.read()
-        code = process.wait(timeout=120)
+        code = process.wait(timeout=600)
     assert (complaint == "") is quiet
     assert (code == 0) is quiet
 
@@ -137,5 +137,5 @@ def test_until_then_a_signal_ends_the_process_even_in_a_callback(number: signal.
         "call()\n"
         "print('went on')\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=600)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

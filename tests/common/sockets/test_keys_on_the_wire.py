@@ -14,7 +14,7 @@ from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
-LIMIT_S = 60.0
+LIMIT_S = 600.0
 REFUSAL_S = 0.5
 """Long for a handshake on loopback: who has said nothing by then was not let in."""
 

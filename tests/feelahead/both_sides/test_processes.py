@@ -16,7 +16,7 @@ from feelahead.experiments.faults.first_side import free_ports
 
 pytestmark = pytest.mark.processes
 
-LIMIT_S = 240.0
+LIMIT_S = 600.0
 
 
 def demo(*arguments: str) -> subprocess.Popen[str]:

@@ -17,7 +17,7 @@ from robot_side.main import KEYS_PERIOD_S
 pytestmark = pytest.mark.processes
 
 START_S = 300.0
-LIMIT_S = 120.0
+LIMIT_S = 600.0
 
 
 @dataclass

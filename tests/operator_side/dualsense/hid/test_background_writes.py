@@ -17,7 +17,7 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
 )
 
-LIMIT_S = 60.0
+LIMIT_S = 600.0
 L2 = build_output_report(OutputReport(l2=Feedback(3, 6)))
 
 

@@ -14,7 +14,7 @@ from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHan
 
 A, B = b"/dev/hidraw3", b"/dev/hidraw4"
 OTHER = "11:22:33:44:55:66"
-LIMIT_S = 60.0
+LIMIT_S = 600.0
 
 
 @pytest.mark.parametrize(("product_id", "model"), [(0x0CE6, "DualSense"), (0x0DF2, "DualSense Edge")])

@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.processes,
     pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it needs a controller that hidapi finds"),
 ]
-LIMIT_S = 120.0
+LIMIT_S = 600.0
 REPORT = bytes(range(48))
 
 
