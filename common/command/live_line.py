@@ -17,8 +17,9 @@ _Fact = tuple[int, str]
 
 def live_line(view: LiveView, width: int) -> str:
     """`view` in at most `width` columns: in long words, in short ones, or only the facts that have room."""
-    for facts in (_in_long_words(view, named=width >= _ROOM_FOR_NAMES), _in_short_words(view)):
-        line = _BETWEEN.join(text for _, text in facts)
+    long, short = _in_long_words(view, named=width >= _ROOM_FOR_NAMES), _in_short_words(view)
+    for facts, between in ((long, _BETWEEN), (short, _BETWEEN), (short, " ")):
+        line = _BETWEEN.join((facts[0][1], between.join(text for _, text in facts[1:])))
         if cell_len(line) <= width:
             return line
     left, kept = width + len(_BETWEEN), set()

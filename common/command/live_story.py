@@ -1,6 +1,7 @@
 """A run as a few lines for a file: one whenever something changed that a person cares about, and else none."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -49,18 +50,25 @@ class Story:
         self._state = self._told = _State()
         self._start_s: float | None = None
         self._told_s = -math.inf
+        self._peaks = {"L2": 0.0, "R2": 0.0}
+        """The most that each trigger resisted since it last yielded."""
 
     def tell(self, now_s: float, view: LiveView) -> str | None:
         """A line with what is new at `now_s` and the time since the first call; None while there is nothing."""
         if self._start_s is None:
             self._start_s = now_s
+        for name, trigger in (("L2", view.l2), ("R2", view.r2)):
+            self._peaks[name] = max(self._peaks[name], trigger.resists or 0.0)
         self._state = _next_state(self._state, view)
         state, told = self._state, self._told
         alarm = view.alarm and (state.phase, state.reason) != (told.phase, told.reason)
         if state == told or (now_s - self._told_s < SHORTEST_GAP_S and not alarm):
             return None
         self._told, self._told_s = state, now_s
-        news = "; ".join(_news(told, state, view))
+        news = "; ".join(_news(told, state, view, self._peaks))
+        for name, resists in (("L2", state.l2), ("R2", state.r2)):
+            if resists is Resistance.NONE:
+                self._peaks[name] = 0.0
         return f"{now_s - self._start_s:6.1f} s  {news}{_figures(view)}"
 
 
@@ -83,7 +91,7 @@ def _next_state(before: _State, view: LiveView) -> _State:
     )
 
 
-def _news(told: _State, state: _State, view: LiveView) -> list[str]:
+def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
     news = []
     if state.linked and not told.linked:
         news.append("link up")
@@ -93,7 +101,7 @@ def _news(told: _State, state: _State, view: LiveView) -> list[str]:
         news.append(state.phase if state.reason is None else f"{state.phase}: {state.reason}")
     for name, before, after, trigger in (("L2", told.l2, state.l2, view.l2), ("R2", told.r2, state.r2, view.r2)):
         if after is not before:
-            news.append(_resistance(name, before, after, trigger, view.haptics))
+            news.append(_resistance(name, before, after, trigger, peaks[name], view.haptics))
     if state.touched != told.touched:
         news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as perceived")
     if state.holding != told.holding:
@@ -101,11 +109,13 @@ def _news(told: _State, state: _State, view: LiveView) -> list[str]:
     return news
 
 
-def _resistance(name: str, before: Resistance, after: Resistance, trigger: TriggerView, haptics: bool) -> str:
+def _resistance(
+    name: str, before: Resistance, after: Resistance, trigger: TriggerView, peak: float, haptics: bool
+) -> str:
     """What a finger on the trigger notices; without haptics, what it would."""
     would, share = ("" if haptics else "would "), f"{percent(trigger.resists)} %"
     if after is Resistance.NONE:
-        return f"{name} {would}yield{'s' if haptics else ''} freely"
+        return f"{name} {would}yield{'s' if haptics else ''} freely, after up to {percent(peak)} %"
     if after is Resistance.FULL:
         return f"{name} {would}resist{'s' if haptics else ''} fully"
     return f"{name} {would}{'ease' if before is Resistance.FULL else 'stiffen'}{'s' if haptics else ''} to {share}"

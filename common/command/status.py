@@ -19,13 +19,19 @@ StatusMode = Literal["line", "json", "none"]
 _PERIOD_S = 0.2
 
 
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the command what follows: Rich would end the process with code 1."""
+        raise  # noqa: PLE0704  # called where the BrokenPipeError is handled
+
+
 class Status:
     """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error."""
 
     def __init__(self, mode: StatusMode, program: str) -> None:
         self._mode = mode
         self._program = program
-        self._console = Console()
+        self._console = _Console()
         self._live: Live | None = None
         self._story = Story()
         self._next_s = -1.0

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any
 
@@ -81,8 +81,14 @@ class SideProcess:
         assert event is not None  # noqa: S101  # there is nothing to stop it
         return event
 
-    def wait_unless(self, kind: str, timeout_s: float, stop: StopSignal | None) -> dict[str, Any] | None:
-        """As `wait_for`, but None as soon as `stop` is set."""
+    def wait_unless(
+        self,
+        kind: str,
+        timeout_s: float,
+        stop: StopSignal | None,
+        meanwhile: Callable[[dict[str, Any]], None] | None = None,
+    ) -> dict[str, Any] | None:
+        """As `wait_for`, but None as soon as `stop` is set; other events go to `meanwhile`, or wait for `events`."""
         remaining_s = timeout_s
         while True:
             try:
@@ -102,7 +108,7 @@ class SideProcess:
                 self._process.wait(timeout=10.0)
                 self.check()
                 raise SideFailedError(f"the {self.name} side ended early")
-            self._passed_over.append(event)
+            (meanwhile or self._passed_over.append)(event)
 
     def check(self) -> None:
         """SideFailedError when it has ended with an error, in its own words; ConfigurationError for bad input."""

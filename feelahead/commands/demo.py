@@ -100,10 +100,12 @@ def _run_both(
     settings: DemoSettings, given: Collection[str], summaries: Mapping[str, Path], stop: StopSignal, status: Status
 ) -> list[str]:
     """Start both sides, watch them, and end them; what went wrong."""
-    status.note("starting the robot side (the first start compiles its kernels)")
+    status.note("starting the robot side")
     with SideProcess("robot_side", "robot", _robot_arguments(settings, given, summaries["robot"])) as robot:
         status.event("started", side="robot", process_id=robot.process_id)
-        listening = robot.wait_unless("listening", _START_TIMEOUT_S, stop)
+        listening = robot.wait_unless(
+            "listening", _START_TIMEOUT_S, stop, lambda event: _show_note(robot, event, status)
+        )
         if listening is None:
             return []
         operator_arguments = _operator_arguments(settings, given, summaries["operator"], listening)
@@ -208,8 +210,13 @@ def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: S
     for event in side.events():
         if event["event"] == "status":
             said[side.name] = {name: value for name, value in event.items() if name != "event"}
-        elif event["event"] == "note":
-            status.note(f"{side.name}: {event['text']}")
+        else:
+            _show_note(side, event, status)
+
+
+def _show_note(side: SideProcess, event: Mapping[str, Any], status: Status) -> None:
+    if event["event"] == "note":
+        status.note(f"{side.name}: {event['text']}")
 
 
 def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:

@@ -11,7 +11,7 @@ Inside, the direction jumps where two ways out are equally short: in the middle 
 that leaves less of itself the more they contradict each other. It has length 1 at a face, 0 in the middle of
 a plate or of a sphere.
 
-Nothing is validated here: centres are checked in `proximity`, primitives once for each frame. What a tick calls
+Nothing is validated here: centres are checked in `pairs.candidates`, primitives once for each frame. What a tick calls
 is `nearest_kernels`.
 """
 

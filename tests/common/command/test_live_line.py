@@ -154,3 +154,10 @@ def test_more_room_never_shows_less(view: LiveView, width: int) -> None:
     """What is most important is there as soon as it fits by itself."""
     if cell_len(view.phase) <= width:
         assert live_line(view, width).startswith(view.phase)
+
+
+def test_a_long_delay_has_room_at_80_columns() -> None:
+    far = {"R2_pulled": 1.0, "R2": 1.0, "nearest_mm": 144.0, "target_mm": 193.0, "delay_ms": 205.0}
+    assert live_line(live_view(APPROACH | far), 79) == (
+        "advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms"
+    )

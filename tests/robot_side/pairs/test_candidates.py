@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.objects.validity import require_valid
 from robot_side.overlap import kernels
-from robot_side.pairs import candidates as proximity
+from robot_side.pairs import candidates
 from robot_side.pairs.candidates import CandidatePairs, candidate_pairs
 from tests.helpers.perceived_scenes import Scene, random_scene
 
@@ -110,11 +110,11 @@ def test_bounds_are_worked_out_once_for_each_frame(monkeypatch: pytest.MonkeyPat
 
 def test_bounds_do_not_outlive_their_frame() -> None:
     gc.collect()
-    before = len(proximity._bounds)
+    before = len(candidates._bounds)
     for seed in range(5):
         candidate_pairs(np.zeros((1, 3)), np.ones(1), random_scene(np.random.default_rng(seed), 1))
     gc.collect()
-    assert len(proximity._bounds) == before
+    assert len(candidates._bounds) == before
 
 
 @pytest.mark.parametrize(
