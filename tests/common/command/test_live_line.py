@@ -146,6 +146,10 @@ def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
                 left = left[len(text) + 2 :]
         if left == "":
             return
+    # Where it is tight, all short facts stand a little closer.
+    phase, *rest = (text for _, text in _in_short_words(view))
+    if line == f"{phase}  {' '.join(rest)}":
+        return
     raise AssertionError(f"{line!r} holds {left!r}")
 
 
