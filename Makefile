@@ -42,9 +42,9 @@ test: $(VENV)/.installed $(VENV)/.test-models ## style, types and tests: make te
 	@$(MAKE) --no-print-directory --jobs=2 types $(VENV)/.kernels
 	$(PYTEST) $(ARGS)
 
-quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests that start processes or install
+quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests that start processes, install, or take long
 	@$(MAKE) --no-print-directory --jobs=2 types $(VENV)/.kernels
-	$(PYTEST) -m "not processes and not install" $(ARGS)
+	$(PYTEST) -m "not processes and not install and not long" $(ARGS)
 
 # Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we

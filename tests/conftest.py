@@ -12,12 +12,14 @@ settings.register_profile("here", deadline=None, derandomize=True, suppress_heal
 settings.load_profile("here")
 
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
+FONTS = "fc-list"
+"""What matplotlib runs by itself before it draws for the first time on a machine."""
 unmarked: list[str] = []
 """The test that runs, unless it carries the marker."""
 
 
-def refuse_processes(event: str, _: tuple[Any, ...]) -> None:
-    if unmarked and event in STARTS:
+def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:
+    if unmarked and event in STARTS and arguments[0] != FONTS:
         raise AssertionError(f"{unmarked[0]} starts a process and carries neither marker, processes nor install")
 
 

@@ -13,6 +13,8 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
+pytestmark = pytest.mark.long
+
 GAP_S = 0.1
 RAMP_S = 0.3
 """Long enough for the arm to come to rest from any speed of this run."""

@@ -16,6 +16,8 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
+pytestmark = pytest.mark.long
+
 LINK = (
     "to_operator: delay 30ms 5ms distribution normal loss 5% corrupt 5%; to_robot: delay 20ms duplicate 10%; "
     "to_operator.telemetry: rate 1mbit"

@@ -9,6 +9,8 @@ from scipy.stats import kstest
 from common.emulation.loss import GilbertElliott, StateLoss
 from tests.helpers.link_runs import Run, bursts, lag_one
 
+pytestmark = pytest.mark.long
+
 # Loss
 
 

@@ -12,6 +12,8 @@ from feelahead.benchmarks.link.reference import compare, independent_delays, jud
 from feelahead.benchmarks.link.samples import LinkSample, distance, play, read_link_sample
 from tests.helpers.repository import DATA
 
+pytestmark = pytest.mark.long
+
 RECORDINGS = DATA / "netem"
 NORMAL = "delay 50ms 10ms distribution normal"
 SIZE_BYTES = 142

@@ -50,6 +50,7 @@ template<int N> double overlap_volume(const Sphere& s, const Element<N>& e) {
 """
 
 
+@pytest.mark.long
 def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written, figures, docs = tmp_path / "out.csv", tmp_path / "figures", tmp_path / "benchmarks.md"
     arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--figures={figures}", f"--write-docs={docs}"]

@@ -10,6 +10,8 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
+pytestmark = pytest.mark.long
+
 
 def loopback(link: str, *, haptics: bool = True, seed: int = 0) -> Loopback:
     return Loopback(

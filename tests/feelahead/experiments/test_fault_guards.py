@@ -22,6 +22,8 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission, Safety
 from robot_side.simulation.joint_reference import JointReference
 
+pytestmark = pytest.mark.long
+
 Patch = Callable[[pytest.MonkeyPatch], None]
 
 

@@ -9,6 +9,8 @@ from feelahead.experiments.faults.virtual_session_faults import SESSION_FAULTS
 from feelahead.experiments.faults.virtual_stream_faults import STREAM_FAULTS
 from tests.helpers.repository import ROOT
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("fault", [*STREAM_FAULTS, *SESSION_FAULTS], ids=lambda fault: fault.run.__name__)
 def test_the_row_holds(fault: Fault) -> None:

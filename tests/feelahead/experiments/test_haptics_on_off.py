@@ -9,6 +9,8 @@ from common.errors import ConfigurationError
 from feelahead.experiments import haptics_on_off
 from feelahead.experiments.haptics_on_off import ComparisonSettings, Outcome, run, table
 
+pytestmark = pytest.mark.long
+
 
 def outcome(seed: int, *, haptics: bool, grasp_s: float | None, contacts: int = 0) -> Outcome:
     return Outcome(
