@@ -1,0 +1,289 @@
+"""The frozen scenes of tests/data are what their comments say: what is there, how far it is, and what moves."""
+
+import copy
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.gripper.held_object import gripped_object
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.simulation.arm import MujocoArm
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.scene import Scene, load_scene
+from tests.helpers.repository import DATA
+from tests.robot_side.simulation.test_scene_meshes import overlap_of
+
+FARTHEST_M = 0.45
+TOUCHING_M = 1e-5
+
+
+@dataclass(frozen=True)
+class Hit:
+    """The end of a free way: what of the gripper, or of what it holds, meets which object."""
+
+    after_mm: float
+    part: str
+    thing: str
+
+
+@dataclass(frozen=True)
+class Expected:
+    objects: str
+    hit: Hit | None
+    """None where going on never collides."""
+    tool_down: bool = False
+
+
+SCENES = {
+    "wall": Expected("wall", Hit(320, "fingertip", "wall")),
+    "plate": Expected("plate", Hit(320, "fingertip", "plate")),
+    "ball": Expected("ball", Hit(320, "right_fingertip", "ball")),
+    "post": Expected("post", Hit(320, "right_fingertip", "post")),
+    "rod_2mm": Expected("rod", Hit(320, "right_fingertip", "rod")),
+    "rod_5mm": Expected("rod", Hit(320, "right_fingertip", "rod")),
+    "rod_10mm": Expected("rod", Hit(320, "right_fingertip", "rod")),
+    "wall_45": Expected("wall", Hit(320, "right_fingertip", "wall")),
+    "slot": Expected("left_post right_post wall", Hit(320, "fingertip", "wall")),
+    "shelf_edge": Expected("shelf", Hit(320, "fingertip", "shelf")),
+    "wall_beside": Expected("wall", None),
+    "table_1_box": Expected("bench", None),
+    "table_2_boxes": Expected("bench", None),
+    "table_12_tetrahedra": Expected("bench", None),
+    "table_mesh": Expected("bench", None),
+    "place_held": Expected("table target", Hit(320, "target", "table"), tool_down=True),
+    "u_mesh": Expected("u", Hit(320, "fingertip", "u"), tool_down=True),
+    "mug": Expected("mug", Hit(320, "palm", "mug"), tool_down=True),
+    "moving": Expected("mover", Hit(400, "fingertip", "mover")),
+    "cluttered": Expected(
+        "left_box left_ball right_box right_tetrahedron board_above box_below ball_below box_behind", None
+    ),
+    "empty": Expected("box", None),
+}
+TABLES = [name for name in SCENES if name.startswith("table_")]
+every_scene = pytest.mark.parametrize("name", SCENES)
+
+
+def load(name: str) -> Scene:
+    return load_scene(DATA / f"{name}.xml", "tool")
+
+
+def part_name(scene: Scene, geom: int) -> str:
+    """The object that a geom belongs to, or the robot's geom itself."""
+    return next((thing.name for thing in scene.objects if geom in thing.geoms), str(scene.model.geom(geom).name))
+
+
+def approach(scene: Scene) -> FloatArray:
+    axis: FloatArray = scene.data.site_xmat[scene.robot.site].reshape(3, 3)[:, 2].copy()
+    return axis
+
+
+def split_geoms(scene: Scene) -> tuple[list[int], list[int]]:
+    """The gripper's geoms and those of a target that it holds, and all that may be in their way."""
+    held = [geom for thing in scene.objects if scene.roles[thing.name] is Role.TARGET for geom in thing.geoms]
+    others = [geom for thing in scene.objects for geom in thing.geoms if geom not in held]
+    return [*scene.robot.gripper_geoms.tolist(), *held], others
+
+
+def first_hit(scene: Scene) -> Hit | None:
+    """Where the true gripper ends when it goes straight on, each time by as much as is surely free."""
+    data = copy.copy(scene.data)
+    moving, others = split_geoms(scene)
+    start, axis = data.geom_xpos[moving].copy(), approach(scene)
+    gone_m = 0.0
+    while gone_m < FARTHEST_M:
+        data.geom_xpos[moving] = start + gone_m * axis
+        distance_m, mine, other = min(
+            (float(mujoco.mj_geomDistance(scene.model, data, mine, other, FARTHEST_M, None)), mine, other)
+            for mine in moving
+            for other in others
+        )
+        if distance_m < TOUCHING_M:
+            return Hit(1e3 * gone_m, part_name(scene, mine), part_name(scene, other))
+        gone_m += distance_m
+    return None
+
+
+def go_on(scene: Scene, data: Any, position_m: FloatArray) -> float:
+    """Move the arm of `data` until the tool, turned as at home, is at `position_m`; how far it is from singular."""
+    robot, site = scene.robot, scene.robot.site
+    turned = scene.data.site_xmat[site].reshape(3, 3)
+    jacobian = np.zeros((6, scene.model.nv))
+    for _ in range(20):
+        mujoco.mj_kinematics(scene.model, data)
+        mujoco.mj_comPos(scene.model, data)
+        mujoco.mj_jacSite(scene.model, data, jacobian[:3], jacobian[3:], site)
+        of_arm = jacobian[:, robot.arm_velocities]
+        axes = data.site_xmat[site].reshape(3, 3)
+        error = np.concatenate([position_m - data.site_xpos[site], 0.5 * np.cross(axes.T, turned.T).sum(axis=0)])
+        if np.abs(error).max() < 1e-6:
+            mujoco.mj_forward(scene.model, data)
+            return float(np.linalg.svd(of_arm, compute_uv=False)[-1])
+        damped = of_arm @ of_arm.T + 1e-6 * np.eye(6)
+        data.qpos[robot.arm_positions] += of_arm.T @ np.linalg.solve(damped, error)
+    raise AssertionError(f"the arm does not reach {position_m}")
+
+
+def test_each_file_is_looked_at() -> None:
+    assert {path.stem for path in DATA.glob("*.xml")} == {"arm", *SCENES}
+
+
+@every_scene
+def test_it_is_loaded_as_meant_and_stands_free(name: str) -> None:
+    scene, expected = load(name), SCENES[name]
+    roles = {"table": Role.SUPPORT, "target": Role.TARGET}
+    assert scene.roles == {thing: roles.get(thing, Role.OBSTACLE) for thing in expected.objects.split()}
+    assert scene.start_pose == "the keyframe 'home'"
+    assert (scene.approximated, scene.shared_names, scene.warnings) == ((), (), ())
+    assert scene.data.ncon == 0
+    np.testing.assert_array_equal(scene.data.qpos[scene.robot.finger_positions], [0.0425, 0.0425])
+    # Fingers close along y; one home for all that go ahead and one for all that go down.
+    axes = scene.data.site_xmat[scene.robot.site].reshape(3, 3)
+    home, ahead = ([0.45, 0.0, 0.48], [0, 0, -1]) if expected.tool_down else ([0.55, 0.0, 0.2], [1, 0, 0])
+    np.testing.assert_allclose(scene.data.site_xpos[scene.robot.site], home, atol=1e-5)
+    np.testing.assert_allclose(axes[:, 2], ahead, atol=1e-4)
+    np.testing.assert_allclose(axes[:, 0], [0, -1, 0], atol=1e-4)
+
+
+@every_scene
+def test_the_free_way_is_what_its_comment_says(name: str) -> None:
+    expected = SCENES[name].hit
+    comment = (DATA / f"{name}.xml").read_text().removeprefix("<!-- ").split(" -->")[0]
+    assert 2 <= len(comment.splitlines()) <= 4
+    assert "Frozen: " in comment
+    assert re.findall(r"Free way: (\w+)", comment) == ["endless" if expected is None else f"{expected.after_mm:.0f}"]
+    found = first_hit(load(name))
+    if expected is None or found is None:
+        assert found is expected
+        return
+    assert found.after_mm == pytest.approx(expected.after_mm, abs=0.1)
+    assert found.part.endswith(expected.part)
+    assert found.thing == expected.thing
+
+
+@every_scene
+def test_the_arm_can_go_there_and_touches_nothing_on_its_way(name: str) -> None:
+    scene, hit = load(name), SCENES[name].hit
+    robot, data = scene.robot, copy.copy(scene.data)
+    home = data.site_xpos[robot.site].copy()
+    end_m = min(0.35, hit.after_mm * 1e-3 - 0.002) if hit else 0.35
+    for gone_m in np.linspace(0.0, end_m, 30):
+        assert go_on(scene, data, home + gone_m * approach(scene)) > 0.15
+        joints = data.qpos[robot.arm_positions]
+        assert min((joints - robot.lower_rad).min(), (robot.upper_rad - joints).min()) > 0.5
+        # The target of `place_held` stays behind here, as there is no physics that brings it along.
+        touching = {part_name(scene, geom) for pair in data.contact.geom for geom in pair.tolist()}
+        assert touching == set() or "target" in touching
+
+
+@pytest.mark.parametrize("name", ["slot", "wall_beside", "u_mesh", "table_1_box", "mug"])
+def test_what_is_beside_the_way_is_as_near_as_said(name: str) -> None:
+    nearest_m = {"slot": 0.02, "wall_beside": 0.025, "u_mesh": 0.03, "table_1_box": 0.02, "mug": 0.0087}[name]
+    assert nearest_beside(load(name), 0.315).min() == pytest.approx(1e3 * nearest_m, abs=0.1)
+
+
+def nearest_beside(scene: Scene, way_m: float) -> FloatArray:
+    """How near the gripper comes to each object on its way, in mm, not counting what is ahead of it."""
+    data = copy.copy(scene.data)
+    moving, _ = split_geoms(scene)
+    start, axis = data.geom_xpos[moving].copy(), approach(scene)
+    ends, nearest_mm = np.zeros(6), np.full(len(scene.objects), np.inf)
+    for gone_m in np.linspace(0.0, way_m, 60):
+        data.geom_xpos[moving] = start + gone_m * axis
+        for index, thing in enumerate(scene.objects):
+            for geom in thing.geoms:
+                for mine in moving:
+                    distance_m = mujoco.mj_geomDistance(scene.model, data, mine, geom, 1.0, ends)
+                    if abs((ends[3:] - ends[:3]) @ axis) < 0.5 * distance_m:
+                        nearest_mm[index] = min(nearest_mm[index], 1e3 * distance_m)
+    return nearest_mm
+
+
+def test_the_clutter_lines_the_way() -> None:
+    scene = load("cluttered")
+    nearest = dict(zip(scene.roles, nearest_beside(scene, 0.35), strict=True))
+    del nearest["box_behind"]
+    assert {name for name, mm in nearest.items() if not 30.0 <= mm <= 60.0} == set()
+
+
+# The table, described in four ways
+
+
+def test_the_four_tables_are_perceived_as_one_solid() -> None:
+    seen = {name: MujocoCamera(load(name)).perceive(0.0) for name in TABLES}
+    kinds = {name: (len(it.box_object), len(it.tetrahedron_object), len(it.mesh_object)) for name, it in seen.items()}
+    assert kinds == {
+        "table_1_box": (1, 0, 0),
+        "table_2_boxes": (2, 0, 0),
+        "table_12_tetrahedra": (0, 12, 0),
+        "table_mesh": (0, 0, 1),
+    }
+    # Around all of it, at the seam under the way, on an edge, at two corners; then anywhere near the top.
+    centers = [[0.75, 0, 0.128], [0.75, 0, 0.15], [0.35, 0.1, 0.148], [0.35, 0.4, 0.148], [1.15, -0.4, 0.108]]
+    random = np.random.default_rng(5)
+    anywhere = random.uniform([0.3, -0.45, 0.08], [1.2, 0.45, 0.18], (100, 3))
+    volumes = {name: volumes_of(it, np.array(centers), anywhere) for name, it in seen.items()}
+    expected = volumes["table_1_box"]
+    assert expected[0] == pytest.approx(0.8 * 0.8 * 0.04, rel=1e-9)
+    assert (expected > 0.0).sum() > 50
+    for name in TABLES:
+        # MuJoCo keeps vertices in single precision.
+        np.testing.assert_allclose(volumes[name], expected, rtol=1e-6, atol=1e-10, err_msg=name)
+
+
+def volumes_of(seen: PerceivedObjects, centers_m: FloatArray, anywhere_m: FloatArray) -> FloatArray:
+    around = overlap_of(seen, "bench", centers_m[:1], 1.0)
+    return np.concatenate([around, overlap_of(seen, "bench", np.concatenate([centers_m[1:], anywhere_m]), 0.05)])
+
+
+# What moves
+
+
+def test_the_mover_comes_at_60_mm_s_and_stops_before_a_gripper_that_rests() -> None:
+    scene = load("moving")
+    arm = MujocoArm(scene, Encoder())
+    arm.state(0.0)
+    mover = scene.model.joint("mover")
+    for tick in range(1, 550):
+        arm.state(1e-2 * tick)
+        assert scene.data.ncon == 0
+        if tick < 495:
+            assert scene.data.qvel[mover.dofadr[0]] == pytest.approx(0.06, abs=0.003)
+    assert scene.data.qvel[mover.dofadr[0]] == pytest.approx(0.0, abs=1e-5)
+    assert scene.data.qpos[mover.qposadr[0]] == pytest.approx(0.3, abs=1e-3)
+    left = first_hit(scene)
+    assert left is not None
+    assert left.after_mm == pytest.approx(100.0, abs=1.0)
+
+
+def test_the_held_box_stays_between_open_fingers_and_is_gripped_when_they_close() -> None:
+    scene = load("place_held")
+    arm, camera = MujocoArm(scene, Encoder()), MujocoCamera(scene)
+    arm.state(0.0)
+    target, gripper = scene.data.body("target"), scene.data.body("gripper")
+
+    def place_in_gripper() -> FloatArray:
+        place: FloatArray = (target.xpos - gripper.xpos) @ gripper.xmat.reshape(3, 3)
+        return place
+
+    for tick in range(1, 2001):
+        state = arm.state(1e-3 * tick)
+        np.testing.assert_allclose(place_in_gripper(), [0.0, 0.0, 0.16], atol=5e-4)
+        assert scene.data.ncon == 0
+        assert not state.gripper_holding
+    arm.command_gripper(1.0, 10.0)
+    for tick in range(2001, 3001):
+        state = arm.state(1e-3 * tick)
+    assert state.gripper_holding
+    assert state.gripper_opening_m == pytest.approx(0.05, abs=1e-3)
+    np.testing.assert_allclose(place_in_gripper(), [0.0, 0.0, 0.16], atol=5e-4)
+    np.testing.assert_allclose(scene.data.site_xpos[scene.robot.site], [0.45, 0.0, 0.48], atol=1e-3)
+    seen = camera.perceive(3.0)
+    index = gripped_object(seen, scene.data.site_xpos[scene.robot.site], state.gripper_opening_m)
+    assert index is not None
+    assert seen.names[index] == "target"
