@@ -82,6 +82,11 @@ class OperatorSide:
         self._lost_s: float | None = None
         self._has_been_armed = False
 
+    @property
+    def intent(self) -> OperatorIntent | None:
+        """What the hands meant by the newest report of the controller; None before the first."""
+        return self._intent
+
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
         try:

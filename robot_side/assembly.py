@@ -49,16 +49,21 @@ class SimulationObserver:
 
 
 def build_robot_side(
-    settings: RobotSettings, epoch: int, clock_domain: str, watch: Callable[[Arm], Arm] | None = None
+    settings: RobotSettings,
+    epoch: int,
+    clock_domain: str,
+    watch: Callable[[Arm], Arm] | None = None,
+    scene: Scene | None = None,
 ) -> RobotSide:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
-    `watch` may stand in front of the arm, to record what it is told and does.
+    `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
+    that the settings name, so that the caller can look at it.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    scene = load_scene(settings.model, settings.site, settings.roles)
+    scene = scene or load_scene(settings.model, settings.site, settings.roles)
     noise, camera_noise, samples = np.random.SeedSequence(settings.seed).generate_state(3)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()

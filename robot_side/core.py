@@ -88,6 +88,15 @@ class RobotSide:
         self._next_observers_s = -np.inf
         self._next_truth_s = -np.inf
 
+    @property
+    def held(self) -> str | None:
+        """The name of the object that the gripper holds; None for none."""
+        return None if self._held is None else self._held.name
+
+    def loop_age_s(self, now_s: float) -> float:
+        """The delay that is reckoned with at `now_s`: t_d of eq. 8."""
+        return self._loop_age.value(now_s)
+
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Take one control payload from `peer`; what is invalid, late or not the operator's never gets further."""
         self.session.receive(peer, payload, now_s)

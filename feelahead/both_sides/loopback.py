@@ -4,12 +4,14 @@ Everything happens at the instant when it is due, in order of time, so that the 
 the same numbers on every machine.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from common.clock import MonotonicClock, VirtualClock
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
+from common.protocol.messages import Telemetry
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
 from operator_side.core import OperatorSide
@@ -26,6 +28,7 @@ from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
 from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
 from robot_side.settings import RobotSettings
+from robot_side.simulation.scene import Scene
 
 _WALL = MonotonicClock()
 """For how long a tick takes, and nothing else."""
@@ -41,12 +44,32 @@ class LoopbackSettings:
     operator: OperatorSettings = field(default_factory=OperatorSettings)
 
 
+class Person(Protocol):
+    """Whoever has the controller in their hands."""
+
+    def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
+        """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
+        ...
+
+
 class Loopback:
     """Two cores, a controller with a person, and the link between them, driven by one virtual clock."""
 
-    def __init__(self, settings: LoopbackSettings) -> None:
+    def __init__(
+        self,
+        settings: LoopbackSettings,
+        *,
+        scene: Scene | None = None,
+        device: SimulatedDualSense | None = None,
+        person: Callable[[SimulatedDualSense], Person] | None = None,
+        after_robot_tick: Callable[[float], None] | None = None,
+    ) -> None:
+        """`scene`: instead of the one that the settings name; `person`: instead of the scripted one.
+
+        after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
+        """
         self.clock = VirtualClock()
-        self.robot: RobotSide = build_robot_side(settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK)
+        self.robot: RobotSide = build_robot_side(settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK, scene=scene)
         # After the scene, which decides what kernels there are.
         warm_up()
         self.operator = OperatorSide(
@@ -59,15 +82,20 @@ class Loopback:
             seed=settings.operator.seed,
             asymmetry_s=settings.operator.asymmetry_s(),
         )
-        self.device = SimulatedDualSense()
+        self.device = device or SimulatedDualSense()
         self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
-        self.person = SimulatedOperator(
-            self.device,
-            settings.operator.person,
-            settings.operator.seed,
-            settings.operator.calibration,
-            swap_sides=settings.operator.swap_sides,
+        self.person: Person = (
+            person(self.device)
+            if person is not None
+            else SimulatedOperator(
+                self.device,
+                settings.operator.person,
+                settings.operator.seed,
+                settings.operator.calibration,
+                swap_sides=settings.operator.swap_sides,
+            )
         )
+        self._after_robot_tick = after_robot_tick
         self.tick_time = RunningStatistics(settings.robot.seed)
         there, back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(there.profile("to_robot"))
@@ -131,3 +159,5 @@ class Loopback:
         self.tick_time.add(_WALL.now() - start_s)
         for message in outgoing:
             self._to_operator[message.stream].push(now_s, message.payload)
+        if self._after_robot_tick is not None:
+            self._after_robot_tick(now_s)

@@ -1,10 +1,12 @@
 """What is true of the simulated world, for summaries and tests alone."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
+from common.arrays import IntArray
 from robot_side.objects.perceived import Role
 from robot_side.simulation.scene import Scene
 
@@ -48,24 +50,8 @@ class GroundTruth:
 
     def _distance(self, object_geoms: list[int], farthest_m: float) -> float:
         """The smallest signed distance between the gripper and some geoms, at most `farthest_m`."""
-        model, data = self._scene.model, self._scene.data
         mine, theirs = np.array(list(self._gripper), dtype=np.int64), np.array(object_geoms, dtype=np.int64)
-        if theirs.size == 0:
-            return farthest_m
-        apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
-        # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
-        bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
-        bound -= model.geom_rbound[mine][:, None]
-        nearest = farthest_m
-        for pair in np.argsort(bound, axis=None):
-            first, second = np.unravel_index(pair, bound.shape)
-            if bound[first, second] >= nearest:
-                break
-            distance = mujoco.mj_geomDistance(
-                model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0), None
-            )
-            nearest = min(nearest, float(distance))
-        return nearest
+        return least_distance(self._scene.model, self._scene.data, mine, theirs, farthest_m)
 
     def _contacts(self) -> frozenset[tuple[str, str]]:
         found = set()
@@ -74,3 +60,21 @@ class GroundTruth:
                 if mine in self._gripper and other in self._object_of:
                     found.add((self._gripper[mine], self._object_of[other]))
         return frozenset(found)
+
+
+def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> float:
+    """The smallest signed distance from geoms `mine` to geoms `theirs`, metres; at most `farthest_m`."""
+    if mine.size == 0 or theirs.size == 0:
+        return farthest_m
+    apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
+    # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
+    bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
+    bound -= model.geom_rbound[mine][:, None]
+    nearest = farthest_m
+    for pair in np.argsort(bound, axis=None):
+        first, second = np.unravel_index(pair, bound.shape)
+        if bound[first, second] >= nearest:
+            break
+        distance = mujoco.mj_geomDistance(model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0), None)
+        nearest = min(nearest, float(distance))
+    return nearest

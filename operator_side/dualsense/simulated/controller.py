@@ -28,6 +28,7 @@ from operator_side.dualsense.reports.output_report import (
 )
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.simulated_hands import SimulatedHands
+from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
 """About 250 reports a second on USB (SDL)."""
@@ -68,9 +69,11 @@ class SimulatedDualSense(SimulatedHands):
         bluetooth_period_s: float = INPUT_REPORT_PERIOD_S,
         address: str = SIMULATED_ADDRESS,
         calibration: CalibrationReport = IDEAL_CALIBRATION,
+        strength_step_n: float = STRENGTH_STEP_N,
     ) -> None:
         """`bluetooth_period_s`: a controller sends up to 1000 reports a second there (SDL), 250 on USB.
 
+        `strength_step_n`: the resistance that one strength of its triggers' effects adds, an eighth of the strongest.
         `calibration`: what its motion sensors really are like, and what feature 0x05 says of them. ValueError for
         a period that is not above 0, or an address that is none.
         """
@@ -81,6 +84,7 @@ class SimulatedDualSense(SimulatedHands):
             model,
             Battery(0.95, BatteryState.DISCHARGING) if wireless else CHARGED,
             ON_BLUETOOTH if wireless else ON_USB,
+            strength_step_n,
         )
         self._transport = transport
         self._period_s = bluetooth_period_s if wireless else INPUT_REPORT_PERIOD_S

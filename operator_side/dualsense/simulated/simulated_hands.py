@@ -14,7 +14,7 @@ from operator_side.dualsense.reports.controller_state import (
     Vector3,
 )
 from operator_side.dualsense.reports.models import Model
-from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
+from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
 
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
@@ -26,10 +26,12 @@ class SimulatedHands:
     At first nobody touches the controller, and it lies flat. Forces are those of trigger_model: assumptions.
     """
 
-    def __init__(self, model: Model, battery: Battery, connections: Connections) -> None:
+    def __init__(
+        self, model: Model, battery: Battery, connections: Connections, strength_step_n: float = STRENGTH_STEP_N
+    ) -> None:
         self._model = model
-        self._l2 = SimulatedTrigger()
-        self._r2 = SimulatedTrigger()
+        self._l2 = SimulatedTrigger(strength_step_n)
+        self._r2 = SimulatedTrigger(strength_step_n)
         self._held = ControllerState(battery=battery, connections=connections)
 
     def set_finger_force(self, l2_n: float, r2_n: float) -> None:

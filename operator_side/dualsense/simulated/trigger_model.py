@@ -38,19 +38,23 @@ _TOUCHING_TRAVEL = 0.005
 """How near to a resisting zone the trigger lies against it."""
 
 
-def equilibrium_travel(finger_force_n: float, zone_strengths: tuple[float, ...]) -> float:
+def equilibrium_travel(
+    finger_force_n: float, zone_strengths: tuple[float, ...], strength_step_n: float = STRENGTH_STEP_N
+) -> float:
     """Where a finger that presses from rest with a constant force comes to a stop, 0 to 1.
 
     It is the first travel at which spring and effect together hold the force. The effect is constant within a
     zone, so this may be the very boundary of a stiffer zone. Never grows with any strength, never falls with
-    the force. `zone_strengths`: ten, 0 to 8. ValueError for a negative or non-finite force.
+    the force. `zone_strengths`: ten, 0 to 8. ValueError for a negative or non-finite force or step.
     """
     if not (math.isfinite(finger_force_n) and finger_force_n >= 0.0):
         raise ValueError(f"finger_force_n = {finger_force_n}; valid: finite, 0 or more")
     if len(zone_strengths) != ZONE_COUNT or not all(0 <= k <= MAX_STRENGTH for k in zone_strengths):
         raise ValueError(f"zone_strengths = {zone_strengths}; valid: {ZONE_COUNT} from 0 to {MAX_STRENGTH}")
+    if not (math.isfinite(strength_step_n) and strength_step_n >= 0.0):
+        raise ValueError(f"strength_step_n = {strength_step_n}; valid: finite, 0 or more")
     for zone, strength in enumerate(zone_strengths):
-        balance = (finger_force_n - SPRING_PRELOAD_N - strength * STRENGTH_STEP_N) / SPRING_RISE_N
+        balance = (finger_force_n - SPRING_PRELOAD_N - strength * strength_step_n) / SPRING_RISE_N
         if balance < (zone + 1) / ZONE_COUNT:
             return max(balance, zone / ZONE_COUNT)
     return 1.0
@@ -64,7 +68,9 @@ class SimulatedTrigger:
     second zone, then it holds nothing until the trigger is back before its first one. Vibration moves nothing.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
+        """`strength_step_n`: what one strength resists; 0 for a trigger whose effects are told and not felt."""
+        self._strength_step_n = strength_step_n
         self._finger_force_n = 0.0
         self._effect: AnyEffect = Off()
         self._power = 1.0
@@ -114,7 +120,7 @@ class SimulatedTrigger:
 
     def set_finger_force(self, finger_force_n: float) -> None:
         """Press with a constant force from now on; ValueError for a negative or non-finite one."""
-        self._equilibrium = equilibrium_travel(finger_force_n, self._strengths())
+        self._equilibrium = equilibrium_travel(finger_force_n, self._strengths(), self._strength_step_n)
         self._finger_force_n = finger_force_n
 
     def set_effect(self, effect: AnyEffect, power: float = 1.0) -> None:
@@ -146,4 +152,4 @@ class SimulatedTrigger:
         return tuple(strength * self._power for strength in self._effect.zone_strengths)
 
     def _balance(self) -> None:
-        self._equilibrium = equilibrium_travel(self._finger_force_n, self._strengths())
+        self._equilibrium = equilibrium_travel(self._finger_force_n, self._strengths(), self._strength_step_n)

@@ -8,6 +8,7 @@ import pytest
 
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.person import SimulatedOperator
 from robot_side.settings import RobotSettings
 
 pytestmark = pytest.mark.long
@@ -54,7 +55,9 @@ def test_a_bump_where_contact_begins_comes_to_meet_the_finger() -> None:
     run = loopback("")
     contacts: list[float] = []
     bumps = set()
-    while run.person.phase != "close" and run.clock.now() < 9.0:
+    person = run.person
+    assert isinstance(person, SimulatedOperator)
+    while person.phase != "close" and run.clock.now() < 9.0:
         run.run_until(run.clock.now() + 0.05)
         felt = run.operator.stiffness
         assert felt is None or felt.l2_contact is None

@@ -1,0 +1,89 @@
+"""The true gripper among the true objects, put where one likes: for experiments that look at a motion afterwards."""
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.simulation.ground_truth import least_distance
+from robot_side.simulation.scene import Scene
+from robot_side.simulation.true_contact import free_way
+
+_LEAST_STEP_M = 0.001
+
+
+class PosedScene:
+    """A scene's geometry in poses that were recorded elsewhere; nobody simulates it."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._data = mujoco.MjData(scene.model)
+        self._data.qpos[:] = scene.data.qpos
+        self._gripper = scene.robot.gripper_geoms.astype(np.int64)
+        self._objects = np.array([geom for thing in scene.objects for geom in thing.geoms], dtype=np.int64)
+        self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
+
+    def put(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
+        """Put the joints (n,) and (f,), and every object `shift_m` (3,) from where the scene has it."""
+        data, robot = self._data, self.scene.robot
+        data.qpos[robot.arm_positions] = arm_positions_rad
+        data.qpos[robot.finger_positions] = finger_positions
+        mujoco.mj_kinematics(self.scene.model, data)
+        data.geom_xpos[self._objects] += shift_m
+        self._at_rest_m = data.geom_xpos[self._gripper].copy()
+
+    def approach_axis(self) -> FloatArray:
+        """The tool's approach axis (3,) in the present pose, unit, in the world frame."""
+        axis: FloatArray = self._data.site_xmat[self.scene.robot.site].reshape(3, 3)[:, 2].copy()
+        return axis
+
+    def gap_m(self, farthest_m: float = 1.0) -> float:
+        """The least distance from the gripper to any object, at most `farthest_m`."""
+        return least_distance(self.scene.model, self._data, self._gripper, self._objects, farthest_m)
+
+    def way_m(self, farthest_m: float) -> float:
+        """How far the gripper could go along its approach axis until it touches, at most `farthest_m`."""
+        axis = self.approach_axis()
+        way_m = free_way(self.scene.model, self._data, self._gripper, self._objects, axis, farthest_m)
+        self._data.geom_xpos[self._gripper] = self._at_rest_m
+        return way_m
+
+    def stays_clear(self, ahead_m: float, margin_m: float) -> bool:
+        """Whether the gripper, moved by up to `ahead_m` along its approach axis, stays `margin_m` off everything."""
+        axis, moved_m, clear = self.approach_axis(), 0.0, True
+        while True:
+            gap_m = self.gap_m(margin_m + ahead_m + _LEAST_STEP_M)
+            if gap_m < margin_m:
+                clear = False
+                break
+            if moved_m >= ahead_m:
+                break
+            moved_m = min(moved_m + max(gap_m - margin_m, _LEAST_STEP_M), ahead_m)
+            self._data.geom_xpos[self._gripper] = self._at_rest_m + moved_m * axis
+        self._data.geom_xpos[self._gripper] = self._at_rest_m
+        return clear
+
+    def perceived(self, errors_m: FloatArray) -> PerceivedObjects:
+        """What a camera with these errors (k, 3) says of the objects in the present pose (eq. 1)."""
+        scene, data = self.scene, self._data
+        return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
+
+
+def let_through(scene: Scene) -> None:
+    """Nothing touches anything from now on: the gripper goes through what stands in the way."""
+    scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+
+
+def move_objects(scene: Scene, shift_m: FloatArray) -> None:
+    """Put every object `shift_m` (3,) from where the scene has it, before anything moves.
+
+    ValueError for an object that moves on joints.
+    """
+    model = scene.model
+    geoms = np.array([geom for thing in scene.objects for geom in thing.geoms], dtype=np.int64)
+    roots = np.unique(model.body_rootid[model.geom_bodyid[geoms]])
+    if model.body_dofnum[np.isin(model.body_rootid, roots[roots != 0])].any():
+        raise ValueError("scene: some of its objects move on joints; valid: objects that stand fixed")
+    model.body_pos[roots[roots != 0]] += shift_m
+    model.geom_pos[geoms[model.geom_bodyid[geoms] == 0]] += shift_m
+    mujoco.mj_forward(model, scene.data)
