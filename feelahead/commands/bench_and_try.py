@@ -92,6 +92,12 @@ try_out = Menu(
     "try",
     "experiment",
     {
+        "approach": Entry(
+            "feelahead.experiments.approach.command",
+            "try_approach",
+            "a finger of constant force pulls the gripper towards things: does it hit them, and how fast",
+            "pip install 'feelahead[robot,operator,bench]'",
+        ),
         "haptics": Entry(
             "feelahead.experiments.haptics_on_off",
             "try_haptics",

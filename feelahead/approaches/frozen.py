@@ -1,0 +1,78 @@
+"""What must not change from one law to the next, lest their figures could not be compared: scenes, forces, limits.
+
+The scenes lie in tests/data; the forces of the simulated finger and the limits of the arm are those of commit 92ca53a.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import ConfigurationError
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.dualsense.simulated.trigger_model import (
+    FINGER_TIME_CONSTANT_S,
+    NORMAL_FINGER_FORCE_N,
+    SPRING_PRELOAD_N,
+    SPRING_RISE_N,
+)
+from operator_side.hands.travel_calibration import TravelCalibration
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.settings import CameraSettings, EncoderSettings
+from robot_side.simulation.joint_reference import MotionLimits
+
+SCENES: Final = Path(__file__).parents[2] / "tests" / "data"
+SITE: Final = "tool"
+AHEAD: Final = (
+    *("wall", "plate", "ball", "post", "rod_2mm", "rod_5mm", "rod_10mm"),
+    *("wall_45", "slot", "shelf_edge", "moving", "place_held", "u_mesh", "mug"),
+)
+"""Scenes in which a pull that goes on ends in a contact."""
+PASSED: Final = (
+    *("wall_beside", "table_1_box", "table_2_boxes", "table_12_tetrahedra", "table_mesh"),
+    *("cluttered", "empty"),
+)
+"""Scenes in which it does not: what is felt there is a false alarm."""
+GRIPPED: Final = ("place_held",)
+"""Scenes in which the gripper closes on something before the pull."""
+_HASH_DIGITS = 12
+
+
+def frozen_scene(name: str) -> Path:
+    """The MJCF file of a frozen scene; ConfigurationError where the scenes are not there, as beside a wheel."""
+    path = SCENES / f"{name}.xml"
+    if not path.is_file():
+        names = ", ".join((*AHEAD, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
+        raise ConfigurationError(f"scene {name!r}: {path} is not there; valid: {names}")
+    return path
+
+
+def frozen_values() -> dict[str, Any]:
+    """The forces of the simulated finger, and the limits of finger and arm, as the code has them now."""
+    return {
+        "finger": {
+            "preload_n": SPRING_PRELOAD_N,
+            "rise_n": SPRING_RISE_N,
+            "time_constant_s": FINGER_TIME_CONSTANT_S,
+            "normal_n": NORMAL_FINGER_FORCE_N,
+            "sensed_travel": SENSED_TRAVEL,
+            "zones": ZONE_COUNT,
+            "strengths": MAX_STRENGTH,
+        },
+        "travel": asdict(TravelCalibration()),
+        "arm": asdict(MotionLimits()),
+        "tool": asdict(ToolMotionSettings()),
+        "camera": asdict(CameraSettings()),
+        "encoder": asdict(EncoderSettings()),
+    }
+
+
+def frozen_hash(others: Sequence[Path] = ()) -> str:
+    """One hash of all frozen scenes and values; of the `others`, where a model is none of them, too."""
+    digest = hashlib.sha256(json.dumps(frozen_values(), sort_keys=True).encode())
+    for path in [*sorted(SCENES.glob("*.xml")), *(path for path in others if path.parent.resolve() != SCENES)]:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:_HASH_DIGITS]

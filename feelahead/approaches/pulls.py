@@ -1,0 +1,119 @@
+"""What a hand does with the triggers and sticks over time, whatever it feels: forces in newtons, seeded.
+
+A pull is open loop: the same one again, whatever stands in the way.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from common.protocol.messages import Vector2
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from operator_side.hands.travel_calibration import StickRest, TriggerTravel
+
+PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw"]
+PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)
+
+_TRAVEL = TriggerTravel()
+_STICK = StickRest()
+_NOISE_STEP_S = 0.05
+_LONGEST_S = 20.0
+
+
+@dataclass(frozen=True)
+class Hands:
+    """What both hands do at one moment; sticks as the controller has them, -1 to 1."""
+
+    r2_n: float = 0.0
+    l2_n: float = 0.0
+    left_stick: Vector2 = (0.0, 0.0)
+    right_stick: Vector2 = (0.0, 0.0)
+
+
+Pull = Callable[[float], Hands]
+"""The hands, so many seconds after the pull began."""
+
+
+def force_for(travel: float) -> float:
+    """The force in newtons that holds a free trigger at the calibrated `travel`, 0 to 1."""
+    return SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * _TRAVEL.raw(travel) if travel > 0.0 else 0.0
+
+
+def constant_force(force_n: float) -> Pull:
+    """R2 pressed with `force_n` for good."""
+    hands = Hands(r2_n=force_n)
+    return lambda _: hands
+
+
+def make_pull(kind: PullKind, seed: int) -> Pull:
+    """One pull of its kind, drawn from `seed`.
+
+    steady: one travel between 0.25 and 1. bell: bell-shaped pulls of 0.7 to 1.4 s (minimum jerk), rests between.
+    on_off: pressed for 0.3 to 0.7 s, let go for 0.2 to 0.5 s. random: travel that wanders between 0 and 1.
+    drift, yaw: steady, while a stick moves across at 0.1 m/s, or turns at 0.5 rad/s, to one side.
+    """
+    generator = np.random.default_rng([seed, PULL_KINDS.index(kind)])
+    if kind == "bell":
+        return _bells(generator)
+    if kind == "on_off":
+        return _on_off(generator)
+    if kind == "random":
+        return _wandering(generator)
+    side = float(generator.choice([-1.0, 1.0]))
+    stick = (side * (_STICK.dead_zone + 1.0 - _STICK.dead_zone), 0.0)
+    hands = Hands(
+        r2_n=force_for(float(generator.uniform(0.25, 1.0))),
+        left_stick=stick if kind == "drift" else (0.0, 0.0),
+        right_stick=stick if kind == "yaw" else (0.0, 0.0),
+    )
+    return lambda _: hands
+
+
+def _bells(generator: np.random.Generator) -> Pull:
+    """Speeds like those of a hand that aims: v(t) = peak · 16 x² (1 - x)², x from 0 to 1 (Flash and Hogan 1985)."""
+    bells, end_s = [], 0.0
+    while end_s < _LONGEST_S:
+        duration_s = float(generator.uniform(0.7, 1.4))
+        bells.append((end_s, duration_s, float(generator.uniform(0.5, 1.0))))
+        end_s += duration_s + float(generator.uniform(0.1, 0.4))
+
+    def pull(since_s: float) -> Hands:
+        for start_s, duration_s, peak in bells:
+            if start_s <= since_s < start_s + duration_s:
+                x = (since_s - start_s) / duration_s
+                return Hands(r2_n=force_for(peak * 16.0 * x * x * (1.0 - x) ** 2))
+        return Hands()
+
+    return pull
+
+
+def _on_off(generator: np.random.Generator) -> Pull:
+    force_n = float(generator.uniform(2.0, 3.7))
+    presses, end_s = [], 0.0
+    while end_s < _LONGEST_S:
+        pressed_s = float(generator.uniform(0.3, 0.7))
+        presses.append((end_s, end_s + pressed_s))
+        end_s += pressed_s + float(generator.uniform(0.2, 0.5))
+    pressed = Hands(r2_n=force_n)
+    return lambda since_s: pressed if any(start <= since_s < end for start, end in presses) else Hands()
+
+
+def _wandering(generator: np.random.Generator) -> Pull:
+    """A travel of mean 0.5 and standard deviation 0.35, correlated over 0.4 s, within 0 and 1."""
+    keep = math.exp(-_NOISE_STEP_S / 0.4)
+    value, travels = float(generator.standard_normal()), []
+    for _ in range(round(_LONGEST_S / _NOISE_STEP_S) + 2):
+        travels.append(min(max(0.5 + 0.35 * value, 0.0), 1.0))
+        value = keep * value + math.sqrt(1.0 - keep * keep) * float(generator.standard_normal())
+
+    def pull(since_s: float) -> Hands:
+        place = min(max(since_s, 0.0) / _NOISE_STEP_S, len(travels) - 2.0)
+        index = int(place)
+        part = place - index
+        return Hands(r2_n=force_for((1.0 - part) * travels[index] + part * travels[index + 1]))
+
+    return pull

@@ -1,0 +1,176 @@
+"""A pull in free space, open loop and without haptics, recorded once: it serves every law, P, scene and camera draw.
+
+The whole loopback runs, so that jitter, loss and the arm's own limits are in it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.emulation.clauses import LinkModel
+from common.errors import FeelaheadError
+from feelahead.approaches.frozen import SITE, frozen_scene
+from feelahead.approaches.pulling_hands import PullingHands
+from feelahead.approaches.pulls import PullKind, make_pull
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.main import MOTION_PERIOD_S
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
+from robot_side.simulation.posed_scene import let_through
+from robot_side.simulation.scene import Scene, load_scene
+
+POSE_S = 0.01
+"""The true pose is noted this often."""
+TICK_S = 0.001
+"""And what each side has of the other, this often."""
+_LONGEST_ARMING_S = 30.0
+
+
+@dataclass(frozen=True)
+class RecordedApproach:
+    """What happened on both sides, on the one virtual clock that both share; the pull begins at `began_s`."""
+
+    pull: PullKind
+    link: str
+    seed: int
+    began_s: float
+    pose_time_s: FloatArray
+    """(k,) every 10 ms, from a second before the pull on"""
+    joint_positions_rad: FloatArray
+    """(k, n) true"""
+    joint_velocities_rad_s: FloatArray
+    """(k, n) true"""
+    finger_positions: FloatArray
+    """(k, f) true"""
+    loop_age_s: FloatArray
+    """(k,) t_d of eq. 8 at the robot side"""
+    tick_time_s: FloatArray
+    """(l,) every millisecond"""
+    applied_sent_s: FloatArray
+    """(l,) when the operator side sent the command that the arm follows; NaN for none"""
+    applied_at_s: FloatArray
+    """(l,) when that command arrived"""
+    seen_sent_s: FloatArray
+    """(l,) when the robot side sent the stiffness that the operator side has; NaN for none"""
+    travel: FloatArray
+    """(l, 2) mechanical travel of L2 and R2, 0 to 1"""
+    command_time_s: FloatArray
+    """(c,) every 4 ms: when a command was sent"""
+    command: FloatArray
+    """(c,) calibrated travel of R2 less that of L2, in that command"""
+
+    def pose_row(self, time_s: float) -> int:
+        """The newest row of the poses at `time_s`, the first one before it."""
+        return int(np.clip(np.searchsorted(self.pose_time_s, time_s + 1e-9) - 1, 0, len(self.pose_time_s) - 1))
+
+    def tick_row(self, time_s: float) -> int:
+        """The newest row of the ticks at `time_s`, the first one before it."""
+        return int(np.clip(np.searchsorted(self.tick_time_s, time_s + 1e-9) - 1, 0, len(self.tick_time_s) - 1))
+
+    def arrives_s(self, sent_s: float) -> float:
+        """When a command that was sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
+        # What is newest never gets older but for a gap, in which nothing is followed.
+        newest = np.fmax.accumulate(np.where(np.isnan(self.applied_sent_s), -np.inf, self.applied_sent_s))
+        row = int(np.searchsorted(newest, sent_s - 1e-9))
+        return float(self.tick_time_s[row]) if row < len(newest) else float("inf")
+
+
+def record_approach(
+    pull: PullKind,
+    link: str,
+    seed: int,
+    duration_s: float = 4.0,
+    scene_name: str = "empty",
+    link_model: LinkModel = "datagram",
+) -> RecordedApproach:
+    """Record the pull of this kind and seed from the home pose of a frozen scene, whose objects let it through.
+
+    FeelaheadError where the robot is not armed in time, or its arm is stopped on the way.
+    """
+    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, link_model=link_model, seed=seed)
+    operator = OperatorSettings(link=link, link_model=link_model, seed=seed, haptics=False)
+    scene = load_scene(robot.model, robot.site, robot.roles)
+    let_through(scene)
+    device = SimulatedDualSense()
+    hands = PullingHands(device, make_pull(pull, seed))
+    notes = _Notes(scene)
+    run = Loopback(
+        LoopbackSettings(robot, operator),
+        scene=scene,
+        device=device,
+        person=lambda _: hands,
+        after_robot_tick=lambda now_s: notes.take(run, now_s),
+    )
+    while hands.pull_began_s is None:
+        run.run_until(run.clock.now() + POSE_S)
+        if run.clock.now() > _LONGEST_ARMING_S:
+            raise FeelaheadError(f"the robot was not armed within {_LONGEST_ARMING_S:g} s over --link {link!r}")
+    run.run_until(hands.pull_began_s + duration_s)
+    if run.robot.session.safety.stops:
+        raise FeelaheadError(f"the arm was stopped over --link {link!r}: {run.robot.session.safety.stops[-1][1]}")
+    return notes.record(pull, link, seed, hands.pull_began_s)
+
+
+class _Notes:
+    """What is noted after each turn of the robot side."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._poses: list[tuple[float, FloatArray, FloatArray, FloatArray, float]] = []
+        self._ticks: list[tuple[float, float, float, float, float, float]] = []
+        self._commands: list[tuple[float, float]] = []
+        self._applied = (float("nan"), float("nan"))
+
+    def take(self, run: Loopback, now_s: float) -> None:
+        """One turn."""
+        data, robot = self._scene.data, self._scene.robot
+        command = run.robot.session.safety.command
+        if command is None:
+            self._applied = (float("nan"), float("nan"))
+        elif command.header.sent_s != self._applied[0]:
+            self._applied = (command.header.sent_s, now_s)
+        seen = run.operator.stiffness
+        seen_sent_s = float("nan") if seen is None else seen.header.sent_s
+        self._ticks.append((now_s, *self._applied, seen_sent_s, *run.device.travel))
+        number = len(self._ticks) - 1
+        if number % round(MOTION_PERIOD_S / TICK_S) == 0 and (intent := run.operator.intent) is not None:
+            self._commands.append((now_s, intent.r2 - intent.l2))
+        if number % round(POSE_S / TICK_S) == 0:
+            self._poses.append(
+                (
+                    now_s,
+                    data.qpos[robot.arm_positions].copy(),
+                    data.qvel[robot.arm_velocities].copy(),
+                    data.qpos[robot.finger_positions].copy(),
+                    run.robot.loop_age_s(now_s),
+                )
+            )
+
+    def record(self, pull: PullKind, link: str, seed: int, began_s: float) -> RecordedApproach:
+        """All of it from a second before the pull on."""
+        from_s = began_s - 1.0
+        times, positions, velocities, fingers, ages = zip(
+            *(row for row in self._poses if row[0] >= from_s), strict=True
+        )
+        ticks = np.array([row for row in self._ticks if row[0] >= from_s])
+        commands = np.array(self._commands)
+        return RecordedApproach(
+            pull=pull,
+            link=link,
+            seed=seed,
+            began_s=began_s,
+            pose_time_s=np.array(times),
+            joint_positions_rad=np.array(positions),
+            joint_velocities_rad_s=np.array(velocities),
+            finger_positions=np.array(fingers),
+            loop_age_s=np.array(ages),
+            tick_time_s=ticks[:, 0].copy(),
+            applied_sent_s=ticks[:, 1].copy(),
+            applied_at_s=ticks[:, 2].copy(),
+            seen_sent_s=ticks[:, 3].copy(),
+            travel=ticks[:, 4:6].copy(),
+            command_time_s=commands[:, 0].copy(),
+            command=commands[:, 1].copy(),
+        )

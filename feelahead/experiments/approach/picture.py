@@ -1,0 +1,92 @@
+"""One approach over time, and contact speed against delay for each law."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Final
+
+from common.emulation.spec import LinkSpec
+from feelahead.approaches.approach import Approach, Outcome
+
+_COLOURS: Final = {"none": "#777777", "first": "#0072b2", "paper": "#d55e00"}
+_MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
+
+
+def draw_run(approach: Approach, outcome: Outcome, frozen: str, path: Path) -> None:
+    """R2's zones and travel, speed and gap over time."""
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    trace = outcome.trace
+    figure, (zones, motion) = plt.subplots(2, 1, figsize=(8.0, 5.6), dpi=110, sharex=True, layout="constrained")
+    end_s = max(float(trace.time_s[-1]), 0.01)
+    shown = zones.imshow(
+        trace.strengths.T,
+        aspect="auto",
+        origin="lower",
+        extent=(0.0, end_s, 0.0, 1.0),
+        cmap="Greys",
+        vmin=0,
+        vmax=8,
+        interpolation="nearest",
+    )
+    zones.plot(trace.time_s, trace.travel, color="#d55e00", label="the finger")
+    zones.set(ylabel="travel of R2", ylim=(0.0, 1.0))
+    zones.legend(loc="upper left")
+    figure.colorbar(shown, ax=zones, label="strength, 0 to 8")
+    motion.plot(trace.time_s, 1e3 * trace.speed_m_s, color="#0072b2", label="speed, mm/s")
+    motion.plot(trace.time_s, 1e3 * trace.gap_m, color="#009e73", linestyle="--", label="true gap, mm")
+    motion.axhline(0.0, color="black", linewidth=0.6)
+    if outcome.contact_speed_mm_s is not None:
+        motion.plot(outcome.ended_s, outcome.contact_speed_mm_s, "x", color="black", label="contact")
+    motion.set(xlabel="seconds since the pull began", xlim=(0.0, end_s))
+    motion.legend()
+    link = approach.link or "no delay"
+    title = f"{approach.force_n:g} N in {approach.model.stem}, law {approach.law}, {link} (frozen {frozen})"
+    figure.suptitle(title, fontsize=9)
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path: Path) -> None:
+    """Contact speed against the one-way delay: a panel for each force, a line for each law and scene.
+
+    A run that stops before the contact counts as 0 mm/s; one that is undecided is left out.
+    """
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    forces = sorted({one.force_n for one, _ in ended})
+    scenes = list(dict.fromkeys(one.model.stem for one, _ in ended))
+    laws = list(dict.fromkeys(one.law for one, _ in ended))
+    size = (4.2 * len(forces) + 1.6, 4.2)
+    figure, panels = plt.subplots(
+        1, len(forces), figsize=size, dpi=110, sharey=True, squeeze=False, layout="constrained"
+    )
+    for panel, force_n in zip(panels[0], forces, strict=True):
+        for law in laws:
+            for number, scene in enumerate(scenes):
+                points: dict[float, list[float]] = {}
+                for one, outcome in ended:
+                    if (one.force_n, one.law, one.model.stem) == (force_n, law, scene) and outcome.end != "undecided":
+                        speed = outcome.contact_speed_mm_s or 0.0
+                        points.setdefault(_one_way_ms(one), []).append(speed)
+                delays = sorted(points)
+                label = f"{law}, {scene}" if force_n == forces[0] else None
+                panel.plot(
+                    delays,
+                    [median(points[delay]) for delay in delays],
+                    marker=_MARKS[number % len(_MARKS)],
+                    color=_COLOURS.get(law, "#009e73"),
+                    alpha=0.7,
+                    label=label,
+                )
+        panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms", ylim=(-5.0, None))
+        panel.grid(alpha=0.3)
+    panels[0][0].set_ylabel("speed at contact, mm/s (0: none)")
+    figure.legend(loc="outside right upper", fontsize=7)
+    figure.suptitle(f"frozen {frozen}", fontsize=8)
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def _one_way_ms(approach: Approach) -> float:
+    return 1e3 * LinkSpec.parse(approach.link, 0, approach.link_model).profile("to_robot").mean_delay_s()

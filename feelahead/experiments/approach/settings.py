@@ -1,0 +1,135 @@
+"""What `feelahead try approach` is told, and the approaches that follow from it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from common.emulation.clauses import LinkModel
+from common.emulation.spec import LinkSpec
+from feelahead.approaches.approach import Approach
+from feelahead.approaches.frozen import AHEAD, GRIPPED, SITE, frozen_scene
+from feelahead.approaches.laws import Compensation, Law
+from feelahead.approaches.spoilt import Spoil
+
+_LONGEST_LOOP_S = 2.0
+"""Beyond this loop age the robot side is never armed (SafetySettings.max_delay_s)."""
+
+
+def require_young_loop(spec: str, link_model: LinkModel) -> None:
+    """ValueError for a link over which the robot side is never armed; ConfigurationError for a bad one."""
+    link = LinkSpec.parse(spec, 0, link_model)
+    loop_s = sum(link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
+    if loop_s >= _LONGEST_LOOP_S:
+        raise ValueError(
+            f"--link {spec!r}: a message and its answer take {loop_s:g} s; valid: below {_LONGEST_LOOP_S:g} s, beyond"
+            " which the robot side is never armed"
+        )
+
+
+@dataclass(frozen=True)
+class ApproachSettings:
+    """A finger that presses R2 with a constant force, until the gripper touches something or comes to rest.
+
+    Both sides run in virtual time with the real messages, link, trigger effects and physics: the same command
+    gives the same figures. Without --model, every frozen scene of tests/data that ends in a contact is tried. Options
+    that take several values are combined with each other; with one of each, the summary is that run's own.
+    """
+
+    model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
+    """MJCF scenes with an arm; objects ahead of its tool are what it may hit."""
+    site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
+    """The site between the fingertips, z along the approach."""
+    force: Annotated[tuple[float, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
+    """Newtons on R2, 1 to 4: 2 is a light pull, 3.7 a normal one."""
+    strongest_effect: Annotated[tuple[float, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
+    """Newtons that the strongest effect adds (nobody has measured it): 1.5, 2 and 3 span what is likely."""
+    link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("",)
+    """Emulated links, both ways, in netem's words: "delay 200ms 10ms distribution normal"."""
+    link_model: LinkModel = "datagram"
+    """datagram lets jitter reorder messages, stream keeps them in order."""
+    law: tuple[Law, ...] = ("first",)
+    """What is felt: the first law, the paper's plain one, or none. Several are set side by side."""
+    compensation: Compensation = "robot"
+    """Who reckons with the delay. These laws have eq. 8 at the robot side; no other yet."""
+    haptics: bool = True
+    """Without: the same as --law none."""
+    probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
+    """The laws' own P (eq. 10)."""
+    duration: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 8.0
+    """From the beginning of the pull, in virtual time; a contact ends the run."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """The first seed, for the errors of camera, encoders and link."""
+    seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """How many seeds."""
+    grip: bool = False
+    """Close the gripper on what stands between its fingers first."""
+    spoil: Spoil = "nothing"
+    """Spoil what is felt, to see that the figures notice: 100 ms late, or on the other trigger."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
+    """Runs at the same time."""
+    summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the figures there."""
+    picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    """Draw zones, travel, speed and gap over time (one run), or contact speed against delay (several)."""
+    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """These settings from a file."""
+
+    def __post_init__(self) -> None:
+        for name, values, low, high in (
+            ("force", self.force, 0.0, 20.0),
+            ("strongest-effect", self.strongest_effect, 0.0, 20.0),
+            ("duration", (self.duration,), 0.05, 1000.0),
+        ):
+            for value in values:
+                if not (math.isfinite(value) and low <= value <= high):
+                    raise ValueError(f"--{name} {value}: valid: {low:g} to {high:g}")
+        for name in ("force", "strongest_effect", "link", "law"):
+            if not getattr(self, name):
+                raise ValueError(f"--{name.replace('_', '-')}: valid: one value or more")
+        if not 0.0 < self.probability < 1.0:
+            raise ValueError(f"--probability {self.probability}: valid: above 0 and below 1")
+        for name, lowest in (("seed", 0), ("seeds", 1), ("workers", 1)):
+            if getattr(self, name) < lowest:
+                raise ValueError(f"--{name} {getattr(self, name)}: valid: {lowest} or more")
+        if self.compensation != "robot":
+            raise ValueError(
+                f"--compensation {self.compensation}: law {', '.join(self.law)} reckons with the delay at the robot"
+                " side (eq. 8); valid: robot"
+            )
+        for spec in self.link:
+            require_young_loop(spec, self.link_model)
+        for path in (self.summary, self.picture):
+            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
+                raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
+
+    def models(self) -> tuple[Path, ...]:
+        """The scenes to try; ConfigurationError where the frozen ones are not there."""
+        return self.model or tuple(frozen_scene(name) for name in AHEAD)
+
+    def approaches(self) -> Iterator[Approach]:
+        """Every combination, the seeds innermost."""
+        for model in self.models():
+            for link in self.link:
+                for force_n in self.force:
+                    for strongest_n in self.strongest_effect:
+                        for law in self.law if self.haptics else ("none",):
+                            for seed in range(self.seed, self.seed + self.seeds):
+                                yield Approach(
+                                    model=model,
+                                    force_n=force_n,
+                                    site=self.site,
+                                    strongest_n=strongest_n,
+                                    link=link,
+                                    link_model=self.link_model,
+                                    law=law,
+                                    compensation=self.compensation,
+                                    probability=self.probability,
+                                    duration_s=self.duration,
+                                    seed=seed,
+                                    grip=self.grip or (not self.model and model.stem in GRIPPED),
+                                    spoil=self.spoil,
+                                )
