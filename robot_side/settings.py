@@ -64,6 +64,8 @@ class EnlargementOptions:
     """`once` takes the largest over sampled configurations, as the paper does."""
     direction: Literal["isotropic", "towards_object"] = "isotropic"
     """One distance a sphere (the paper), or one for each sphere and object."""
+    fixed_m: float | None = None
+    """A fixed enlargement in place of eq. 8-10, to compare with."""
 
 
 @dataclass(frozen=True)
@@ -126,4 +128,5 @@ class RobotSettings(RunOptions):
             measure=self.enlargement.measure,
             mode=self.enlargement.mode,
             direction=self.enlargement.direction,
+            fixed_m=self.enlargement.fixed_m,
         )

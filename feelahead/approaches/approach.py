@@ -1,7 +1,7 @@
 """One approach: a finger of constant force pulls R2, both sides and the link in virtual time. Does it hit?"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -18,7 +18,8 @@ from feelahead.approaches.spoilt import Spoil, controller
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.settings import OperatorSettings
-from robot_side.settings import CameraSettings, RobotSettings
+from robot_side.settings import CameraSettings, EnlargementOptions, RobotSettings
+from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
@@ -28,6 +29,8 @@ STANDS_M_S = 0.001
 """Slower than this for the last second, the gripper has stopped."""
 SWING_M_S = 0.015
 """A change of speed that counts when reversals are counted."""
+REACTION_S = 0.25
+"""What a person needs from feeling to letting go (assumed)."""
 _LAST_S = 1.0
 _LONGEST_ARMING_S = 30.0
 
@@ -53,6 +56,9 @@ class Approach:
     seed: int = 0
     grip: bool = False
     spoil: Spoil = "nothing"
+    camera_sd_m: float = 0.003
+    margin_m: float | None = None
+    """The fixed enlargement of the law `margin`."""
 
 
 @dataclass(frozen=True)
@@ -112,41 +118,99 @@ class _Samples:
         )
 
 
-class _Watch:
-    """Sees the truth after each turn of the robot side."""
+class PullRun:
+    """Both sides, their link and a hand that pulls, from the start until whoever runs it has seen enough."""
 
-    def __init__(self, truth: TrueContact) -> None:
-        self.truth = truth
+    def __init__(
+        self,
+        approach: Approach,
+        pull: Pull | None = None,
+        shift_m: FloatArray | None = None,
+        *,
+        lets_go: bool = False,
+    ) -> None:
+        """`pull`: instead of the constant force. shift_m (3,): the objects stand so far from where the scene has them.
+
+        `lets_go`: the hand lets go 0.25 s after it has felt full strength in the zone where its finger is.
+        """
+        self.approach = approach
         self.onset: ContactOnset | None = None
+        """The first contact since the pull began."""
         self.samples = _Samples()
-        self.run: Loopback | None = None
-        self.hands: PullingHands | None = None
+        robot = robot_settings(approach)
+        operator = OperatorSettings(
+            link=approach.link, link_model=approach.link_model, seed=approach.seed, haptics=approach.law != "none"
+        )
+        scene = load_scene(robot.model, robot.site, robot.roles)
+        if shift_m is not None:
+            move_objects(scene, shift_m)
+        self.truth = TrueContact(scene)
+        device = controller(approach.strongest_n / MAX_STRENGTH, "full" if approach.law == "full" else approach.spoil)
+        self.hands = PullingHands(device, pull or constant_force(approach.force_n), grip=approach.grip)
+        self.loopback = Loopback(
+            LoopbackSettings(robot, operator),
+            scene=scene,
+            device=device,
+            person=lambda _: self.hands,
+            after_robot_tick=self._after_robot_tick,
+        )
+        self._scene = scene
+        self._lets_go = lets_go
         self._next_s = -math.inf
 
-    def after_robot_tick(self, now_s: float) -> None:
-        run, hands = self.run, self.hands
-        if run is None or hands is None or self.onset is not None:
+    @property
+    def tool_position_m(self) -> FloatArray:
+        """The true tool (3,) in the world frame."""
+        position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
+        return position
+
+    def arm(self) -> float:
+        """Go on until the pull begins; when that is. FeelaheadError where the robot is not armed in time."""
+        while self.hands.pull_began_s is None:
+            self.loopback.run_until(self.loopback.clock.now() + SAMPLE_S)
+            if self.loopback.clock.now() > _LONGEST_ARMING_S:
+                raise FeelaheadError(self._not_armed())
+        return self.hands.pull_began_s
+
+    def go_on(self, until_s: float) -> Iterator[float]:
+        """Go on until a contact or `until_s`, with a pause each 10 ms for the caller to look or to leave."""
+        clock = self.loopback.clock
+        while self.onset is None and clock.now() < until_s:
+            self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
+            yield clock.now()
+
+    def _not_armed(self) -> str:
+        stops = self.loopback.robot.session.safety.stops
+        why = f"; it stopped: {stops[-1][1]}" if stops else ""
+        grip = " and did not grip" if self.approach.grip else ""
+        link = self.approach.link
+        return f"the robot was not armed{grip} within {_LONGEST_ARMING_S:g} s over --link {link!r}{why}"
+
+    def _after_robot_tick(self, now_s: float) -> None:
+        if self.onset is not None:
             return
+        run, hands = self.loopback, self.hands
         onset = self.truth.update(run.robot.held)
         if hands.pull_began_s is None:
             return
         self.onset = onset
+        strengths, travel = run.device.effects[1].zone_strengths, run.device.travel[1]
+        if self._lets_go and hands.let_go_s is None:
+            zone = min(int(travel * len(strengths)), len(strengths) - 1)
+            if strengths[zone] == MAX_STRENGTH:
+                hands.let_go_s = now_s + REACTION_S
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             self.samples.time_s.append(now_s - hands.pull_began_s)
             self.samples.speed_m_s.append(self.truth.approach()[1])
             self.samples.gap_m.append(self.truth.gap_m(run.robot.held))
-            self.samples.travel.append(run.device.travel[1])
-            self.samples.strengths.append(run.device.effects[1].zone_strengths)
+            self.samples.travel.append(travel)
+            self.samples.strengths.append(strengths)
 
 
-def run_approach(approach: Approach, pull: Pull | None = None, camera: CameraSettings | None = None) -> Outcome:
-    """Run it to its contact, or to its end; the same settings give the same outcome.
-
-    `pull`: instead of R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
-    used; FeelaheadError where the robot is not armed in time.
-    """
-    robot = RobotSettings(
+def robot_settings(approach: Approach) -> RobotSettings:
+    """The robot side of an approach; ConfigurationError for a model or a link that cannot be used."""
+    return RobotSettings(
         model=approach.model,
         site=approach.site,
         link=approach.link,
@@ -154,43 +218,36 @@ def run_approach(approach: Approach, pull: Pull | None = None, camera: CameraSet
         seed=approach.seed,
         probability=approach.probability,
         stiffness=stiffness_settings(approach.law),
-        camera=camera or CameraSettings(),
+        camera=CameraSettings(sd_m=approach.camera_sd_m),
+        enlargement=EnlargementOptions(fixed_m=approach.margin_m if approach.law == "margin" else None),
     )
-    operator = OperatorSettings(
-        link=approach.link, link_model=approach.link_model, seed=approach.seed, haptics=approach.law != "none"
-    )
-    scene = load_scene(robot.model, robot.site, robot.roles)
-    watch = _Watch(TrueContact(scene))
-    device = controller(approach.strongest_n / MAX_STRENGTH, approach.spoil)
-    hands = PullingHands(device, pull or constant_force(approach.force_n), grip=approach.grip)
-    run = Loopback(
-        LoopbackSettings(robot, operator),
-        scene=scene,
-        device=device,
-        person=lambda _: hands,
-        after_robot_tick=watch.after_robot_tick,
-    )
-    watch.run, watch.hands = run, hands
-    while hands.pull_began_s is None:
-        run.run_until(run.clock.now() + SAMPLE_S)
-        if run.clock.now() > _LONGEST_ARMING_S:
-            raise FeelaheadError(_not_armed(approach, run))
-    end_s = hands.pull_began_s + approach.duration_s
-    while watch.onset is None and run.clock.now() < end_s:
-        run.run_until(min(run.clock.now() + SAMPLE_S, end_s))
-    return _outcome(watch, run.robot.held)
 
 
-def _not_armed(approach: Approach, run: Loopback) -> str:
-    stops = run.robot.session.safety.stops
-    why = f"; it stopped: {stops[-1][1]}" if stops else ""
-    grip = " and did not grip" if approach.grip else ""
-    return f"the robot was not armed{grip} within {_LONGEST_ARMING_S:g} s over --link {approach.link!r}{why}"
+def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
+    """Run it to its contact, or to its end; the same settings give the same outcome.
+
+    `pull`: instead of R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
+    used; FeelaheadError where the robot is not armed in time.
+    """
+    run = PullRun(approach, pull)
+    for _ in run.go_on(run.arm() + approach.duration_s):
+        pass
+    return _outcome(run)
 
 
-def _outcome(watch: _Watch, held: str | None) -> Outcome:
-    trace = watch.samples.trace()
-    onset = watch.onset
+def time_to_goal_s(approach: Approach, pull: Pull, goal_m: float) -> float | None:
+    """How long the pull takes to bring the tool `goal_m` ahead; None where it touches, or is not there in time."""
+    run = PullRun(approach, pull)
+    began_s = run.arm()
+    axis, start_m = run.truth.approach()[0], run.tool_position_m
+    for now_s in run.go_on(began_s + approach.duration_s):
+        if (run.tool_position_m - start_m) @ axis >= goal_m:
+            return now_s - began_s
+    return None
+
+
+def _outcome(run: PullRun) -> Outcome:
+    trace, onset = run.samples.trace(), run.onset
     end: End = "contact" if onset is not None else "stopped" if stands(trace) else "undecided"
     stopped = end == "stopped"
     return Outcome(
@@ -199,7 +256,7 @@ def _outcome(watch: _Watch, held: str | None) -> Outcome:
         contact_with=None if onset is None else onset.thing,
         least_gap_mm=1e3 * float(trace.gap_m.min(initial=math.inf)),
         stops_at_mm=1e3 * float(trace.gap_m[-1]) if stopped else None,
-        way_left_mm=1e3 * watch.truth.way_left_m(watch.truth.approach()[0], held) if stopped else None,
+        way_left_mm=1e3 * run.truth.way_left_m(run.truth.approach()[0], run.loopback.robot.held) if stopped else None,
         reversals=reversals(trace.speed_m_s.tolist()),
         ended_s=float(trace.time_s[-1]),
         trace=trace,

@@ -4,11 +4,15 @@ from collections import deque
 from dataclasses import replace
 from typing import Literal
 
-from operator_side.dualsense.reports.output_report import build_output_report, parse_output_report
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report, parse_output_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 Spoil = Literal["nothing", "delayed", "swapped"]
 """delayed: effects come 100 ms late. swapped: what is meant for one trigger is felt on the other."""
+_FULL = OutputReport(
+    l2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT), r2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT)
+)
 SPOILING_DELAY_S = 0.1
 
 
@@ -43,8 +47,25 @@ class SwappedDualSense(SimulatedDualSense):
         super().write(build_output_report(replace(told, l2=told.r2, r2=told.l2)), now_s)
 
 
-def controller(strength_step_n: float, spoil: Spoil = "nothing") -> SimulatedDualSense:
+class FullDualSense(SimulatedDualSense):
+    """Resists with the strongest effect everywhere, whatever it is told."""
+
+    def write(self, report: bytes, now_s: float) -> None:
+        """Take an output report, and do something else."""
+        del report
+        super().write(build_output_report(_FULL), now_s)
+
+    def read(self, now_s: float) -> bytes | None:
+        """As any controller; it resists from the first time on."""
+        if self.released:
+            super().write(build_output_report(_FULL), now_s)
+        return super().read(now_s)
+
+
+def controller(strength_step_n: float, spoil: Spoil | Literal["full"] = "nothing") -> SimulatedDualSense:
     """A simulated controller, spoilt as asked."""
+    if spoil == "full":
+        return FullDualSense(strength_step_n=strength_step_n)
     if spoil == "delayed":
         return DelayedDualSense(strength_step_n)
     kind = SwappedDualSense if spoil == "swapped" else SimulatedDualSense

@@ -59,6 +59,12 @@ bench = Menu(
             "run time against error of the exact overlaps and of what is used in their place",
             "pip install 'feelahead[robot,bench]'",
         ),
+        "coverage": Entry(
+            "feelahead.benchmarks.coverage.bench",
+            "bench_coverage",
+            "how often full stiffness stands in time, and how often without need, for each law",
+            "pip install 'feelahead[robot,operator,bench]'",
+        ),
         "link": Entry(
             "feelahead.benchmarks.link.bench",
             "bench_link",

@@ -96,6 +96,8 @@ class EnlargementSettings:
     """`once`: the largest variance over sampled configurations (the paper); else the present one's."""
     direction: Literal["isotropic", "towards_object"] = "isotropic"
     """`isotropic`: one distance a sphere (the paper); `towards_object`: one for each sphere and object."""
+    fixed_m: float | None = None
+    """An enlargement that is always the same, to compare with: eq. 8-10 are not used. None for none."""
 
     def __post_init__(self) -> None:
         try:
@@ -103,6 +105,7 @@ class EnlargementSettings:
             _non_negative("camera_sd_m", self.camera_sd_m)
             require_finite("camera_mean_m", np.asarray(self.camera_mean_m))
             require_finite("kinematic_mean_m", np.asarray(self.kinematic_mean_m))
+            _non_negative("fixed_m", 0.0 if self.fixed_m is None else self.fixed_m)
         except ValueError as error:
             raise ConfigurationError(str(error)) from None
         for name, valid in (
@@ -141,6 +144,8 @@ class Enlargement:
         velocities_m_s (m, 3) of the centres. With P >= 0.5 it is an upper bound of `distances_towards`.
         """
         require_age(loop_age_s)
+        if self.settings.fixed_m is not None:
+            return np.full(len(velocities_m_s), self.settings.fixed_m)
         if self._variance_once_m2 is None:
             variance_m2 = scalar_variance(covariances, self.settings.measure)
         else:
@@ -175,6 +180,8 @@ class Enlargement:
         """
         require_finite("velocities_m_s", velocities_m_s)
         require_age(loop_age_s)
+        if self.settings.fixed_m is not None:
+            return np.full(directions.shape[:-1], self.settings.fixed_m)
         variance = (
             directional_variance(covariances, directions)
             if self._variance_once_m2 is None

@@ -48,7 +48,9 @@ class TrueContact:
         """
         if self._data.time == self._seen_s:
             return None
-        touching = [pair for contact in self._data.contact if (pair := self._pair(contact, held)) is not None]
+        data = self._data
+        # Looking at MuJoCo's contacts one by one takes longer than a step of the physics: most of the time there is none.
+        touching = [pair for row in range(data.ncon) if (pair := self._pair(data.contact[row], held)) is not None]
         found = self._onsets(touching) if touching else []
         self._remember()
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)

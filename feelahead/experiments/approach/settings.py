@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -12,7 +12,7 @@ from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import AHEAD, GRIPPED, SITE, frozen_scene
-from feelahead.approaches.laws import Compensation, Law
+from feelahead.approaches.laws import Compensation
 from feelahead.approaches.spoilt import Spoil
 
 _LONGEST_LOOP_S = 2.0
@@ -51,8 +51,9 @@ class ApproachSettings:
     """Emulated links, both ways, in netem's words: "delay 200ms 10ms distribution normal"."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
-    law: tuple[Law, ...] = ("first",)
-    """What is felt: the first law, the paper's plain one, or none. Several are set side by side."""
+    law: tuple[Literal["first", "paper", "none", "full"], ...] = ("first",)
+    """What is felt: the first law, the paper's plain one, nothing, or always the strongest effect. Several are set side
+    by side."""
     compensation: Compensation = "robot"
     """Who reckons with the delay. These laws have eq. 8 at the robot side; no other yet."""
     haptics: bool = True

@@ -1,0 +1,59 @@
+"""`feelahead bench coverage`: do the work, keep it, and show it."""
+
+import csv
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from common.command.command_line import parse_settings
+from feelahead.approaches.frozen import frozen_hash
+from feelahead.benchmarks.coverage.evaluate import Row
+from feelahead.benchmarks.coverage.settings import CoverageSettings
+from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table
+from feelahead.benchmarks.coverage.work import Kept, Piece, do, pieces
+
+_PROGRAM = "feelahead bench coverage"
+
+
+def bench_coverage(arguments: Sequence[str]) -> int:
+    """Run the benchmark, print its tables, write the CSV and the picture."""
+    settings = parse_settings(CoverageSettings, _PROGRAM, arguments)
+    plan, frozen = settings.plan(), frozen_hash()
+    setup = {"plan": asdict(plan), "seed": settings.seed, "spoil": settings.spoil}
+    kept = Kept(settings.resume, setup)
+    whole = pieces(plan, settings.seed, settings.spoil)
+    _work([piece for piece in whole if piece.name not in kept.done], kept, settings.workers)
+    records = [record for piece in whole for record in kept.done[piece.name]]
+    cells = sorted((one for one in records if one["kind"] == "cell"), key=lambda one: one["cell"])
+    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
+    console.print(coverage_table(cells, settings.laws))
+    console.print(alarm_table(cells, settings.laws))
+    console.print(law_table(records, settings.laws))
+    if unavoidable := sum(one["unavoidable"] for one in cells if one["law"] == settings.laws[0]):
+        places = sum(one["places"] for one in cells if one["law"] == settings.laws[0])
+        console.print(f"{unavoidable} of {places} places in which no release avoids the contact are not judged")
+    for line in check_lines(records):
+        console.print(line)
+    console.print(f"frozen scenes and limits: {frozen}")
+    if settings.csv is not None:
+        with settings.csv.open("w", newline="", encoding="utf-8") as file:
+            names = [column.name for column in fields(Row)] + ["frozen"]
+            writer = csv.DictWriter(file, names, extrasaction="ignore")
+            writer.writeheader()
+            writer.writerows(one | {"frozen": frozen} for one in cells)
+    if settings.picture is not None:
+        draw(records, settings.laws, frozen, settings.picture)
+    return 0
+
+
+def _work(todo: list[Piece], kept: Kept, workers: int) -> None:
+    """Do what is left, with a bar of the time that is left."""
+    columns = (TextColumn("coverage"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("coverage", total=sum(piece.weight for piece in todo))
+        for piece, records in do(todo, workers):
+            kept.keep(piece, records)
+            progress.advance(bar, piece.weight)

@@ -1,0 +1,97 @@
+"""Where things are put so that a recorded approach meets them, and the last moment at which letting go avoids that."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.arrays import FloatArray
+from feelahead.benchmarks.coverage.replay import Replay
+from robot_side.simulation.posed_scene import PosedScene
+
+_FASTEST_M_S = 0.45
+"""No part of the gripper is faster: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""
+_LEAST_STEP_S = 0.002
+_FIRST_S = 0.3
+"""No contact is sought before the pull has lasted for so long."""
+_LEAST_START_GAP_M = 0.015
+_ACROSS_M = 0.01
+"""Things are put up to so far from where the scene has them, to each side and up or down."""
+_TRIES = 40
+
+
+@dataclass(frozen=True)
+class Collision:
+    """One place of the objects."""
+
+    shift_m: FloatArray
+    """(3,) from where the scene has them"""
+    touch_s: float
+    """When the true gripper would touch, if the pull went on"""
+    last_release_s: float | None
+    """The last moment, on the operator side, at which letting go avoids it; None where no release does."""
+
+
+def place(replay: Replay, posed: PosedScene, generator: np.random.Generator) -> Collision | None:
+    """Draw a place of the objects in which the approach collides, at an even chance for each moment of the pull.
+
+    None where that was not found after 40 draws.
+    """
+    record = replay.record
+    posed.put(*_pose(replay, record.began_s), np.zeros(3))
+    home_way_m = posed.way_m(1.0)
+    across = np.linalg.svd(replay.axis[None, :])[2][1:]
+    for _ in range(_TRIES):
+        moment_s = float(generator.uniform(record.began_s + _FIRST_S, replay.end_s))
+        ahead_m = float(np.interp(moment_s, record.pose_time_s, replay.along_m)) - home_way_m
+        shift_m = ahead_m * replay.axis + generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
+        posed.put(*_pose(replay, record.began_s), shift_m)
+        if posed.gap_m() < _LEAST_START_GAP_M:
+            continue
+        touch_s = first_touch_s(replay, posed, shift_m)
+        if touch_s is not None:
+            return Collision(shift_m, touch_s, last_release_s(replay, posed, shift_m, touch_s))
+    return None
+
+
+def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray) -> float | None:
+    """When the true gripper first touches the objects moved by `shift_m` (3,); None within the record."""
+    time_s = replay.record.began_s
+    while time_s <= replay.end_s:
+        posed.put(*_pose(replay, time_s), shift_m)
+        gap_m = posed.gap_m()
+        if gap_m <= 0.0:
+            return time_s
+        time_s += max(gap_m / _FASTEST_M_S, _LEAST_STEP_S)
+    return None
+
+
+def last_release_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float) -> float | None:
+    """The last moment at which letting go avoids the contact, to 2 ms; None where no release since the pull began does.
+
+    How far a released arm gets never falls with the moment of release, as no pull here moves back.
+    """
+    early_s, late_s = replay.record.began_s, touch_s
+    if not avoids(replay, posed, shift_m, touch_s, early_s):
+        return None
+    while late_s - early_s > _LEAST_STEP_S:
+        middle_s = 0.5 * (early_s + late_s)
+        if avoids(replay, posed, shift_m, touch_s, middle_s):
+            early_s = middle_s
+        else:
+            late_s = middle_s
+    return early_s
+
+
+def avoids(replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float) -> bool:
+    """Whether letting go at `released_s` leaves a gap."""
+    stopped = replay.stopped_joints(released_s)
+    if stopped is None or stopped[0] >= touch_s:
+        return False
+    _, fingers = _pose(replay, stopped[0])
+    posed.put(stopped[1], fingers, shift_m)
+    return posed.gap_m() > 0.0
+
+
+def _pose(replay: Replay, time_s: float) -> tuple[FloatArray, FloatArray]:
+    record = replay.record
+    return replay.joints_at(time_s)[0], record.finger_positions[record.pose_row(time_s)]

@@ -1,0 +1,124 @@
+"""Whether full strength stood in time, and whether strength stood that nothing called for."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtri
+
+from common.arrays import FloatArray
+from feelahead.approaches.approach import REACTION_S
+from feelahead.benchmarks.coverage.laws import Draw, FieldLaw
+from feelahead.benchmarks.coverage.replay import Replay
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.hands.travel_calibration import TriggerTravel
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.posed_scene import PosedScene
+
+HORIZON_S: Final = 0.30
+"""The reaction, the finger's own 0.04 s and the write's 0.01 s: for so long a zone's speed goes on."""
+ALARM_STRENGTH: Final = 4
+CLEAR_M: Final = 0.015
+"""So much farther off than D_σ nothing calls for strength."""
+ALARM_STEP_S: Final = 0.02
+_L2, _R2 = 0, 1
+_TRAVEL = TriggerTravel()
+
+
+@dataclass(frozen=True)
+class Stood:
+    """What one law did for one draw."""
+
+    covered: bool
+    """Full strength stood in the zone that the finger reaches, 0.25 s before the last moment to let go."""
+    strength: int
+    """What stood there then, 0 to 8."""
+
+
+def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
+    """Judge `law` by the definition above."""
+    at_s = last_release_s - REACTION_S
+    strengths = law.felt(draw, np.array([at_s]))[0, _R2]
+    strength = int(strengths[reached_zone(draw.replay, at_s, last_release_s)])
+    return Stood(strength == MAX_STRENGTH, strength)
+
+
+def reached_zone(replay: Replay, from_s: float, to_s: float) -> int:
+    """The deepest of the ten zones that R2 reaches between two moments."""
+    record = replay.record
+    rows = slice(record.tick_row(from_s), record.tick_row(to_s) + 1)
+    return zone_of(float(record.travel[rows, _R2].max()))
+
+
+def zone_of(travel: float) -> int:
+    """The zone, 0 to 9, of a mechanical travel, 0 to 1."""
+    return min(int(travel * ZONE_COUNT), ZONE_COUNT - 1)
+
+
+def zone_speed_m_s(zone: int) -> float:
+    """What the middle of a zone commands: its calibrated travel times the full speed."""
+    raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
+    return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """Strength of 4 or more under the finger that nothing called for."""
+
+    count: int
+    """Stretches of it."""
+    alarm_s: float
+    judged_s: float
+    """The pull's time in which R2 was pulled at all."""
+
+
+def false_alarms(
+    law: FieldLaw, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float, probability: float
+) -> Alarms:
+    """Judge every 20 ms from the pull's beginning until `until_s`, before the contact if there is one.
+
+    An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear: what is under way,
+    then the zone's speed for 0.3 s, then braking.
+    """
+    replay = draw.replay
+    record = replay.record
+    times = np.arange(record.began_s, min(until_s, replay.end_s), ALARM_STEP_S)
+    travels = record.travel[[record.tick_row(time_s) for time_s in times], _R2]
+    pulled = travels > SENSED_TRAVEL * _TRAVEL.dead_zone
+    if not pulled.any():
+        return Alarms(0, 0.0, 0.0)
+    strengths = law.felt(draw, times)[:, _R2]
+    alarmed = np.zeros(len(times), dtype=np.bool_)
+    for number in np.flatnonzero(pulled):
+        zone = zone_of(float(travels[number]))
+        if strengths[number, zone] >= ALARM_STRENGTH:
+            time_s = float(times[number])
+            joints, _ = replay.joints_at(time_s)
+            posed.put(joints, record.finger_positions[record.pose_row(time_s)], shift_m)
+            margin_m = statistical_distance_m(draw, time_s, probability) + CLEAR_M
+            alarmed[number] = posed.stays_clear(stopping_path_m(replay, time_s, zone), margin_m)
+    starts = int(np.count_nonzero(alarmed & ~np.concatenate([[False], alarmed[:-1]])))
+    return Alarms(starts, ALARM_STEP_S * float(alarmed.sum()), ALARM_STEP_S * float(pulled.sum()))
+
+
+def stopping_path_m(replay: Replay, time_s: float, zone: int) -> float:
+    """How far the gripper goes if the finger stays in `zone` for 0.3 s more and then lets go."""
+    speed = zone_speed_m_s(zone)
+    braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(time_s))
+    return max(0.0, replay.under_way_m(time_s)) + speed * HORIZON_S + braking_m
+
+
+def statistical_distance_m(draw: Draw, time_s: float, probability: float) -> float:
+    """D_σ(P) = max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)) (eq. 9-10 without the delay), the largest of the gripper's spheres."""
+    replay = draw.replay
+    pose = replay.estimated[replay.record.pose_row(time_s)]
+    encoder = Encoder(replay.encoder.sigma_rad, replay.encoder.resolution_rad)
+    sigma_rad = np.full(pose.tool_jacobian.shape[1], encoder.standard_deviation_rad())
+    covariances = position_covariance(pose.sphere_jacobians, sigma_rad)
+    directions = np.broadcast_to(pose.tool_rotation[:, 2], (len(covariances), 1, 3))
+    variance = float(np.max(directional_variance(covariances, directions))) + draw.camera_sd_m**2
+    return max(0.0, float(ndtri(probability)) * math.sqrt(variance))

@@ -1,0 +1,217 @@
+"""Everything about the cells of one motion: its approaches are recorded once and judged for every cell, law and P."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from common.arrays import FloatArray
+from feelahead.approaches.frozen import PASSED, SITE, frozen_scene
+from feelahead.approaches.recording import record_approach
+from feelahead.approaches.spoilt import Spoil
+from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan
+from feelahead.benchmarks.coverage.collisions import Collision, place
+from feelahead.benchmarks.coverage.covered import false_alarms, stood
+from feelahead.benchmarks.coverage.intervals import draws_needed, share
+from feelahead.benchmarks.coverage.laws import Comparison, Draw, FieldLaw
+from feelahead.benchmarks.coverage.replay import Replay
+from robot_side.enlargement.distance import Enlargement, EnlargementSettings
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.scene import Scene, load_scene
+
+_ALARM_DRAWS = 2
+"""Camera draws a place in which false alarms are looked for."""
+_MOVING_M_S = 0.01
+
+
+@dataclass(frozen=True)
+class Row:
+    """One cell, law and P."""
+
+    cell: str
+    scene: str
+    pull: str
+    link: str
+    camera_mm: float
+    encoder_factor: float
+    law: str
+    probability: float
+    coverage: float | None
+    """None where nothing collides, or no release avoids it."""
+    low: float | None
+    high: float | None
+    draws: int
+    approaches: int
+    holds: bool | None
+    mean_strength: float | None
+    """In the zone that the finger reaches, 0.25 s before the last moment to let go."""
+    places: int
+    unavoidable: int
+    """Places in which no release since the pull's beginning avoids the contact; not among the draws."""
+    alarms_per_min: float
+    alarm_share: float
+    judged_s: float
+    margin_mm: float
+    """The fixed margin that stands beside the first law: its mean enlargement while moving."""
+
+
+@dataclass
+class _Counts:
+    """Of one law at one P; `hits` and `draws` have an entry for each approach."""
+
+    hits: list[int] = field(default_factory=list)
+    draws: list[int] = field(default_factory=list)
+    strength: int = 0
+    alarms: int = 0
+    alarm_s: float = 0.0
+    judged_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Staged:
+    """One approach among the objects of one cell, in every place."""
+
+    replay: Replay
+    posed: PosedScene
+    collisions: tuple[Collision, ...]
+    """Empty where nothing collides: the objects then stand where the scene has them."""
+
+    @property
+    def avoidable(self) -> tuple[tuple[Collision, float], ...]:
+        """Collisions that some release avoids, with the last moment for it."""
+        return tuple((one, one.last_release_s) for one in self.collisions if one.last_release_s is not None)
+
+    def draw(self, shift_m: FloatArray, cell: Cell, number: int) -> Draw:
+        """The objects moved by shift_m (3,), seen with the camera's `number`-th error."""
+        record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
+        sd_m = 1e-3 * cell.camera_mm
+        errors_m = CameraError(names, 0.0, sd_m, 0.0, _seed(record.seed, number)).next_frame()
+        self.posed.put(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
+        return Draw(self.replay, self.posed.perceived(errors_m), sd_m)
+
+
+def evaluate(
+    motion: Motion, cells: Sequence[Cell], plan: Plan, seed: int, spoil: Spoil = "nothing"
+) -> Iterator[list[Row]]:
+    """The rows of each cell in turn; the same seed gives the same rows."""
+    records = [
+        record_approach(motion.pull, LINKS[motion.link], seed + number, scene_name=motion.home)
+        for number in range(plan.approaches)
+    ]
+    for cell in cells:
+        scene = _scene(cell.scene)
+        encoder = EncoderSettings(sigma_rad=cell.encoder_factor * EncoderSettings().sigma_rad)
+        staged = [_stage(cell, Replay(record, scene, encoder, record.seed), plan.places) for record in records]
+        yield _evaluate_cell(cell, staged, plan, spoil)
+
+
+@cache
+def _scene(name: str) -> Scene:
+    return load_scene(frozen_scene(name), SITE)
+
+
+def _seed(approach: int, number: int) -> int:
+    return int(np.random.SeedSequence([approach, number]).generate_state(1)[0])
+
+
+def _stage(cell: Cell, replay: Replay, places: int) -> _Staged:
+    posed = PosedScene(_scene(cell.scene))
+    if cell.scene in PASSED:
+        return _Staged(replay, posed, ())
+    generator = np.random.default_rng([replay.record.seed, 0x71ACE])
+    found = [place(replay, posed, generator) for _ in range(places)]
+    return _Staged(replay, posed, tuple(one for one in found if one is not None))
+
+
+def _evaluate_cell(cell: Cell, staged: Sequence[_Staged], plan: Plan, spoil: Spoil) -> list[Row]:
+    rows = []
+    for probability in plan.probabilities:
+        margin_m = mean_enlargement_m([one.replay for one in staged], cell, probability)
+        comparison = Comparison(margin_m, spoil)
+        for name in plan.laws:
+            counts, law = _Counts(), comparison.law(name, probability)
+            _count_covered(counts, law, cell, staged, probability)
+            _count_alarms(counts, law, cell, staged, probability)
+            rows.append(_row(cell, name, probability, counts, staged, margin_m))
+    return rows
+
+
+def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_Staged], probability: float) -> None:
+    """At least n >= 10 / (1 - P) draws, as many for each approach that has a contact to avoid."""
+    useful = [one for one in staged if one.avoidable]
+    each = math.ceil(draws_needed(probability) / max(1, len(useful)))
+    for one in useful:
+        hits = 0
+        for number in range(each):
+            collision, last_release_s = one.avoidable[number % len(one.avoidable)]
+            judged = stood(law, one.draw(collision.shift_m, cell, number), last_release_s)
+            hits += judged.covered
+            counts.strength += judged.strength
+        counts.hits.append(hits)
+        counts.draws.append(each)
+
+
+def _count_alarms(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_Staged], probability: float) -> None:
+    for one in staged:
+        places = [(each.shift_m, each.touch_s) for each in one.collisions[:1]]
+        if cell.scene in PASSED:
+            places = [(np.zeros(3), one.replay.end_s)]
+        for shift_m, until_s in places:
+            for number in range(_ALARM_DRAWS):
+                draw = one.draw(shift_m, cell, number)
+                alarms = false_alarms(law, draw, one.posed, shift_m, until_s, probability)
+                counts.alarms += alarms.count
+                counts.alarm_s += alarms.alarm_s
+                counts.judged_s += alarms.judged_s
+
+
+def mean_enlargement_m(replays: Sequence[Replay], cell: Cell, probability: float) -> float:
+    """The first law's largest enlargement over the gripper, on average over all rows in which the tool moves."""
+    settings = EnlargementSettings(probability=probability, camera_sd_m=1e-3 * cell.camera_mm)
+    enlargement, found = Enlargement(settings), []
+    for replay in replays:
+        record = replay.record
+        encoder = Encoder(replay.encoder.sigma_rad, replay.encoder.resolution_rad)
+        sigma_rad = np.full(record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
+        for row in range(0, len(record.pose_time_s), 5):
+            if abs(replay.approach_speed_m_s[row]) > _MOVING_M_S:
+                jacobians = replay.estimated[row].sphere_jacobians
+                velocities = jacobians @ record.joint_velocities_rad_s[row]
+                covariances = position_covariance(jacobians, sigma_rad)
+                age_s = float(record.loop_age_s[row])
+                found.append(float(enlargement.distances(covariances, velocities, age_s).max()))
+    return float(np.mean(found)) if found else 0.0
+
+
+def _row(cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequence[_Staged], margin_m: float) -> Row:
+    covered = share(counts.hits, counts.draws)
+    draws = sum(counts.draws)
+    return Row(
+        cell=cell.key,
+        scene=cell.scene,
+        pull=cell.motion.pull,
+        link=cell.motion.link,
+        camera_mm=cell.camera_mm,
+        encoder_factor=cell.encoder_factor,
+        law=law,
+        probability=probability,
+        coverage=None if covered is None else covered.value,
+        low=None if covered is None else covered.low,
+        high=None if covered is None else covered.high,
+        draws=draws,
+        approaches=0 if covered is None else covered.approaches,
+        holds=None if covered is None else covered.holds(probability),
+        mean_strength=counts.strength / draws if draws else None,
+        places=sum(len(one.collisions) for one in staged),
+        unavoidable=sum(len(one.collisions) - len(one.avoidable) for one in staged),
+        alarms_per_min=60.0 * counts.alarms / counts.judged_s if counts.judged_s else 0.0,
+        alarm_share=counts.alarm_s / counts.judged_s if counts.judged_s else 0.0,
+        judged_s=counts.judged_s,
+        margin_mm=1e3 * margin_m,
+    )

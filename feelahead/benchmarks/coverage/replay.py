@@ -1,0 +1,123 @@
+"""A recorded approach as both sides saw it: true motion, estimated poses, and when a release would have stopped it."""
+
+import math
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from common.arrays import FloatArray
+from feelahead.approaches.recording import RecordedApproach
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
+from operator_side.hands.travel_calibration import TriggerTravel
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.simulation.kinematics import MujocoKinematics
+from robot_side.simulation.scene import Scene
+
+_SPHERES = 16
+_TRAVEL = TriggerTravel()
+_LONGEST_RETURN = 4.0
+"""In the finger's time constants: from full travel to the dead zone it takes 3."""
+_COASTING_STEPS = 100
+
+
+class Replay:
+    """One record with the encoders' errors drawn anew; times are those of the one virtual clock."""
+
+    def __init__(self, record: RecordedApproach, scene: Scene, encoder: EncoderSettings, seed: int) -> None:
+        """`scene`: any with the arm that was recorded, for its kinematics."""
+        self.record = record
+        self.encoder = encoder
+        self._kinematics = MujocoKinematics(scene, _SPHERES)
+        self._seed = seed
+        self.end_s = float(record.pose_time_s[-1])
+        true = [self._pose(row, record.joint_positions_rad[row]) for row in range(len(record.pose_time_s))]
+        axis = true[record.pose_row(record.began_s)].tool_rotation[:, 2]
+        start_m = true[record.pose_row(record.began_s)].tool_position_m
+        self.axis = axis
+        """(3,) the approach axis when the pull begins, in the world frame"""
+        self.along_m: FloatArray = np.array([(pose.tool_position_m - start_m) @ axis for pose in true])
+        """(k,) how far the true tool has got along that axis since the pull began"""
+        self.approach_speed_m_s: FloatArray = np.array(
+            [
+                pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ record.joint_velocities_rad_s[row])
+                for row, pose in enumerate(true)
+            ]
+        )
+        """(k,) û·v of the true tool"""
+
+    @cached_property
+    def estimated(self) -> list[GripperPose]:
+        """The gripper where noisy encoders put it, for each row of the poses."""
+        encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
+        return [self._pose(row, encoder.read(joints)) for row, joints in enumerate(self.record.joint_positions_rad)]
+
+    def _pose(self, row: int, joints_rad: FloatArray) -> GripperPose:
+        record = self.record
+        state = ArmState(
+            time_s=float(record.pose_time_s[row]),
+            joint_positions_rad=joints_rad,
+            joint_velocities_rad_s=record.joint_velocities_rad_s[row],
+            finger_positions=record.finger_positions[row],
+            gripper_opening_m=0.0,
+            gripper_holding=False,
+        )
+        pose = self._kinematics.pose(state)
+        return replace(pose, sphere_jacobians=pose.sphere_jacobians.copy())
+
+    def joints_at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+        """True joint positions and velocities (n,) at `time_s`, between the rows of the poses."""
+        record = self.record
+        row = min(record.pose_row(time_s), len(record.pose_time_s) - 2)
+        step_s = record.pose_time_s[row + 1] - record.pose_time_s[row]
+        part = min(max((time_s - record.pose_time_s[row]) / step_s, 0.0), 1.0)
+        positions, velocities = record.joint_positions_rad, record.joint_velocities_rad_s
+        return (
+            (1.0 - part) * positions[row] + part * positions[row + 1],
+            (1.0 - part) * velocities[row] + part * velocities[row + 1],
+        )
+
+    def stopped_joints(self, released_s: float) -> tuple[float, FloatArray] | None:
+        """When a release at `released_s` on the operator side reaches the arm, and the joints (n,) where it rests then.
+
+        None where that is beyond the record. All joints slow down in proportion (`JointReference`), so that the arm
+        goes on along its present joint velocity.
+        """
+        arrives_s = self.record.arrives_s(released_s)
+        if arrives_s > self.end_s:
+            return None
+        joints_rad, velocities_rad_s = self.joints_at(arrives_s)
+        braking_s = float(np.abs(velocities_rad_s).max()) / MotionLimits().acceleration_rad_s2
+        travel = float(self.record.travel[self.record.tick_row(released_s), 1])
+        return arrives_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
+
+    def under_way_m(self, time_s: float) -> float:
+        """How far the true tool still goes along the axis until the command that is sent at `time_s` arrives."""
+        arrives_s = min(self.record.arrives_s(time_s), self.end_s)
+        times = self.record.pose_time_s
+        return float(np.interp(arrives_s, times, self.along_m) - np.interp(time_s, times, self.along_m))
+
+    def deceleration_m_s2(self, time_s: float) -> float:
+        """What the joints' limit gives along the approach axis at `time_s`, for the present direction of motion."""
+        row = self.record.pose_row(time_s)
+        fastest = float(np.abs(self.record.joint_velocities_rad_s[row]).max())
+        speed = abs(float(self.approach_speed_m_s[row]))
+        return MotionLimits().acceleration_rad_s2 * speed / fastest if fastest > 0.0 and speed > 0.0 else 3.0
+
+
+def coasting_s(braking_s: float, travel: float, finger_s: float = FINGER_TIME_CONSTANT_S) -> float:
+    """For how long, at its present speed, an arm goes on as a finger that has let go comes back from `travel`, 0 to 1.
+
+    The mechanical travel falls as exp(-t / finger_s), and what it commands ends with the dead zone. The arm's speed
+    falls by no more than 1 / braking_s of the present one in a second, so that it is the greater of the two.
+    """
+    times = np.linspace(0.0, max(braking_s, _LONGEST_RETURN * finger_s), _COASTING_STEPS)
+    commanded = np.array([_TRAVEL.travel(min(travel * math.exp(-t / finger_s) / SENSED_TRAVEL, 1.0)) for t in times])
+    speeds = commanded / max(commanded[0], 1e-9)
+    if braking_s > 0.0:
+        speeds = np.maximum(speeds, 1.0 - times / braking_s)
+    return float(np.trapezoid(speeds, times))

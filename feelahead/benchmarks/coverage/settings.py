@@ -1,0 +1,60 @@
+"""What `feelahead bench coverage` is told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from feelahead.approaches.laws import LAWS, Law
+from feelahead.approaches.spoilt import Spoil
+from feelahead.benchmarks.coverage.cells import Plan, full_plan, quick_plan
+
+
+@dataclass(frozen=True)
+class CoverageSettings:
+    """How often full stiffness stands in time, and how often it stands without need, for each law.
+
+    Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
+    the finger reaches until then. False alarm: strength of 4 or more under the finger, while that zone's stopping path
+    from the true pose stays D_σ(P) + 15 mm clear. Slowdown: the time to a goal in the free over that without haptics.
+    Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P.
+    """
+
+    quick: bool = False
+    """A few cells in three minutes, instead of all in two hours."""
+    laws: tuple[Law, ...] = LAWS
+    """Set side by side."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """For every draw: the same seed gives the same figures."""
+    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
+    """Processes at the same time."""
+    resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
+    """Write each motion's figures there as soon as it is done, and leave out what is there already."""
+    only: Annotated[str, tyro.conf.arg(metavar="TEXT")] = ""
+    """Only cells whose name contains TEXT, as in 'wall/bell/200 ms'."""
+    csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
+    """Write every cell's figures there."""
+    picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    """Draw coverage against false alarms."""
+    spoil: Spoil = "nothing"
+    """Spoil the laws on purpose, to see that the figures notice: 100 ms late, or on the other trigger."""
+    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """These settings from a file."""
+
+    def __post_init__(self) -> None:
+        for name, lowest in (("seed", 0), ("workers", 1)):
+            if getattr(self, name) < lowest:
+                raise ValueError(f"--{name} {getattr(self, name)}: valid: {lowest} or more")
+        if not self.laws:
+            raise ValueError(f"--laws: valid: one or more of {', '.join(LAWS)}")
+        for path in (self.resume, self.csv, self.picture):
+            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
+                raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
+        if not self.plan().cells:
+            raise ValueError(f"--only {self.only!r}: no cell's name contains it; valid: as wall/bell/200 ms")
+
+    def plan(self) -> Plan:
+        """What is to be done."""
+        whole = quick_plan(self.laws) if self.quick else full_plan(self.laws)
+        return whole.of(tuple(cell for cell in whole.cells if self.only in cell.key))
