@@ -49,7 +49,7 @@ class TrueContact:
         if self._data.time == self._seen_s:
             return None
         data = self._data
-        # Looking at MuJoCo's contacts one by one takes longer than a step of the physics: most of the time there is none.
+        # Each look at MuJoCo's contacts takes longer than a step of the physics, and most of the time there are none.
         touching = [pair for row in range(data.ncon) if (pair := self._pair(data.contact[row], held)) is not None]
         found = self._onsets(touching) if touching else []
         self._remember()

@@ -118,6 +118,6 @@ def coasting_s(braking_s: float, travel: float, finger_s: float = FINGER_TIME_CO
     times = np.linspace(0.0, max(braking_s, _LONGEST_RETURN * finger_s), _COASTING_STEPS)
     commanded = np.array([_TRAVEL.travel(min(travel * math.exp(-t / finger_s) / SENSED_TRAVEL, 1.0)) for t in times])
     speeds = commanded / max(commanded[0], 1e-9)
-    if braking_s > 0.0:
+    if braking_s > 1e-6:
         speeds = np.maximum(speeds, 1.0 - times / braking_s)
     return float(np.trapezoid(speeds, times))

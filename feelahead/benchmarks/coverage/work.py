@@ -85,7 +85,7 @@ class Kept:
     def __init__(self, path: Path | None, setup: dict[str, Any]) -> None:
         """ConfigurationError for a file that is there and holds another run, or none."""
         self._path = path
-        self._setup = setup | {"frozen": frozen_hash()}
+        self._setup: dict[str, Any] = json.loads(json.dumps(setup | {"frozen": frozen_hash()}))
         self.done: dict[str, Records] = {}
         if path is None or not path.exists():
             return
@@ -106,10 +106,12 @@ class Kept:
         self.done[piece.name] = records
         if self._path is None:
             return
-        new = not self._path.exists() or self._path.stat().st_size == 0
+        before = self._path.read_bytes() if self._path.exists() else b""
         with self._path.open("a", encoding="utf-8") as file:
-            if new:
+            if not before:
                 file.write(json.dumps(self._setup) + "\n")
+            elif not before.endswith(b"\n"):
+                file.write("\n")
             file.write(json.dumps({"piece": piece.name, "records": records}) + "\n")
 
 

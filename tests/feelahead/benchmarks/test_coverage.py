@@ -1,0 +1,303 @@
+"""What counts as covered and as a false alarm, and that spoilt laws show."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import ConfigurationError
+from feelahead.approaches.frozen import AHEAD, PASSED, SITE, frozen_scene
+from feelahead.approaches.laws import Law
+from feelahead.approaches.recording import RecordedApproach, record_approach
+from feelahead.approaches.spoilt import Spoil
+from feelahead.benchmarks.coverage import bench, cells
+from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan, full_plan, quick_plan
+from feelahead.benchmarks.coverage.closed_loop import check
+from feelahead.benchmarks.coverage.collisions import first_touch_s, last_release_s
+from feelahead.benchmarks.coverage.covered import (
+    HORIZON_S,
+    false_alarms,
+    statistical_distance_m,
+    stood,
+    stopping_path_m,
+    zone_of,
+    zone_speed_m_s,
+)
+from feelahead.benchmarks.coverage.evaluate import Row, evaluate
+from feelahead.benchmarks.coverage.intervals import draws_needed, share
+from feelahead.benchmarks.coverage.laws import Comparison, Draw
+from feelahead.benchmarks.coverage.replay import Replay, coasting_s
+from feelahead.benchmarks.coverage.settings import CoverageSettings
+from feelahead.benchmarks.coverage.work import Kept, Piece, pieces
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.scene import load_scene
+
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("coverage")]
+
+SEED = 1
+"""A steady pull at 0.24 m/s."""
+
+
+@cache
+def recorded(link: str = "") -> RecordedApproach:
+    return record_approach("steady", link, SEED, duration_s=2.0)
+
+
+def staged(scene_name: str, link: str = "", ahead_m: float = 0.0) -> tuple[Replay, PosedScene, Draw]:
+    scene = load_scene(frozen_scene(scene_name), SITE)
+    posed, replay = PosedScene(scene), Replay(recorded(link), scene, EncoderSettings(), SEED)
+    posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], ahead_m * replay.axis)
+    errors_m = np.zeros((len(scene.objects), 3))
+    return replay, posed, Draw(replay, posed.perceived(errors_m), 0.003)
+
+
+@given(st.floats(0.0, 0.3), st.floats(0.1, 1.0))
+def test_an_arm_coasts_at_least_as_its_brakes_and_as_the_finger_alone_would(braking_s: float, travel: float) -> None:
+    coasting = coasting_s(braking_s, travel)
+    assert coasting >= 0.5 * braking_s - 1e-3
+    assert coasting >= coasting_s(0.0, travel) - 1e-3
+    assert coasting <= coasting_s(0.0, travel) + 0.5 * braking_s + 1e-3
+
+
+def test_a_light_pull_comes_back_to_the_dead_zone_sooner() -> None:
+    assert coasting_s(0.0, 0.1) < coasting_s(0.0, 0.3) < coasting_s(0.0, 0.7) < 0.04
+
+
+def test_draws_and_intervals() -> None:
+    assert [draws_needed(p) for p in (0.5, 0.9, 0.99, 0.999)] == [20, 100, 1000, 10000]
+    whole = share([10, 10], [10, 10])
+    assert whole is not None
+    assert (whole.value, whole.low, whole.high, whole.draws, whole.approaches) == (1.0, 1.0, 1.0, 20, 2)
+    assert whole.holds(0.999)
+    half = share([10, 0], [10, 10])
+    assert half is not None
+    # All that speaks for an interval is two approaches, however many draws each has.
+    assert (half.value, half.low, half.high) == (0.5, 0.0, 1.0)
+    assert not half.holds(0.5)
+    assert share([0, 0], [0, 0]) is None
+    nine = share([9] * 40, [10] * 40)
+    assert nine is not None
+    assert nine.holds(0.9)
+    assert not nine.holds(0.99)
+
+
+def test_zones_and_their_speeds() -> None:
+    assert [zone_of(travel) for travel in (0.0, 0.0999, 0.1, 0.55, 1.0)] == [0, 0, 1, 5, 9]
+    speeds = [zone_speed_m_s(zone) for zone in range(10)]
+    assert speeds == sorted(speeds)
+    # The sensor ends at three quarters of the travel.
+    assert speeds[7] == speeds[9] == pytest.approx(0.25)
+    assert speeds[0] == pytest.approx(0.25 * (0.05 / 0.75 - 0.05) / 0.93)
+
+
+def test_a_release_at_the_last_moment_leaves_a_gap_and_a_later_one_none() -> None:
+    replay, posed, _ = staged("wall")
+    touch_s = first_touch_s(replay, posed, np.zeros(3))
+    assert touch_s is not None
+    axis_m = np.interp(touch_s, replay.record.pose_time_s, replay.along_m)
+    assert axis_m == pytest.approx(0.320, abs=0.001)
+    last_s = last_release_s(replay, posed, np.zeros(3), touch_s)
+    assert last_s is not None
+    speed = replay.approach_speed_m_s[replay.record.pose_row(touch_s)]
+    # 8 rad/s² of the fastest joint, and the finger's own return.
+    assert 0.03 < touch_s - last_s < 0.04 + speed / 3.0
+    assert first_touch_s(replay, posed, 1.0 * replay.axis) is None
+
+
+def test_whoever_lets_go_at_once_always_avoids_it() -> None:
+    shift_m = -0.29 * staged("wall")[0].axis
+    replay, posed, _ = staged("wall", LINKS["200 ms"], ahead_m=-0.29)
+    touch_s = first_touch_s(replay, posed, shift_m)
+    assert touch_s is not None
+    last_s = last_release_s(replay, posed, shift_m, touch_s)
+    assert last_s is not None
+    # 30 mm from the start, a command that takes 200 ms has to be taken back before it arrives.
+    assert replay.record.began_s <= last_s < replay.record.began_s + 0.15
+
+
+def covered(law: Law, spoil: Spoil = "nothing", ahead_m: float = 0.0) -> tuple[bool, int]:
+    replay, posed, draw = staged("wall", ahead_m=ahead_m)
+    touch_s = first_touch_s(replay, posed, ahead_m * replay.axis)
+    assert touch_s is not None
+    last_s = last_release_s(replay, posed, ahead_m * replay.axis, touch_s)
+    assert last_s is not None
+    judged = stood(Comparison(0.02, spoil).law(law, 0.99), draw, last_s)
+    return judged.covered, judged.strength
+
+
+def test_always_full_covers_and_none_does_not() -> None:
+    assert covered("full") == (True, 8)
+    assert covered("none") == (False, 0)
+
+
+def strengths_before_contact(spoil: Spoil) -> np.ndarray[Any, Any]:
+    replay, posed, draw = staged("wall")
+    touch_s = first_touch_s(replay, posed, np.zeros(3))
+    assert touch_s is not None
+    return Comparison(0.02, spoil).law("first", 0.99).felt(draw, np.array([touch_s - 0.11, touch_s - 0.01]))
+
+
+def test_spoilt_laws_show() -> None:
+    whole, delayed, swapped = (strengths_before_contact(spoil) for spoil in ("nothing", "delayed", "swapped"))
+    # Without delay full strength comes right before the contact, on R2 alone.
+    assert whole[1, 1].max() == 8
+    assert whole[1, 0].max() == 0
+    assert (delayed[1] == whole[0]).all()
+    assert delayed[1, 1].sum() < whole[1, 1].sum()
+    assert (swapped[:, 0] == whole[:, 1]).all()
+    assert swapped[1, 1].max() == 0
+
+
+def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
+    replay, posed, draw = staged("empty")
+    began_s = replay.record.began_s
+    comparison = Comparison(0.02)
+    full = false_alarms(comparison.law("full", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    assert full.count == 1
+    assert full.alarm_s == pytest.approx(full.judged_s)
+    assert full.judged_s == pytest.approx(replay.end_s - began_s, abs=0.1)
+    none = false_alarms(comparison.law("none", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    assert (none.count, none.alarm_s) == (0, 0.0)
+    # With a wall so near that any zone's stopping path meets it, nothing is a false alarm.
+    replay, posed, draw = staged("wall", ahead_m=-0.30)
+    near = false_alarms(comparison.law("full", 0.99), draw, posed, -0.30 * replay.axis, began_s + 0.1, 0.99)
+    assert near.count == 0
+
+
+def test_a_stopping_path_is_what_is_under_way_the_horizon_and_the_braking() -> None:
+    replay, _, draw = staged("wall", LINKS["200 ms"])
+    time_s = replay.record.began_s + 1.0
+    speed = zone_speed_m_s(5)
+    path_m = stopping_path_m(replay, time_s, 5)
+    assert path_m - replay.under_way_m(time_s) - speed * HORIZON_S == pytest.approx(
+        speed**2 / (2.0 * replay.deceleration_m_s2(time_s))
+    )
+    # A command takes 200 ms to the arm, which goes at 0.24 m/s meanwhile.
+    assert replay.under_way_m(time_s) == pytest.approx(0.2 * 0.24, abs=0.006)
+    assert statistical_distance_m(draw, time_s, 0.5) == pytest.approx(0.0, abs=1e-9)
+    assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
+
+
+TINY = Plan((), approaches=1, places=2, probabilities=(0.5,), laws=("first", "none", "full"), checked=1, raced=1)
+
+
+@cache
+def judged(spoil: Spoil = "nothing") -> Sequence[Row]:
+    motion = Motion("bell", "200 ms")
+    both = [Cell(motion, "wall"), Cell(motion, "wall_beside")]
+    return [row for rows in evaluate(motion, both, TINY, 0, spoil) for row in rows]
+
+
+def test_a_cell_has_what_it_takes_to_judge_it() -> None:
+    wall = {row.law: row for row in judged() if row.scene == "wall"}
+    assert {(row.places, row.unavoidable, row.draws) for row in wall.values()} == {(2, 0, 20)}
+    assert wall["full"].coverage == wall["full"].low == 1.0
+    assert wall["full"].holds
+    assert wall["none"].coverage == wall["none"].high == 0.0
+    assert not wall["none"].holds
+    assert wall["full"].alarms_per_min > 0.0
+    assert wall["none"].alarms_per_min == 0.0
+    beside = {row.law: row for row in judged() if row.scene == "wall_beside"}
+    assert beside["full"].coverage is None
+    assert beside["full"].alarm_share > 0.9
+    assert beside["first"].alarms_per_min == 0.0
+
+
+def test_the_same_seed_gives_the_same_rows_and_a_spoilt_law_others() -> None:
+    again = judged.__wrapped__()
+    assert again == judged()
+    spoilt = {row.law: row for row in judged("swapped") if row.scene == "wall"}
+    whole = {row.law: row for row in judged() if row.scene == "wall"}
+    assert spoilt["first"].mean_strength == 0.0
+    assert whole["first"].mean_strength is not None
+    assert whole["first"].mean_strength > 0.0
+
+
+def test_physics_does_as_reckoned() -> None:
+    checks = list(check(3, 100))
+    assert {one.kind_of_check for one in checks} == {"released early", "released late", "reacting"}
+    assert all(one.contact == one.expected_contact for one in checks[:2])
+
+
+def test_the_plans() -> None:
+    full = full_plan(("first",))
+    names = {cell.scene for cell in full.cells}
+    assert names == {*AHEAD, *PASSED} - {"moving", "place_held"}
+    assert {cell.motion.link for cell in full.cells} == set(LINKS)
+    assert {cell.camera_mm for cell in full.cells} == {1.0, 3.0, 6.0}
+    assert len({cell.key for cell in full.cells}) == len(full.cells)
+    assert full.checked == 300
+    assert {cell.key for cell in quick_plan(("first",)).cells} <= {cell.key for cell in full.cells}
+    names_of_pieces = [piece.name for piece in pieces(full, 0, "nothing")]
+    assert len(set(names_of_pieces)) == len(names_of_pieces)
+
+
+def piece(name: str) -> Piece:
+    return Piece(name, 1.0, lambda: [], ())
+
+
+def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> None:
+    path = tmp_path / "kept.jsonl"
+    kept = Kept(path, {"seed": 0})
+    kept.keep(piece("one"), [{"kind": "cell", "law": "first"}])
+    kept.keep(piece("two"), [])
+    path.write_text(path.read_text()[:-10])
+    again = Kept(path, {"seed": 0})
+    assert again.done == {"one": [{"kind": "cell", "law": "first"}]}
+    again.keep(piece("two"), [{"kind": "check"}])
+    assert Kept(path, {"seed": 0}).done == {"one": [{"kind": "cell", "law": "first"}], "two": [{"kind": "check"}]}
+    with pytest.raises(ConfigurationError, match="other settings"):
+        Kept(path, {"seed": 1})
+    path.write_text("nothing of ours\n")
+    with pytest.raises(ConfigurationError, match="no run of this benchmark"):
+        Kept(path, {"seed": 0})
+
+
+@pytest.mark.parametrize(
+    ("flags", "named"),
+    [
+        ({"seed": -1}, "--seed"),
+        ({"workers": 0}, "--workers"),
+        ({"laws": ()}, "--laws"),
+        ({"only": "no such cell"}, "--only"),
+        ({"csv": Path("/no/such/folder/file.csv")}, "file.csv"),
+    ],
+)
+def test_bad_settings_are_named(flags: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        CoverageSettings(**flags)
+
+
+def test_the_command_prints_its_tables_writes_its_files_and_resumes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = Motion("steady", "0 ms")
+
+    def tiny(laws: tuple[Law, ...]) -> Plan:
+        return replace(TINY, cells=(Cell(motion, "wall"),), laws=laws, approaches=1, checked=1)
+
+    monkeypatch.setattr("feelahead.benchmarks.coverage.settings.quick_plan", tiny)
+    monkeypatch.setattr("feelahead.benchmarks.coverage.work.SCENES", ("empty",))
+    arguments = ["--quick", "--workers", "1", "--laws", "first", "none", "--seed", str(SEED)]
+    files = [f"--csv={tmp_path / 'c.csv'}", f"--picture={tmp_path / 'c.png'}", f"--resume={tmp_path / 'r.jsonl'}"]
+    assert bench.bench_coverage([*arguments, *files]) == 0
+    first = capsys.readouterr().out
+    assert "covered: full strength stood in time" in first
+    assert "1 of 1 as reckoned" in first
+    assert (tmp_path / "c.png").stat().st_size > 1000
+    assert (tmp_path / "c.csv").read_text().startswith("cell,scene,pull,link")
+    setup = json.loads((tmp_path / "r.jsonl").read_text().splitlines()[0])
+    assert setup["seed"] == SEED
+    monkeypatch.setattr("feelahead.benchmarks.coverage.work.evaluate", None)
+    assert bench.bench_coverage([*arguments, *files]) == 0
+    assert capsys.readouterr().out == first
+    assert math.isfinite(cells.full_plan(("first",)).approaches)
