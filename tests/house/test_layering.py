@@ -96,6 +96,7 @@ LIBRARIES = {
         "robot_side/main.py",
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
+        "feelahead/approaches/progress.py",
         "feelahead/both_sides",
         "feelahead/commands",
         "feelahead/benchmarks",

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, fields
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from common.command.command_line import parse_settings
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.progress import progress
 from feelahead.benchmarks.coverage.evaluate import Row
 from feelahead.benchmarks.coverage.settings import CoverageSettings
 from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table
@@ -50,10 +50,8 @@ def bench_coverage(arguments: Sequence[str]) -> int:
 
 
 def _work(todo: list[Piece], kept: Kept, workers: int) -> None:
-    """Do what is left, with a bar of the time that is left."""
-    columns = (TextColumn("coverage"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("coverage", total=sum(piece.weight for piece in todo))
+    """Do what is left."""
+    with progress("coverage", sum(piece.weight for piece in todo)) as advance:
         for piece, records in do(todo, workers):
             kept.keep(piece, records)
-            progress.advance(bar, piece.weight)
+            advance(piece.weight)

@@ -98,31 +98,37 @@ def draw(records: Iterable[Row], laws: Sequence[str], frozen: str, path: Path) -
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     rows = [one for one in records if one["kind"] == "cell"]
+    probabilities = sorted({one["probability"] for one in rows})
     figure, axes = plt.subplots(figsize=(7.2, 4.6), dpi=110, layout="constrained")
     for law in laws:
-        points = []
-        for probability in sorted({one["probability"] for one in rows}):
-            some = [one for one in rows if one["law"] == law and one["probability"] == probability]
-            judged = [one for one in some if one["coverage"] is not None]
-            minutes = sum(one["judged_s"] for one in some) / 60.0
-            draws = sum(one["draws"] for one in judged)
-            if minutes > 0.0 and draws > 0:
-                alarms = sum(one["alarms_per_min"] * one["judged_s"] / 60.0 for one in some) / minutes
-                points.append((alarms, sum(one["coverage"] * one["draws"] for one in judged) / draws, probability))
-        if not points:
-            continue
-        axes.plot([x for x, _, _ in points], [y for _, y, _ in points], color=_COLOURS.get(law, "black"), label=law)
-        for number, (x, y, probability) in enumerate(points):
-            axes.plot(x, y, _MARKS[number % len(_MARKS)], color=_COLOURS.get(law, "black"))
-            axes.annotate(f"{probability:g}", (x, y), textcoords="offset points", xytext=(5, 4), fontsize=7)
+        colour = _COLOURS.get(law, "black")
+        axes.plot([], [], color=colour, linewidth=4.0, label=law)
+        points = [_point([one for one in rows if one["law"] == law and one["probability"] == p]) for p in probabilities]
+        known = [point for point in points if point is not None]
+        axes.plot([x for x, _ in known], [y for _, y in known], color=colour, linewidth=0.8)
+        for mark, point in zip(_MARKS, points, strict=False):
+            if point is not None:
+                axes.plot(*point, mark, color=colour, alpha=0.8)
+    for mark, probability in zip(_MARKS, probabilities, strict=False):
+        axes.plot([], [], mark, color="black", label=f"P = {probability:g}")
     axes.set(xlabel="false alarms a minute", ylabel="covered: full strength in time", ylim=(-0.03, 1.03))
     axes.set_xscale("symlog", linthresh=0.1)
-    axes.set_xlim(-0.02, None)
+    axes.set_xlim(-0.02, 200.0)
     axes.grid(alpha=0.3)
-    axes.legend(title="law (points: P)")
+    axes.legend(loc="center", fontsize=8)
     axes.set_title(f"all cells together (frozen {frozen})", fontsize=9)
     figure.savefig(path)
     plt.close(figure)
+
+
+def _point(rows: Sequence[Row]) -> tuple[float, float] | None:
+    """False alarms a minute, and the share that is covered, over these rows; None without any."""
+    judged = [one for one in rows if one["coverage"] is not None]
+    seconds, draws = sum(one["judged_s"] for one in rows), sum(one["draws"] for one in judged)
+    if seconds == 0.0 or draws == 0:
+        return None
+    alarms = sum(one["alarms_per_min"] * one["judged_s"] for one in rows) / seconds
+    return alarms, sum(one["coverage"] * one["draws"] for one in judged) / draws
 
 
 def _grouped(rows: Sequence[Row], names: tuple[str, ...]) -> list[tuple[tuple[Any, ...], list[Row]]]:

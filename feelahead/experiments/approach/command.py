@@ -4,16 +4,16 @@ import json
 import multiprocessing
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from common.command.command_line import parse_settings
 from feelahead.approaches.approach import Approach, Outcome, run_approach
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.picture import draw_comparison, draw_run
 from feelahead.experiments.approach.settings import ApproachSettings
 from feelahead.experiments.approach.table import comparison, sentence
@@ -45,26 +45,28 @@ def try_approach(arguments: Sequence[str]) -> int:
 
 
 def _run_all(approaches: Sequence[Approach], workers: int) -> list[Ended]:
-    """Each in turn, or several processes at a time, with a bar on the screen."""
-    columns = (TextColumn("approaches"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("approaches", total=len(approaches))
+    """Each in turn, or in several processes at a time."""
+    with progress("approaches", len(approaches)) as advance:
         if workers == 1 or len(approaches) == 1:
             ended = []
             for approach in approaches:
                 ended.append((approach, run_approach(approach)))
-                progress.advance(bar)
+                advance(1.0)
             return ended
         # The first one alone: it compiles the kernels, if they are not there.
-        first = run_approach(approaches[0])
-        progress.advance(bar)
+        outcomes = {approaches[0]: run_approach(approaches[0])}
+        advance(1.0)
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            futures = [pool.submit(run_approach, approach) for approach in approaches[1:]]
-            for future in futures:
-                future.add_done_callback(lambda _: progress.advance(bar))
-            outcomes = [first, *(future.result() for future in futures)]
-        return list(zip(approaches, outcomes, strict=True))
+            futures = {pool.submit(run_approach, approach): approach for approach in approaches[1:]}
+            try:
+                for future in as_completed(futures):
+                    outcomes[futures[future]] = future.result()
+                    advance(1.0)
+            finally:
+                for future in futures:
+                    future.cancel()
+        return [(approach, outcomes[approach]) for approach in approaches]
 
 
 def _summary(ended: Sequence[Ended], frozen: str) -> dict[str, Any]:
