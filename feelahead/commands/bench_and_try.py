@@ -59,6 +59,12 @@ bench = Menu(
             "run time against error of the exact overlaps and of what is used in their place",
             "pip install 'feelahead[robot,bench]'",
         ),
+        "error": Entry(
+            "feelahead.benchmarks.error.bench",
+            "bench_error",
+            "run time against error of the error propagation, and of the prediction of the gripper's way",
+            "pip install 'feelahead[robot,operator,bench]'",
+        ),
         "coverage": Entry(
             "feelahead.benchmarks.coverage.bench",
             "bench_coverage",

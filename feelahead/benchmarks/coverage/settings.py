@@ -1,6 +1,6 @@
 """What `feelahead bench coverage` is told."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +9,9 @@ import tyro
 from feelahead.approaches.laws import LAWS, Law
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import Plan, full_plan, quick_plan
+
+_GREATEST = 0.9999
+"""That takes 100 000 draws a cell."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,10 @@ class CoverageSettings:
     """A few cells in three minutes, instead of all in two hours."""
     laws: tuple[Law, ...] = LAWS
     """Set side by side."""
+    probabilities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="P...")] = ()
+    """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
+    checked: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """So many approaches again in full physics, closed loop, instead of the plan's own."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """For every draw: the same seed gives the same figures."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
@@ -48,6 +55,11 @@ class CoverageSettings:
                 raise ValueError(f"--{name} {getattr(self, name)}: valid: {lowest} or more")
         if not self.laws:
             raise ValueError(f"--laws: valid: one or more of {', '.join(LAWS)}")
+        for probability in self.probabilities:
+            if not 0.0 < probability <= _GREATEST:
+                raise ValueError(f"--probabilities {probability}: valid: above 0 up to {_GREATEST}")
+        if self.checked is not None and self.checked < 0:
+            raise ValueError(f"--checked {self.checked}: valid: 0 or more")
         for path in (self.resume, self.csv, self.picture):
             if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
                 raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
@@ -57,4 +69,9 @@ class CoverageSettings:
     def plan(self) -> Plan:
         """What is to be done."""
         whole = quick_plan(self.laws) if self.quick else full_plan(self.laws)
-        return whole.of(tuple(cell for cell in whole.cells if self.only in cell.key))
+        return replace(
+            whole,
+            cells=tuple(cell for cell in whole.cells if self.only in cell.key),
+            probabilities=tuple(sorted(set(self.probabilities))) or whole.probabilities,
+            checked=whole.checked if self.checked is None else self.checked,
+        )

@@ -268,6 +268,8 @@ def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> 
         ({"seed": -1}, "--seed"),
         ({"workers": 0}, "--workers"),
         ({"laws": ()}, "--laws"),
+        ({"probabilities": (0.9, 1.0)}, "--probabilities"),
+        ({"checked": -1}, "--checked"),
         ({"only": "no such cell"}, "--only"),
         ({"csv": Path("/no/such/folder/file.csv")}, "file.csv"),
     ],
