@@ -1,0 +1,138 @@
+"""Where the gripper will be once the command sent now takes effect: what the operator side knows and the robot cannot.
+
+A report of the robot is old, and the arm follows commands that had not reached it then. The operator side has sent
+them: from the speed in the report it reckons on. That takes the place of ΔT = v t_d (eq. 8), which assumes that the
+speed stays as it was.
+"""
+
+import math
+from collections import deque
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+MAX_DELAY_S: Final = 2.0
+"""Beyond this loop age the robot side is disarmed, so that no older command matters."""
+_MOST_COMMANDS: Final = 4096
+"""Kept at most: eight times what 250 commands a second leave in the window."""
+_CLOCK_RATES_S: Final = 0.001
+"""By so much two clocks that run at slightly different rates may make `held` too long."""
+
+
+class Displacement(NamedTuple):
+    """What the commands under way will have done, along the direction in which R2 advances."""
+
+    way_m: float
+    """δ, signed: from where the gripper was in the report to where it is when a command sent now is followed."""
+    speed_m_s: float
+    """w, signed: its speed then."""
+
+
+class CommandsUnderWay:
+    """The operator side's own commands of the last seconds, followed as the robot will follow them.
+
+    Which are still under way? The robot made its report at its time T. The newest message that it had by then was
+    stamped `echo` by us and had lain there for `held`, so it arrived at T - held. If a message takes d to the robot,
+    echo + d = T - held: **T is when a message arrives that we sent at e = echo + held.** No clocks are compared: e is
+    a stamp of ours and a duration. At T:
+
+    - Commands sent until `echo` have had their effect: the arm follows that of `echo`, and its speed v, measured at T,
+      is as far on the way to it as the arm could get. Older ones cannot arrive any more, as the newest wins.
+    - All that were sent after `echo` are under way. On a steady link these are the commands sent after e, and one sent
+      at t is followed from T + (t - e) on. Where one sent between `echo` and e should have arrived and has not,
+      messages take longer than that of `echo` did, and the first of these arrives at T at the earliest. So e is no
+      later than the first command after `echo`.
+
+    A command sent now is followed from T + (now - e) on. Until then the arm goes from the speed v towards
+    u(t) = x(t) v_max, x(t) the newest command sent at or before t, for t from e to now:
+
+        δ = ∫ v dt,  w = v(now),  |dv/dt| <= a
+
+    exactly, as u is constant between commands. What differs in truth: d changes from message to message, the joints
+    share out their acceleration among them, and an arm at the edge of its reach does not do what it is told.
+    `feelahead bench error` measures the sum of it.
+    """
+
+    def __init__(self, window_s: float = MAX_DELAY_S) -> None:
+        """Remember what was sent in the last `window_s`; ValueError unless that is finite and above 0."""
+        if not (math.isfinite(window_s) and window_s > 0.0):
+            raise ValueError(f"window_s = {window_s}; valid: a finite time above 0 s")
+        self._window_s = window_s
+        self._sent: deque[tuple[float, float]] = deque(maxlen=_MOST_COMMANDS)
+
+    def __len__(self) -> int:
+        """How many commands are remembered."""
+        return len(self._sent)
+
+    def sent(self, now_s: float, travel: float) -> None:
+        """A command left at `now_s`, the stamp in its header: calibrated travel of R2 less that of L2, -1 to 1.
+
+        It counts until the next one; who stops commanding says so by a travel of 0. ValueError for a travel out of
+        range, or a time that is not finite or lies before the last one.
+        """
+        if not -1.0 <= travel <= 1.0:
+            raise ValueError(f"travel = {travel}; valid: -1 to 1")
+        last_s = self._sent[-1][0] if self._sent else -math.inf
+        if not (math.isfinite(now_s) and now_s >= last_s):
+            raise ValueError(f"now_s = {now_s}; valid: a finite time, not before the last command's, {last_s}")
+        # The newest one from before the window stays: it is what counted as the window began.
+        while len(self._sent) > 1 and self._sent[1][0] <= now_s - self._window_s:
+            self._sent.popleft()
+        self._sent.append((now_s, travel))
+
+    def displacement(
+        self,
+        now_s: float,
+        echo_sent_s: float | None,
+        echo_held_s: float | None,
+        speed_m_s: float,
+        full_speed_m_s: float,
+        acceleration_m_s2: float,
+    ) -> Displacement | None:
+        """δ and w by the time that a command sent at `now_s` is followed.
+
+        echo_sent_s, echo_held_s: from the header of the report that `speed_m_s`, v along the direction in which R2
+        advances, came in. full_speed_m_s: v_max, of full travel. acceleration_m_s2: a; infinite for an arm that follows
+        at once. None where the commands since the echo are not known: without an echo, or with one that is older than
+        the window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
+        none.
+        """
+        if not math.isfinite(speed_m_s):
+            raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
+        if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
+            raise ValueError(f"full_speed_m_s = {full_speed_m_s}; valid: finite and above 0")
+        if not acceleration_m_s2 > 0.0:
+            raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
+        if echo_sent_s is None or echo_held_s is None:
+            return None
+        if not (self._sent and max(now_s - self._window_s, self._sent[0][0]) <= echo_sent_s <= now_s):
+            return None
+        if not 0.0 <= echo_held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
+            return None
+        way_m, speed = 0.0, speed_m_s
+        for duration_s, travel in self._from_echo_on(echo_sent_s, echo_held_s, now_s):
+            way_m, speed = _follow(way_m, speed, travel * full_speed_m_s, acceleration_m_s2, duration_s)
+        return Displacement(way_m, speed)
+
+    def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[tuple[float, float]]:
+        """(duration, travel) of every command that counts between e and now, the oldest first."""
+        newest_first = []
+        for sent_s, travel in reversed(self._sent):
+            if sent_s <= now_s:
+                newest_first.append((sent_s, travel))
+            if sent_s <= echo_sent_s:
+                break
+        followed, *under_way = reversed(newest_first)
+        since_s = min(echo_sent_s + echo_held_s, under_way[0][0] if under_way else now_s)
+        return [
+            (until_s - sent_s, travel)
+            for (sent_s, travel), (until_s, _) in pairwise([(since_s, followed[1]), *under_way, (now_s, 0.0)])
+        ]
+
+
+def _follow(way_m: float, speed: float, target: float, acceleration: float, duration_s: float) -> tuple[float, float]:
+    """Way and speed after `duration_s` towards the speed `target`, changing by at most `acceleration`."""
+    changing_s = abs(target - speed) / acceleration
+    if changing_s > duration_s:
+        after = speed + math.copysign(acceleration * duration_s, target - speed)
+        return way_m + 0.5 * (speed + after) * duration_s, after
+    return way_m + 0.5 * (speed + target) * changing_s + target * (duration_s - changing_s), target

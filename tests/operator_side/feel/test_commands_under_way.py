@@ -1,0 +1,236 @@
+"""Commands under way are followed as a slow stepping of time would follow them, whatever was sent and when."""
+
+import math
+
+import pytest
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
+
+from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement
+
+FULL_M_S = 0.25
+PERIOD_S = 0.004
+TRAVEL = st.floats(-1.0, 1.0)
+SPEED = st.floats(-0.3, 0.3)
+ACCELERATION = st.floats(0.5, 20.0)
+COMMANDS = st.lists(TRAVEL, min_size=1, max_size=60)
+
+
+def sent_every(travels: list[float], period_s: float = PERIOD_S) -> CommandsUnderWay:
+    """Command i of these left at i periods."""
+    commands = CommandsUnderWay()
+    for index, travel in enumerate(travels):
+        commands.sent(index * period_s, travel)
+    return commands
+
+
+def displacement(
+    commands: CommandsUnderWay,
+    now_s: float,
+    echo_sent_s: float,
+    echo_held_s: float = 0.0,
+    speed_m_s: float = 0.0,
+    acceleration_m_s2: float = 3.0,
+) -> Displacement:
+    found = commands.displacement(now_s, echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, acceleration_m_s2)
+    assert found is not None
+    return found
+
+
+def stepped(travels: list[float], now_s: float, since_s: float, speed_m_s: float, acceleration: float) -> Displacement:
+    """The same by time steps; command i holds from i periods on."""
+    steps = 20_000
+    step_s, way_m = (now_s - since_s) / steps, 0.0
+    for step in range(steps):
+        time_s = since_s + (step + 0.5) * step_s
+        target = FULL_M_S * travels[min(int(time_s / PERIOD_S), len(travels) - 1)]
+        most = acceleration * step_s
+        after = speed_m_s + min(max(target - speed_m_s, -most), most)
+        way_m += 0.5 * (speed_m_s + after) * step_s
+        speed_m_s = after
+    return Displacement(way_m, speed_m_s)
+
+
+@given(TRAVEL, st.floats(0.0, 1.9), ACCELERATION)
+def test_a_constant_command_at_its_speed_goes_on_as_speed_times_time(
+    travel: float, duration_s: float, acceleration: float
+) -> None:
+    commands = sent_every([travel])
+    speed = travel * FULL_M_S
+    found = displacement(commands, duration_s, 0.0, speed_m_s=speed, acceleration_m_s2=acceleration)
+    assert found.way_m == pytest.approx(speed * duration_s, abs=1e-12)
+    assert found.speed_m_s == pytest.approx(speed, abs=1e-12)
+
+
+@given(COMMANDS, SPEED)
+def test_without_delay_nothing_is_under_way(travels: list[float], speed: float) -> None:
+    newest_s = (len(travels) - 1) * PERIOD_S
+    assert displacement(sent_every(travels), newest_s, newest_s, speed_m_s=speed) == Displacement(0.0, speed)
+    held_s = 0.7 * PERIOD_S
+    found = displacement(sent_every(travels), newest_s + held_s, newest_s, held_s, speed)
+    assert found == pytest.approx((0.0, speed), abs=1e-12)
+
+
+@given(COMMANDS, SPEED, ACCELERATION, st.data())
+def test_the_other_direction_is_the_same_with_the_other_sign(
+    travels: list[float], speed: float, acceleration: float, data: st.DataObject
+) -> None:
+    echo_s = PERIOD_S * data.draw(st.integers(0, len(travels) - 1))
+    now_s = len(travels) * PERIOD_S
+    one = displacement(sent_every(travels), now_s, echo_s, 0.001, speed, acceleration)
+    mirrored = [-travel for travel in travels]
+    other = displacement(sent_every(mirrored), now_s, echo_s, 0.001, -speed, acceleration)
+    assert other == Displacement(-one.way_m, -one.speed_m_s)
+
+
+@given(COMMANDS, SPEED, ACCELERATION)
+def test_no_speed_changes_faster_or_goes_farther_than_the_arm_allows(
+    travels: list[float], speed: float, acceleration: float
+) -> None:
+    duration_s = len(travels) * PERIOD_S
+    found = displacement(sent_every(travels), duration_s, 0.0, 0.0, speed, acceleration)
+    assert abs(found.speed_m_s - speed) <= acceleration * duration_s * (1.0 + 1e-12)
+    targets = [speed, *(FULL_M_S * travel for travel in travels)]
+    assert min(targets) - 1e-12 <= found.speed_m_s <= max(targets) + 1e-12
+    assert min(targets) * duration_s - 1e-12 <= found.way_m <= max(targets) * duration_s + 1e-12
+
+
+@given(COMMANDS, SPEED, ACCELERATION, st.data())
+@example([0.0, 1.0, 1.0, -1.0, 0.5], 0.1, 20.0, None)
+def test_it_is_what_a_fine_stepping_of_time_gives(
+    travels: list[float], speed: float, acceleration: float, data: st.DataObject | None
+) -> None:
+    echo = 0 if data is None else data.draw(st.integers(0, len(travels) - 1))
+    held_s = PERIOD_S * (0.25 if data is None else data.draw(st.floats(0.0, 1.0)))
+    echo_s = echo * PERIOD_S
+    now_s = (len(travels) - 1) * PERIOD_S + 0.01
+    found = displacement(sent_every(travels), now_s, echo_s, held_s, speed, acceleration)
+    reference = stepped(travels, now_s, echo_s + held_s, speed, acceleration)
+    assert found.way_m == pytest.approx(reference.way_m, abs=2e-6)
+    assert found.speed_m_s == pytest.approx(reference.speed_m_s, abs=2e-3)
+
+
+@given(COMMANDS, COMMANDS, SPEED)
+def test_more_travel_goes_at_least_as_far(travels: list[float], more: list[float], speed: float) -> None:
+    raised = [min(travel + abs(extra), 1.0) for travel, extra in zip(travels, more, strict=False)]
+    assume(raised)
+    duration_s = len(raised) * PERIOD_S
+    low = displacement(sent_every(travels[: len(raised)]), duration_s, 0.0, 0.0, speed)
+    high = displacement(sent_every(raised), duration_s, 0.0, 0.0, speed)
+    assert high.way_m >= low.way_m - 1e-12
+    assert high.speed_m_s >= low.speed_m_s - 1e-12
+
+
+def test_an_arm_that_follows_at_once_needs_no_acceleration() -> None:
+    commands = sent_every([0.0, 1.0, -1.0])
+    found = displacement(commands, 0.012, 0.0, 0.004, acceleration_m_s2=math.inf)
+    assert found == pytest.approx((0.0, -FULL_M_S), abs=1e-15)
+    assert displacement(commands, 0.010, 0.0, 0.004, acceleration_m_s2=math.inf).way_m == pytest.approx(0.5e-3)
+
+
+def test_what_was_sent_until_the_echo_counts_no_more_and_what_came_after_counts() -> None:
+    # Full travel until 0.1 s, none from there on; a report of an arm at full speed.
+    commands = sent_every([1.0] * 25 + [0.0] * 50)
+    seen = displacement(commands, 0.2, 0.1, 0.0, FULL_M_S)
+    assert seen.way_m == pytest.approx(FULL_M_S**2 / (2.0 * 3.0))
+    unseen = displacement(commands, 0.2, 0.08, 0.0, FULL_M_S)
+    assert unseen.way_m == pytest.approx(FULL_M_S * 0.02 + FULL_M_S**2 / (2.0 * 3.0))
+
+
+def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:
+    # The robot had nothing newer than 0.0 for 30 ms: what was sent at 4 ms comes at the time of the report or later.
+    commands = sent_every([1.0] + [0.0] * 24)
+    speed = 0.25
+    late = displacement(commands, 0.1, 0.0, 0.030, speed)
+    assert late == displacement(commands, 0.1, 0.0, 0.004, speed)
+    assert late.way_m == pytest.approx(speed**2 / (2.0 * 3.0))
+    # Without another command after it, `held` is as long as it says.
+    alone = sent_every([1.0])
+    assert displacement(alone, 0.1, 0.0, 0.030, speed).way_m == pytest.approx(0.07 * speed)
+
+
+def test_commands_after_now_do_not_count() -> None:
+    commands = sent_every([0.0] * 10 + [1.0] * 10)
+    assert displacement(commands, 0.036, 0.0).way_m == 0.0
+
+
+@pytest.mark.parametrize(
+    ("echo_sent_s", "echo_held_s"),
+    [
+        (None, None),
+        (None, 0.0),
+        (5.0, None),
+        (2.9, 0.0),
+        (5.1, 0.0),
+        (4.9, 0.102),
+        (4.9, -0.001),
+        (math.nan, 0.0),
+        (4.9, math.nan),
+        (-math.inf, 0.0),
+        (4.9, math.inf),
+    ],
+)
+def test_without_an_echo_that_history_reaches_back_to_there_is_no_answer(
+    echo_sent_s: float | None, echo_held_s: float | None
+) -> None:
+    commands = CommandsUnderWay()
+    for tick in range(501):
+        commands.sent(0.01 * tick, 0.5)
+    assert commands.displacement(5.0, echo_sent_s, echo_held_s, 0.1, FULL_M_S, 3.0) is None
+    assert commands.displacement(5.0, 3.0, 0.0, 0.1, FULL_M_S, 3.0) is not None
+
+
+def test_there_is_no_answer_from_before_the_first_command() -> None:
+    commands = CommandsUnderWay()
+    assert commands.displacement(1.0, 0.9, 0.0, 0.0, FULL_M_S, 3.0) is None
+    commands.sent(0.95, 0.0)
+    assert commands.displacement(1.0, 0.9, 0.0, 0.0, FULL_M_S, 3.0) is None
+    assert displacement(commands, 1.0, 0.95) == Displacement(0.0, 0.0)
+
+
+def test_a_held_that_drifting_clocks_make_too_long_is_now() -> None:
+    assert displacement(sent_every([1.0]), 0.1, 0.0, 0.1005, 0.2) == Displacement(0.0, 0.2)
+
+
+@given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=300), st.floats(0.05, 1.0))
+def test_what_is_kept_is_the_window_and_the_command_that_counted_as_it_began(
+    gaps_s: list[float], window_s: float
+) -> None:
+    commands = CommandsUnderWay(window_s)
+    sent_s: list[float] = []
+    for gap_s in gaps_s:
+        sent_s.append((sent_s[-1] if sent_s else 0.0) + gap_s)
+        commands.sent(sent_s[-1], 0.0)
+    within = sum(time_s > sent_s[-1] - window_s for time_s in sent_s)
+    assert len(commands) <= within + 1
+
+
+def test_memory_is_bounded_whatever_the_rate() -> None:
+    commands = CommandsUnderWay()
+    for tick in range(10_000):
+        commands.sent(1e-6 * tick, 0.0)
+    assert len(commands) == 4096
+    # What was forgotten is not taken for nothing.
+    assert commands.displacement(0.01, 0.001, 0.0, 0.0, FULL_M_S, 3.0) is None
+    for tick in range(2000):
+        commands.sent(1.0 + PERIOD_S * tick, 0.0)
+    assert len(commands) <= MAX_DELAY_S / PERIOD_S + 2
+
+
+def test_bad_input_is_refused() -> None:
+    commands = sent_every([0.0, 0.0])
+    for now_s, travel in ((1.0, 1.001), (1.0, math.nan), (0.0, 0.0), (math.inf, 0.0), (math.nan, 0.0)):
+        with pytest.raises(ValueError, match="valid: "):
+            commands.sent(now_s, travel)
+    for speed, full, acceleration in (
+        (math.nan, 0.25, 3.0),
+        (0.0, 0.0, 3.0),
+        (0.0, math.inf, 3.0),
+        (0.0, 0.25, 0.0),
+        (0.0, 0.25, math.nan),
+    ):
+        with pytest.raises(ValueError, match="valid: "):
+            commands.displacement(0.01, 0.0, 0.0, speed, full, acceleration)
+    for window_s in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ValueError, match="window_s"):
+            CommandsUnderWay(window_s)
