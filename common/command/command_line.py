@@ -172,6 +172,10 @@ def _one_line(box: str, program: str) -> str:
     said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
     if fits:
         return f"{_shortened(said)}; valid: a number"
+    # Of an option that takes several values tyro does not say which kind they are.
+    several = re.match(r"(--\S+): Could not find valid parse for arguments: \[(.*)\]$", said)
+    if several:
+        return f"{several[1]} {_shortened(several[2])}: valid: a number for each value"
     for kind, valid in (("float", "a number"), ("int()", "a whole number")):
         if kind in said:
             return f"{_shortened(said)}; valid: {valid}"

@@ -42,7 +42,7 @@ def _valid(hint: Any) -> str:
     if origin in (Union, types.UnionType):
         return " or ".join(_valid(argument) for argument in arguments if argument is not type(None))
     if origin is tuple:
-        return f"[{', '.join(_valid(argument) for argument in arguments)}]"
+        return f"[{', '.join('...' if argument is Ellipsis else _valid(argument) for argument in arguments)}]"
     if origin is dict:
         return f"a table of NAME = {_valid(arguments[1])}"
     if isinstance(hint, type) and issubclass(hint, Enum):

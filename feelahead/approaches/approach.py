@@ -34,7 +34,8 @@ REACTION_S = 0.25
 _LAST_S = 1.0
 _LONGEST_ARMING_S = 30.0
 
-End = Literal["contact", "stopped", "undecided"]
+End = Literal["contact", "stopped", "undecided", "disarmed", "failed"]
+"""disarmed: the robot side stopped the arm, whatever was felt. failed: never armed, or touching from the start."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,8 @@ class Outcome:
     ended_s: float
     """Since the pull began."""
     trace: Trace = field(repr=False)
+    why: str | None = None
+    """Of an end that says nothing about the law."""
 
 
 @dataclass
@@ -164,27 +167,37 @@ class PullRun:
         position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
         return position
 
+    @property
+    def disarmed_because(self) -> str | None:
+        """Why the robot side stopped the arm; None while it has not."""
+        safety = self.loopback.robot.session.safety
+        return None if safety.state == "armed" or not safety.stops else safety.stops[-1][1]
+
     def arm(self) -> float:
         """Go on until the pull begins; when that is. FeelaheadError where the robot is not armed in time."""
         while self.hands.pull_began_s is None:
             self.loopback.run_until(self.loopback.clock.now() + SAMPLE_S)
             if self.loopback.clock.now() > _LONGEST_ARMING_S:
                 raise FeelaheadError(self._not_armed())
+        if self.truth.touched:
+            raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
         return self.hands.pull_began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:
-        """Go on until a contact or `until_s`, with a pause each 10 ms for the caller to look or to leave."""
+        """Go on until a contact, a stop or `until_s`, with a pause each 10 ms for the caller to look or to leave."""
         clock = self.loopback.clock
-        while self.onset is None and clock.now() < until_s:
+        while self.onset is None and self.disarmed_because is None and clock.now() < until_s:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
 
     def _not_armed(self) -> str:
-        stops = self.loopback.robot.session.safety.stops
-        why = f"; it stopped: {stops[-1][1]}" if stops else ""
+        robot, link = self.loopback.robot, self.approach.link
+        why = f"{robot.session.safety.stops[-1][1]}; " if robot.session.safety.stops else ""
         grip = " and did not grip" if self.approach.grip else ""
-        link = self.approach.link
-        return f"the robot was not armed{grip} within {_LONGEST_ARMING_S:g} s over --link {link!r}{why}"
+        return (
+            f"the robot was not armed{grip} within {_LONGEST_ARMING_S:g} s over --link {link!r}: {why}loop age"
+            f" {robot.loop_age_s(self.loopback.clock.now()):.2f} s, {robot.session.motion_received} commands arrived"
+        )
 
     def _after_robot_tick(self, now_s: float) -> None:
         if self.onset is not None:
@@ -227,10 +240,14 @@ def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
     """Run it to its contact, or to its end; the same settings give the same outcome.
 
     `pull`: instead of R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
-    used; FeelaheadError where the robot is not armed in time.
+    used; a robot that is not armed in time, or that touches before the pull, is an outcome that `failed`.
     """
     run = PullRun(approach, pull)
-    for _ in run.go_on(run.arm() + approach.duration_s):
+    try:
+        began_s = run.arm()
+    except FeelaheadError as error:
+        return Outcome("failed", None, None, math.nan, None, None, 0, 0.0, run.samples.trace(), str(error))
+    for _ in run.go_on(began_s + approach.duration_s):
         pass
     return _outcome(run)
 
@@ -248,7 +265,9 @@ def time_to_goal_s(approach: Approach, pull: Pull, goal_m: float) -> float | Non
 
 def _outcome(run: PullRun) -> Outcome:
     trace, onset = run.samples.trace(), run.onset
-    end: End = "contact" if onset is not None else "stopped" if stands(trace) else "undecided"
+    end: End = "stopped" if stands(trace) else "undecided"
+    if onset is not None or run.disarmed_because is not None:
+        end = "contact" if onset is not None else "disarmed"
     stopped = end == "stopped"
     return Outcome(
         end=end,
@@ -260,6 +279,7 @@ def _outcome(run: PullRun) -> Outcome:
         reversals=reversals(trace.speed_m_s.tolist()),
         ended_s=float(trace.time_s[-1]),
         trace=trace,
+        why=run.disarmed_because if end == "disarmed" else None,
     )
 
 

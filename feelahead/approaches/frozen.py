@@ -73,6 +73,7 @@ def frozen_values() -> dict[str, Any]:
 def frozen_hash(others: Sequence[Path] = ()) -> str:
     """One hash of all frozen scenes and values; of the `others`, where a model is none of them, too."""
     digest = hashlib.sha256(json.dumps(frozen_values(), sort_keys=True).encode())
-    for path in [*sorted(SCENES.glob("*.xml")), *(path for path in others if path.parent.resolve() != SCENES)]:
+    foreign = sorted(path for path in others if path.parent.resolve() != SCENES)
+    for path in [*sorted(SCENES.glob("*.xml")), *foreign]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:_HASH_DIGITS]

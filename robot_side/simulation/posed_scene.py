@@ -86,6 +86,7 @@ def move_objects(scene: Scene, shift_m: FloatArray) -> None:
         raise ValueError("scene: some of its objects move on joints; valid: objects that stand fixed")
     model.body_pos[roots[roots != 0]] += shift_m
     model.geom_pos[geoms[model.geom_bodyid[geoms] == 0]] += shift_m
+    model.geom_sameframe[geoms[model.geom_bodyid[geoms] == 0]] = 0
     # MuJoCo's tree of a body's geoms was built where they stood, and would miss contacts with those that moved.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     mujoco.mj_forward(model, scene.data)

@@ -39,6 +39,12 @@ class TrueContact:
         # Nobody simulates this one: it holds the state before the last step, or a gripper moved in thought.
         self._before = mujoco.MjData(self._model)
         self._thought = mujoco.MjData(self._model)
+        self._held: str | None = None
+        self._touched = frozenset(
+            self._object_of[pair[2]]
+            for row in range(self._data.ncon)
+            if (pair := self._pair(self._data.contact[row], None)) is not None
+        )
         self._remember()
 
     def update(self, held: str | None) -> ContactOnset | None:
@@ -51,7 +57,12 @@ class TrueContact:
         data = self._data
         # Each look at MuJoCo's contacts takes longer than a step of the physics, and most of the time there are none.
         touching = [pair for row in range(data.ncon) if (pair := self._pair(data.contact[row], held)) is not None]
-        found = self._onsets(touching) if touching else []
+        # What touched at the last look has had its onset; so has what something touched before it was gripped.
+        names = frozenset(self._object_of[theirs] for _, _, theirs, _ in touching)
+        known = self._touched if held == self._held else names
+        new = [pair for pair in touching if self._object_of[pair[2]] not in known]
+        found = self._onsets(new) if new else []
+        self._touched, self._held = names, held
         self._remember()
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
 
@@ -62,6 +73,11 @@ class TrueContact:
         twist: FloatArray = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_SITE, site, twist, 0)
         return axis, float(twist[3:] @ axis)
+
+    @property
+    def touched(self) -> frozenset[str]:
+        """The objects that the gripper, or what it holds, touched at the last look."""
+        return self._touched
 
     def gap_m(self, held: str | None, farthest_m: float = 1.0) -> float:
         """The least distance from the gripper to anything that it does not hold, at most `farthest_m`."""
@@ -112,7 +128,7 @@ class TrueContact:
         """Of the geom's body at `point_m` (3,), before the last step, in the world frame (3,) in m/s."""
         body = int(self._model.geom_bodyid[geom])
         twist: FloatArray = np.zeros(6)
-        mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_BODY, body, twist, 0)
+        mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
         lever: FloatArray = point_m - self._before.xpos[body]
         velocity: FloatArray = twist[3:] + np.cross(twist[:3], lever)
         return velocity
@@ -131,12 +147,19 @@ def free_way(
     Moves `mine` in `data`, whose kinematics must be up to date: give a copy.
     """
     start = data.geom_xpos[mine].copy()
-    moved_m = 0.0
+    moved_m, ends = 0.0, np.zeros(6)
     for _ in range(_MOST_STEPS):
-        gap_m = least_distance(model, data, mine, theirs, farthest_m - moved_m)
-        if gap_m <= _TOUCHING_M:
-            break
-        moved_m += gap_m
+        step_m = farthest_m - moved_m
+        for first in mine:
+            for second in theirs:
+                gap_m = mujoco.mj_geomDistance(model, data, int(first), int(second), farthest_m, ends)
+                if gap_m <= _TOUCHING_M:
+                    return moved_m
+                # Convex geoms are apart by a slab of this width, through which they come at this part of the way.
+                towards = (ends[3:] - ends[:3]) @ direction / gap_m if gap_m < farthest_m else 1.0
+                if towards * step_m > gap_m:
+                    step_m = gap_m / towards
+        moved_m += step_m
         if moved_m >= farthest_m:
             return farthest_m
         data.geom_xpos[mine] = start + moved_m * direction

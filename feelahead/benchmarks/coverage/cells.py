@@ -86,7 +86,7 @@ class Plan:
 
 
 def full_plan(laws: tuple[Law, ...]) -> Plan:
-    """Every scene and link with a steady pull, every pull over three links, and one factor at a time from there on."""
+    """Every scene with a steady pull over four links, every pull over two, and one factor at a time from there on."""
     cells: dict[str, Cell] = {}
 
     def add(pull: PullKind, link: str, scene: str, camera_mm: float = 3.0, encoder_factor: float = 1.0) -> None:
@@ -94,10 +94,12 @@ def full_plan(laws: tuple[Law, ...]) -> Plan:
         cells.setdefault(cell.key, cell)
 
     for link in LINKS:
+        add("steady", link, "wall")
+    for link in ("0 ms", "50 ms", "200 ms", "400 ms"):
         for scene in (*STILL_AHEAD, *PASSED):
             add("steady", link, scene)
     for pull in PULL_KINDS:
-        for link in ("0 ms", "50 ms", "200 ms"):
+        for link in ("50 ms", "200 ms"):
             for scene in ("wall", "post", "rod_5mm", "wall_beside", "table_1_box", "cluttered"):
                 add(pull, link, scene)
     for camera_mm in (1.0, 6.0):

@@ -1,9 +1,7 @@
 """The benchmark's pieces, done by several processes, each as soon as one is free, and kept in a file as they end."""
 
 import json
-import multiprocessing
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 from common.errors import ConfigurationError
 from feelahead.approaches.frozen import frozen_hash
 from feelahead.approaches.laws import Law
+from feelahead.approaches.processes import in_processes
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import Cell, Motion, Plan
 from feelahead.benchmarks.coverage.closed_loop import check
@@ -64,19 +63,12 @@ def again(count: int, seed: int) -> Records:
 
 def do(todo: list[Piece], workers: int) -> Iterator[tuple[Piece, Records]]:
     """Each piece with what came of it, as they end."""
-    if workers == 1:
-        for piece in todo:
-            yield piece, piece.call(*piece.arguments)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        futures: dict[Future[Records], Piece] = {pool.submit(piece.call, *piece.arguments): piece for piece in todo}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+    for place, records in in_processes(_call, [(piece,) for piece in todo], workers):
+        yield todo[place], records
+
+
+def _call(piece: Piece) -> Records:
+    return piece.call(*piece.arguments)
 
 
 class Kept:

@@ -1,10 +1,10 @@
 """Run every approach that was asked for, and say how each ended."""
 
+import contextlib
 import json
-import multiprocessing
+import math
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from typing import Any
 
@@ -13,6 +13,7 @@ from rich.console import Console
 from common.command.command_line import parse_settings
 from feelahead.approaches.approach import Approach, Outcome, run_approach
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.picture import draw_comparison, draw_run
 from feelahead.experiments.approach.settings import ApproachSettings
@@ -23,50 +24,44 @@ Ended = tuple[Approach, Outcome]
 
 
 def try_approach(arguments: Sequence[str]) -> int:
-    """Run, print, write the summary and the picture; 1 where an approach ended undecided."""
+    """Run, print, write the summary and the picture; 1 unless each approach ended in a contact or stopped.
+
+    After a Ctrl-C what is done is shown and written all the same.
+    """
     settings = parse_settings(ApproachSettings, _PROGRAM, arguments)
     approaches = list(settings.approaches())
     ended = _run_all(approaches, settings.workers)
     frozen = frozen_hash(settings.models())
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
     if len(ended) == 1:
         console.print(sentence(*ended[0]))
-    else:
+    elif ended:
         console.print(comparison(ended))
+    if len(ended) < len(approaches):
+        console.print(f"interrupted: {len(ended)} of {len(approaches)} approaches are done")
     console.print(f"frozen scenes and limits: {frozen}")
     if settings.summary is not None:
         settings.summary.write_text(json.dumps(_summary(ended, frozen), indent=2) + "\n", encoding="utf-8")
-    if settings.picture is not None:
+    if settings.picture is not None and ended:
         if len(ended) == 1:
             draw_run(*ended[0], frozen, settings.picture)
         else:
             draw_comparison(ended, frozen, settings.picture)
-    return 1 if any(outcome.end == "undecided" for _, outcome in ended) else 0
+    told = all(outcome.end in ("contact", "stopped") for _, outcome in ended)
+    return 0 if told and len(ended) == len(approaches) else 1
 
 
 def _run_all(approaches: Sequence[Approach], workers: int) -> list[Ended]:
-    """Each in turn, or in several processes at a time."""
-    with progress("approaches", len(approaches)) as advance:
-        if workers == 1 or len(approaches) == 1:
-            ended = []
-            for approach in approaches:
-                ended.append((approach, run_approach(approach)))
-                advance(1.0)
-            return ended
+    """Each in turn, or in several processes at a time; those that were done before a Ctrl-C."""
+    outcomes: dict[int, Outcome] = {}
+    with progress("approaches", len(approaches)) as advance, contextlib.suppress(KeyboardInterrupt):
         # The first one alone: it compiles the kernels, if they are not there.
-        outcomes = {approaches[0]: run_approach(approaches[0])}
+        outcomes[0] = run_approach(approaches[0])
         advance(1.0)
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            futures = {pool.submit(run_approach, approach): approach for approach in approaches[1:]}
-            try:
-                for future in as_completed(futures):
-                    outcomes[futures[future]] = future.result()
-                    advance(1.0)
-            finally:
-                for future in futures:
-                    future.cancel()
-        return [(approach, outcomes[approach]) for approach in approaches]
+        for place, outcome in in_processes(run_approach, [(approach,) for approach in approaches[1:]], workers):
+            outcomes[place + 1] = outcome
+            advance(1.0)
+    return [(approaches[place], outcomes[place]) for place in sorted(outcomes)]
 
 
 def _summary(ended: Sequence[Ended], frozen: str) -> dict[str, Any]:
@@ -79,4 +74,6 @@ def _figures(approach: Approach, outcome: Outcome) -> dict[str, Any]:
     settings = asdict(approach) | {"model": str(approach.model), "haptics": approach.law != "none"}
     figures = {key: value for key, value in vars(outcome).items() if key != "trace"}
     trace = {key: value.tolist() for key, value in vars(outcome.trace).items()}
+    if math.isnan(outcome.least_gap_mm):
+        figures["least_gap_mm"] = None
     return settings | figures | {"trace": trace}

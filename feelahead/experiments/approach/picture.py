@@ -7,6 +7,7 @@ from typing import Final
 
 from common.emulation.spec import LinkSpec
 from feelahead.approaches.approach import Approach, Outcome
+from feelahead.experiments.approach.table import scene_names
 
 _COLOURS: Final = {"none": "#777777", "first": "#0072b2", "paper": "#d55e00"}
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
@@ -50,12 +51,12 @@ def draw_run(approach: Approach, outcome: Outcome, frozen: str, path: Path) -> N
 def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path: Path) -> None:
     """Contact speed against the one-way delay: a panel for each force, a line for each law and scene.
 
-    A run that stops before the contact counts as 0 mm/s; one that is undecided is left out.
+    A run that stops before the contact counts as 0 mm/s; one that ends otherwise is left out.
     """
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     forces = sorted({one.force_n for one, _ in ended})
-    scenes = list(dict.fromkeys(one.model.stem for one, _ in ended))
+    scenes = scene_names([one.model for one, _ in ended])
     laws = list(dict.fromkeys(one.law for one, _ in ended))
     size = (4.2 * len(forces) + 1.6, 4.2)
     figure, panels = plt.subplots(
@@ -63,14 +64,15 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
     )
     for panel, force_n in zip(panels[0], forces, strict=True):
         for law in laws:
-            for number, scene in enumerate(scenes):
+            for number, (scene, name) in enumerate(scenes.items()):
                 points: dict[float, list[float]] = {}
                 for one, outcome in ended:
-                    if (one.force_n, one.law, one.model.stem) == (force_n, law, scene) and outcome.end != "undecided":
+                    told = outcome.end in ("contact", "stopped")
+                    if told and (one.force_n, one.law, one.model) == (force_n, law, scene):
                         speed = outcome.contact_speed_mm_s or 0.0
                         points.setdefault(_one_way_ms(one), []).append(speed)
                 delays = sorted(points)
-                label = f"{law}, {scene}" if force_n == forces[0] else None
+                label = f"{law}, {name}" if force_n == forces[0] else None
                 panel.plot(
                     delays,
                     [median(points[delay]) for delay in delays],
@@ -89,4 +91,6 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
 
 
 def _one_way_ms(approach: Approach) -> float:
-    return 1e3 * LinkSpec.parse(approach.link, 0, approach.link_model).profile("to_robot").mean_delay_s()
+    """Half of what both ways take."""
+    link = LinkSpec.parse(approach.link, 0, approach.link_model)
+    return 500.0 * sum(link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))

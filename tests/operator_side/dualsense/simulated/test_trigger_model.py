@@ -228,6 +228,60 @@ def test_less_power_is_less_strength() -> None:
         trigger.set_effect(Off(), power=1.5)
 
 
+# Another strongest effect than the assumed one
+
+STEPS = st.floats(0.0, 1.0)
+
+
+@given(FORCES, STRENGTHS, STEPS)
+@REPEATABLE
+def test_what_one_strength_resists_may_be_chosen(force_n: float, strengths: tuple[int, ...], step_n: float) -> None:
+    """Twice the step is as good as twice the strength, and half the strengths as half the step."""
+    halved = tuple(strength / 2 for strength in strengths)
+    expected = equilibrium_travel(force_n, halved, step_n)
+    assert equilibrium_travel(force_n, strengths, step_n / 2) == pytest.approx(expected, abs=1e-12)
+    assert equilibrium_travel(force_n, strengths) == equilibrium_travel(force_n, strengths, STRENGTH_STEP_N)
+
+
+@given(FORCES, STRENGTHS, STEPS, STEPS)
+@REPEATABLE
+def test_equilibrium_never_grows_with_the_step(
+    force_n: float, strengths: tuple[int, ...], one: float, other: float
+) -> None:
+    light, heavy = sorted((one, other))
+    assert equilibrium_travel(force_n, strengths, heavy) <= equilibrium_travel(force_n, strengths, light)
+
+
+@pytest.mark.parametrize("strongest_n", [0.0, 1.5, 2.0, 3.0])
+def test_the_strongest_effect_is_eight_steps(strongest_n: float) -> None:
+    trigger = SimulatedTrigger(strongest_n / 8)
+    trigger.set_effect(Feedback(0, 8))
+    pulled(trigger, 4.0)
+    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N - strongest_n) / SPRING_RISE_N, abs=1e-9)
+    # Less power is less of it.
+    trigger.set_effect(Feedback(0, 8), power=0.5)
+    trigger.advance(2.0)
+    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N - strongest_n / 2) / SPRING_RISE_N, abs=1e-9)
+
+
+def test_the_usual_step_makes_two_newtons_of_the_strongest_effect() -> None:
+    assert pytest.approx(2.0) == 8 * STRENGTH_STEP_N
+    usual, chosen = SimulatedTrigger(), SimulatedTrigger(STRENGTH_STEP_N)
+    for trigger in (usual, chosen):
+        trigger.set_effect(MultiPositionFeedback((0, 0, 3, 3, 8, 8, 8, 8, 8, 8)))
+    assert pulled(usual, 3.0) == pulled(chosen, 3.0)
+    assert usual.travel == chosen.travel
+
+
+def test_without_a_step_effects_are_told_and_not_felt() -> None:
+    trigger = SimulatedTrigger(0.0)
+    trigger.set_effect(Feedback(0, 8))
+    feedback = pulled(trigger, 3.0)
+    assert trigger.travel == pytest.approx(equilibrium_travel(3.0, (0,) * 10), abs=1e-9)
+    assert feedback.active_effect == 1
+    assert trigger.effect == Feedback(0, 8)
+
+
 def test_arguments_out_of_range() -> None:
     trigger = SimulatedTrigger()
     for force_n in (-0.1, float("nan"), float("inf")):
@@ -240,3 +294,8 @@ def test_arguments_out_of_range() -> None:
         equilibrium_travel(1.0, (1,) * 9)
     with pytest.raises(ValueError, match="zone_strengths"):
         equilibrium_travel(1.0, (9,) * 10)
+    for step_n in (-0.1, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="strength_step_n"):
+            equilibrium_travel(1.0, (1,) * 10, step_n)
+        with pytest.raises(ValueError, match="strength_step_n"):
+            SimulatedTrigger(step_n).set_finger_force(1.0)

@@ -1,0 +1,394 @@
+"""Approaches to a wall, whose ends can be worked out by hand; and what is told of any approach."""
+
+import functools
+import math
+from dataclasses import fields
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import ConfigurationError
+from feelahead.approaches import approach as module
+from feelahead.approaches.approach import SAMPLE_S, Approach, Outcome, Trace, reversals, run_approach, stands
+from feelahead.approaches.pulls import Hands
+from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
+from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
+from tests.helpers.repository import DATA
+
+pytestmark = pytest.mark.long
+
+approaches = pytest.mark.xdist_group("approaches")
+"""Run by one worker, so that each approach is made once."""
+REPEATABLE = settings(derandomize=True, deadline=None)
+WAY_MM = 320.0
+FAR = "delay 200ms"
+JITTER = "delay 20ms 10ms distribution normal"
+
+
+@functools.cache
+def ended(scene: str = "wall", force_n: float = 3.0, **changes: Any) -> Outcome:
+    return run_approach(Approach(DATA / f"{scene}.xml", force_n, **changes))
+
+
+def free_speed_mm_s(force_n: float) -> float:
+    """Of the trigger's travel against its spring alone, what is sensed, what of that counts, at 250 mm/s when full."""
+    sensed = min((force_n - 0.5) / 4.0 / 0.75, 1.0)
+    return 250.0 * min((sensed - 0.05) / (0.98 - 0.05), 1.0)
+
+
+# Onto a wall
+
+
+@approaches
+@pytest.mark.parametrize("law", ["first", "none"])
+@pytest.mark.parametrize(("force_n", "known_mm_s"), [(3.0, 210.0), (2.0, 120.0)])
+def test_with_200_ms_each_way_a_wall_is_hit_unbraked_with_haptics_and_without(
+    force_n: float, known_mm_s: float, law: Literal["first", "none"]
+) -> None:
+    outcome = ended(force_n=force_n, link=FAR, law=law)
+    assert (outcome.end, outcome.contact_with) == ("contact", "wall")
+    assert outcome.contact_speed_mm_s == pytest.approx(known_mm_s, abs=3.0)
+    assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(force_n), abs=3.0)
+    assert (outcome.stops_at_mm, outcome.way_left_mm, outcome.reversals) == (None, None, 0)
+
+
+@approaches
+def test_without_delay_the_same_finger_is_braked() -> None:
+    outcome = ended()
+    assert outcome.end == "contact"
+    assert outcome.contact_speed_mm_s is not None
+    assert 100.0 < outcome.contact_speed_mm_s < free_speed_mm_s(3.0) - 40.0
+    assert outcome.reversals == 1  # it has slowed down once
+
+
+@approaches
+def test_a_stronger_effect_brakes_more_and_one_without_force_does_not() -> None:
+    speeds = [ended(strongest_n=strongest_n).contact_speed_mm_s for strongest_n in (0.0, 2.0, 3.0)]
+    none, usual, strong = speeds
+    assert none is not None
+    assert usual is not None
+    assert strong is not None
+    assert none == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
+    assert strong < usual - 5.0
+
+
+@approaches
+def test_the_trace_tells_the_way_to_the_wall() -> None:
+    outcome = ended(link=FAR, law="none")
+    trace = outcome.trace
+    rows = len(trace.time_s)
+    assert [getattr(trace, one.name).shape for one in fields(Trace)] == [(rows,)] * 4 + [(rows, 10)]
+    assert trace.time_s[0] == 0.0
+    assert trace.time_s[-1] == outcome.ended_s
+    np.testing.assert_allclose(np.diff(trace.time_s)[:-1], SAMPLE_S, atol=1e-9)
+    # It begins 320 mm before the wall; the speed, added up, has brought it there.
+    assert 1e3 * trace.gap_m[0] == pytest.approx(WAY_MM, abs=0.1)
+    assert 1e3 * np.trapezoid(trace.speed_m_s, trace.time_s) == pytest.approx(WAY_MM, abs=1.0)
+    assert outcome.least_gap_mm == 1e3 * trace.gap_m.min()
+    assert -0.3 < outcome.least_gap_mm <= 0.0
+    # A finger of 3 N, felt by nobody but the spring.
+    assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
+    assert trace.strengths.max() == 0
+
+
+@approaches
+@pytest.mark.parametrize("strongest_n", [2.0, 3.0])
+def test_what_is_felt_is_in_the_trace(strongest_n: float) -> None:
+    trace = ended(strongest_n=strongest_n).trace
+    assert trace.strengths.dtype == np.int64
+    assert trace.strengths[0].max() == 0
+    assert trace.strengths.max() == 8
+    # A finger of 3 N that feels these strengths travels as the trace says, but for what changes within 10 ms; by the
+    # contact, shortly after it has begun to feel them, it has gone back by this much.
+    trigger, travels = SimulatedTrigger(strongest_n / 8), []
+    trigger.set_finger_force(3.0)
+    for strengths in trace.strengths[:-1].tolist():
+        travels.append(trigger.travel)
+        trigger.set_effect(MultiPositionFeedback(tuple(strengths)))
+        trigger.advance(SAMPLE_S)
+    np.testing.assert_allclose(travels, trace.travel[:-1], atol=0.1)
+    assert trace.travel[-1] < (3.0 - 0.5) / 4.0 - 0.1 * strongest_n
+
+
+@approaches
+def test_what_is_gripped_counts_as_gripper() -> None:
+    outcome = ended("place_held", force_n=3.7, grip=True, law="none")
+    assert (outcome.end, outcome.contact_with) == ("contact", "table")
+    assert outcome.contact_speed_mm_s == pytest.approx(250.0, abs=3.0)
+    assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
+
+
+# Not onto it
+
+
+@approaches
+def test_who_does_not_pull_stops_where_they_are() -> None:
+    outcome = ended(force_n=0.0, duration_s=1.2)
+    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
+    assert outcome.stops_at_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.way_left_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.least_gap_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.reversals == 0
+    assert outcome.ended_s == pytest.approx(1.2)
+
+
+@approaches
+def test_who_still_moves_at_the_end_is_undecided() -> None:
+    outcome = ended(force_n=3.7, duration_s=0.5, link=JITTER)
+    assert outcome.end == "undecided"
+    assert (outcome.contact_speed_mm_s, outcome.stops_at_mm, outcome.way_left_mm) == (None, None, None)
+    assert 0.0 < outcome.least_gap_mm < WAY_MM
+
+
+@approaches
+def test_a_pull_of_ones_own_takes_the_place_of_the_force() -> None:
+    approach = Approach(DATA / "wall.xml", 3.7, duration_s=1.6)
+    outcome = run_approach(approach, lambda since_s: Hands(r2_n=2.0 if since_s < 0.2 else 0.0))
+    assert outcome.end == "stopped"
+    assert outcome.trace.travel.max() < (2.0 - 0.5) / 4.0
+    assert outcome.reversals == 1
+    assert outcome.stops_at_mm is not None
+    assert WAY_MM - 40.0 < outcome.stops_at_mm < WAY_MM - 10.0
+
+
+# The same again
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    plain = {one.name: getattr(outcome, one.name) for one in fields(Outcome) if one.name != "trace"}
+    return plain | {one.name: getattr(outcome.trace, one.name).tolist() for one in fields(Trace)}
+
+
+def short(seed: int) -> dict[str, Any]:
+    return numbers(run_approach(Approach(DATA / "wall.xml", 3.7, duration_s=0.5, link=JITTER, seed=seed)))
+
+
+@approaches
+def test_a_seed_gives_the_same_outcome_and_another_one_another() -> None:
+    first = numbers(ended(force_n=3.7, duration_s=0.5, link=JITTER))
+    assert short(0) == first
+    assert short(1) != first
+
+
+@approaches
+def test_an_approach_does_not_depend_on_those_before_it() -> None:
+    before = numbers(ended(link=FAR, law="none"))
+    again = run_approach(Approach(DATA / "wall.xml", 3.0, link=FAR, law="none"))
+    assert numbers(again) == before
+
+
+# What cannot be
+
+
+def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_LONGEST_ARMING_S", 3.0)
+    for changes, why in (
+        ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
+        ({"grip": True}, "grip"),
+    ):
+        failed = ended(**changes)
+        assert failed.end == "failed"
+        assert failed.why is not None
+        assert why in failed.why
+        assert failed.contact_speed_mm_s is failed.stops_at_mm is None
+
+
+def test_an_arm_that_safety_stops_has_not_been_stopped_by_the_law() -> None:
+    stopped = ended(link="outage 300ms at 2.3s", duration_s=3.0)
+    assert (stopped.end, stopped.stops_at_mm) == ("disarmed", None)
+    assert stopped.why is not None
+    assert "no command for" in stopped.why
+
+
+def test_a_model_or_a_site_that_is_not_there_is_named() -> None:
+    with pytest.raises(ConfigurationError, match="no_such_scene"):
+        ended("no_such_scene")
+    with pytest.raises(ConfigurationError, match="'pinch'"):
+        ended(site="pinch")
+
+
+# Reversals
+
+SPEEDS = st.lists(st.integers(-300, 300).map(lambda mm_s: mm_s / 1024.0), max_size=60)
+"""In binary fractions, so that adding and taking away is exact."""
+
+
+@pytest.mark.parametrize(
+    ("speeds_mm_s", "count"),
+    [
+        ([], 0),
+        ([100], 0),
+        ([0, 50, 100, 200, 210], 0),  # monotone
+        ([0, 100, 200, 200, 100, 0], 1),  # rises and stops
+        ([0, 200, 100, 200], 2),
+        ([0, 200, 0, 200, 0, 200, 0], 5),
+        ([0, 100, 90, 100, 90, 100, 90], 0),  # noise
+        ([100, 86, 100, 86, 100], 0),
+        ([100, 84, 100, 84, 100], 4),
+        ([0, 100, 95, 90, 85, 80], 1),  # little by little
+        ([200, 0], 1),  # it had risen before
+        ([0, -50], 1),
+        ([0, 100, 84, 98, 84, 98], 1),
+    ],
+)
+def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], count: int) -> None:
+    assert reversals([1e-3 * one for one in speeds_mm_s]) == count
+
+
+def test_a_limit_cycle_has_two_reversals_each_time() -> None:
+    times_s = np.arange(0.0, 4.0, SAMPLE_S)
+    cycle = 0.1 + 0.03 * np.sin(2.0 * math.pi * 2.0 * times_s)
+    assert reversals(cycle.tolist()) == pytest.approx(2 * 2 * 4, abs=1)
+    calm = 0.1 + 0.007 * np.sin(2.0 * math.pi * 2.0 * times_s)
+    assert reversals(calm.tolist()) == 0
+    assert reversals(calm.tolist(), swing_m_s=0.01) == pytest.approx(2 * 2 * 4, abs=1)
+
+
+@given(SPEEDS, st.integers(-1024, 1024))
+@REPEATABLE
+def test_a_constant_speed_on_top_changes_no_count(speeds_m_s: list[float], offset: int) -> None:
+    assert reversals([one + offset / 1024.0 for one in speeds_m_s]) == reversals(speeds_m_s)
+
+
+@given(SPEEDS, st.integers(1, 5))
+@REPEATABLE
+def test_speeds_that_last_longer_change_no_count(speeds_m_s: list[float], times: int) -> None:
+    assert reversals([one for one in speeds_m_s for _ in range(times)]) == reversals(speeds_m_s)
+
+
+@given(SPEEDS, st.integers(0, 60), st.floats(0.0, 1.0))
+@REPEATABLE
+def test_a_speed_between_its_neighbours_changes_no_count(speeds_m_s: list[float], place: int, part: float) -> None:
+    if len(speeds_m_s) < 2:
+        return
+    place = min(place, len(speeds_m_s) - 2)
+    low, high = sorted(speeds_m_s[place : place + 2])
+    between = min(max(low + part * (high - low), low), high)
+    assert reversals([*speeds_m_s[: place + 1], between, *speeds_m_s[place + 1 :]]) == reversals(speeds_m_s)
+
+
+@given(SPEEDS, st.floats(0.001, 0.1), st.floats(0.001, 0.1))
+@REPEATABLE
+def test_a_larger_swing_is_seen_no_more_often(speeds_m_s: list[float], one: float, other: float) -> None:
+    assert reversals(speeds_m_s, max(one, other)) <= reversals(speeds_m_s, min(one, other))
+
+
+@given(SPEEDS)
+@REPEATABLE
+def test_upside_down_there_is_at_most_one_more_or_less(speeds_m_s: list[float]) -> None:
+    assert abs(reversals(speeds_m_s) - reversals([-one for one in speeds_m_s])) <= 1
+
+
+# Standing
+
+
+def trace_of(speeds_m_s: list[float]) -> Trace:
+    rows = len(speeds_m_s)
+    still = np.zeros(rows)
+    return Trace(
+        np.linspace(0.0, SAMPLE_S * (rows - 1), rows),
+        np.array(speeds_m_s),
+        still,
+        still,
+        np.zeros((rows, 10), dtype=np.int64),
+    )
+
+
+@pytest.mark.parametrize(
+    ("last_m_s", "seconds", "standing"),
+    [
+        (0.0, 1.02, True),
+        (0.00099, 1.02, True),
+        (-0.00099, 1.02, True),
+        (0.0011, 1.02, False),
+        (-0.0011, 1.02, False),
+        (0.0, 0.9, False),  # not for long enough
+    ],
+)
+def test_the_gripper_stands_when_it_has_been_slow_for_a_second(
+    last_m_s: float, seconds: float, *, standing: bool
+) -> None:
+    assert stands(trace_of([0.2] * 100 + [last_m_s] * round(seconds / SAMPLE_S))) is standing
+
+
+def test_one_twitch_within_the_last_second_is_no_standing() -> None:
+    for ago_s, standing in ((0.02, False), (0.95, False), (1.05, True)):
+        speeds = [0.0] * 300
+        speeds[-1 - round(ago_s / SAMPLE_S)] = 0.002
+        assert stands(trace_of(speeds)) is standing
+
+
+def test_a_run_of_less_than_a_second_stands_never() -> None:
+    assert not stands(trace_of([0.0] * 50))
+    assert stands(trace_of([0.0] * 101))
+
+
+# Controllers
+
+
+def told(l2: AnyEffect | None = None, r2: AnyEffect | None = None) -> bytes:
+    return build_output_report(OutputReport(l2=l2, r2=r2))
+
+
+def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
+    return device.effects
+
+
+def pressed(device: SimulatedDualSense, force_n: float, now_s: float) -> tuple[float, float]:
+    """The travels of both triggers, long after both are pressed."""
+    device.set_finger_force(force_n, force_n)
+    device.read(now_s)
+    return device.travel
+
+
+@pytest.mark.parametrize("spoil", ["nothing", "delayed", "swapped"])
+@pytest.mark.parametrize("strongest_n", [0.0, 1.0, 2.0])
+def test_the_strongest_effect_is_what_the_trigger_resists(strongest_n: float, spoil: Spoil) -> None:
+    device = controller(strongest_n / 8, spoil)
+    device.read(0.0)
+    for effect, resisted_n in ((Feedback(0, 8), strongest_n), (Feedback(0, 4), strongest_n / 2), (Off(), 0.0)):
+        now_s = device.write_count + 1.0
+        device.write(told(l2=effect, r2=effect), now_s)
+        pressed(device, 3.0, now_s + 0.2)
+        travels = pressed(device, 3.0, now_s + 0.9)
+        assert travels == pytest.approx([(3.0 - 0.5 - resisted_n) / 4.0] * 2, abs=1e-3)
+
+
+def test_an_unspoilt_controller_does_at_once_what_it_is_told() -> None:
+    device = controller(0.25)
+    device.read(0.0)
+    device.write(told(r2=Feedback(3, 6)), 0.01)
+    assert felt(device) == (Off(), Feedback(3, 6))
+
+
+def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
+    device = controller(0.25, "delayed")
+    device.read(0.0)
+    device.write(told(r2=Feedback(3, 6)), 0.01)
+    device.write(told(r2=Feedback(2, 1), l2=Feedback(1, 1)), 0.05)
+    after_ms = {}
+    for milliseconds in range(51, 200):
+        device.read(1e-3 * milliseconds)
+        after_ms[milliseconds] = felt(device)
+    assert SPOILING_DELAY_S == 0.1
+    assert after_ms[109] == (Off(), Off())
+    assert after_ms[111] == after_ms[149] == (Off(), Feedback(3, 6))
+    assert after_ms[151] == after_ms[199] == (Feedback(1, 1), Feedback(2, 1))
+
+
+def test_a_swapped_controller_does_it_on_the_other_trigger() -> None:
+    device = controller(0.25, "swapped")
+    device.read(0.0)
+    device.write(told(r2=Feedback(3, 6)), 0.01)
+    assert felt(device) == (Feedback(3, 6), Off())
+    device.write(told(l2=Feedback(1, 1), r2=Off()), 0.02)
+    assert felt(device) == (Off(), Feedback(1, 1))
+    # Telling one of them leaves the other as it is.
+    device.write(told(r2=Feedback(5, 5)), 0.03)
+    assert felt(device) == (Feedback(5, 5), Feedback(1, 1))

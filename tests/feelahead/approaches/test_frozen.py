@@ -1,0 +1,107 @@
+"""What is frozen stays as it is: figures that were measured at different times are compared with each other."""
+
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigurationError
+from feelahead.approaches import frozen
+from feelahead.approaches.frozen import AHEAD, GRIPPED, PASSED, SCENES, frozen_hash, frozen_scene, frozen_values
+from tests.helpers.repository import DATA
+
+HASH = "9802787272d9"
+WHAT_A_CHANGE_MEANS = (
+    "a frozen scene, force or limit is another one: no figure measured with the former hash may be compared with one"
+    " measured from now on. Take the change back, or give it a scene of its own; if it must be, measure everything anew"
+)
+VALUES_OF_92CA53A = {
+    "finger": {
+        "preload_n": 0.5,
+        "rise_n": 4.0,
+        "time_constant_s": 0.04,
+        "normal_n": 3.7,
+        "sensed_travel": 0.75,
+        "zones": 10,
+        "strengths": 8,
+    },
+    "travel": {
+        "l2": {"dead_zone": 0.05, "saturation": 0.98},
+        "r2": {"dead_zone": 0.05, "saturation": 0.98},
+        "left_stick": {"x": 0.0, "y": 0.0, "dead_zone": 0.1},
+        "right_stick": {"x": 0.0, "y": 0.0, "dead_zone": 0.1},
+    },
+    "arm": {"velocity_rad_s": 2.0, "acceleration_rad_s2": 8.0, "deceleration_rad_s2": 12.0, "windup_rad": 0.02},
+    "tool": {"trigger_speed_m_s": 0.25, "stick_speed_m_s": 0.1, "turn_speed_rad_s": 0.5},
+    "camera": {"mean_m": 0.0, "sd_m": 0.003, "frame_sd_m": 0.0},
+    "encoder": {"sigma_rad": 2e-4, "resolution_rad": 2.0 * math.pi / 2**15},
+}
+"""Read from the files of that commit, not from those of today."""
+
+
+def test_the_hash_is_the_one_that_figures_were_measured_with() -> None:
+    assert frozen_hash() == HASH, WHAT_A_CHANGE_MEANS
+
+
+def test_forces_and_limits_are_those_of_the_commit_that_is_compared_with() -> None:
+    assert frozen_values() == VALUES_OF_92CA53A, WHAT_A_CHANGE_MEANS
+
+
+def test_every_scene_is_either_hit_or_passed() -> None:
+    assert SCENES == DATA
+    assert sorted((*AHEAD, *PASSED)) == sorted(path.stem for path in DATA.glob("*.xml") if path.stem != "arm")
+    assert set(GRIPPED) <= set(AHEAD)
+    assert all(frozen_scene(name).is_file() for name in (*AHEAD, *PASSED))
+
+
+def test_an_unknown_scene_is_named_with_the_known_ones() -> None:
+    with pytest.raises(ConfigurationError, match=r"'wal'.*valid: wall, plate, .*empty"):
+        frozen_scene("wal")
+
+
+def test_without_the_repository_it_says_where_the_scenes_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frozen, "SCENES", tmp_path / "data")
+    with pytest.raises(ConfigurationError, match="a clone of the repository"):
+        frozen_scene("wall")
+
+
+@pytest.fixture
+def copied_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The scenes, in a folder where a test may change them."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    for path in DATA.glob("*.xml"):
+        shutil.copy(path, folder)
+    monkeypatch.setattr(frozen, "SCENES", folder)
+    return folder
+
+
+def test_the_hash_is_of_names_and_contents_and_not_of_the_place(copied_scenes: Path) -> None:
+    assert frozen_hash() == HASH
+    (copied_scenes / "wall.xml").rename(copied_scenes / "wall_2.xml")
+    assert frozen_hash() != HASH
+
+
+@pytest.mark.parametrize("name", ["arm", *AHEAD, *PASSED])
+def test_the_hash_notices_each_file(copied_scenes: Path, name: str) -> None:
+    path = copied_scenes / f"{name}.xml"
+    path.write_bytes(path.read_bytes() + b" ")
+    assert frozen_hash() != HASH
+
+
+def test_the_hash_notices_another_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frozen, "SPRING_RISE_N", 4.5)
+    assert frozen_values()["finger"]["rise_n"] == 4.5
+    assert frozen_hash() != HASH
+
+
+def test_the_hash_covers_a_model_of_somebody_elses(tmp_path: Path) -> None:
+    assert frozen_hash([DATA / "wall.xml"]) == HASH
+    mine = tmp_path / "wall.xml"
+    mine.write_text("<mujoco/>")
+    first = frozen_hash([mine])
+    assert first != HASH
+    assert frozen_hash([DATA / "plate.xml", mine]) == first
+    mine.write_text("<mujoco />")
+    assert frozen_hash([mine]) not in (HASH, first)

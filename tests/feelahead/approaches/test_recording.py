@@ -1,0 +1,190 @@
+"""Recorded approaches: what each side knew when, on a link without jitter, through a wall."""
+
+import functools
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from common.errors import FeelaheadError
+from feelahead.approaches import recording as module
+from feelahead.approaches.pulls import make_pull
+from feelahead.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
+from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.scene import load_scene
+from tests.helpers.repository import DATA
+
+pytestmark = pytest.mark.long
+
+recordings = pytest.mark.xdist_group("recordings")
+"""Run by one worker, so that each pull is recorded once."""
+DELAY_S, DURATION_S = 0.05, 2.0
+SEED = 1
+"""Its steady pull is a fast one; the tests see to that."""
+
+
+@functools.cache
+def recorded() -> RecordedApproach:
+    return record_approach("steady", f"delay {1e3 * DELAY_S:g}ms", SEED, DURATION_S, "wall")
+
+
+@recordings
+def test_every_array_is_as_long_as_said() -> None:
+    one = recorded()
+    assert (one.pull, one.link, one.seed) == ("steady", "delay 50ms", SEED)
+    poses, ticks = round((1.0 + DURATION_S) / POSE_S), round((1.0 + DURATION_S) / TICK_S)
+    assert len(one.pose_time_s) == pytest.approx(poses, abs=2)
+    assert len(one.tick_time_s) == pytest.approx(ticks, abs=2)
+    for name, columns in (("joint_positions_rad", 6), ("joint_velocities_rad_s", 6), ("finger_positions", 2)):
+        assert getattr(one, name).shape == (len(one.pose_time_s), columns)
+    assert one.loop_age_s.shape == one.pose_time_s.shape
+    for name in ("applied_sent_s", "applied_at_s", "seen_sent_s"):
+        assert getattr(one, name).shape == one.tick_time_s.shape
+    assert one.travel.shape == (len(one.tick_time_s), 2)
+    assert one.command.shape == one.command_time_s.shape
+
+
+@recordings
+def test_times_are_even_and_from_a_second_before_the_pull() -> None:
+    one = recorded()
+    np.testing.assert_allclose(np.diff(one.pose_time_s), POSE_S, atol=1e-9)
+    np.testing.assert_allclose(np.diff(one.tick_time_s), TICK_S, atol=1e-9)
+    np.testing.assert_allclose(np.diff(one.command_time_s), 0.004, atol=1e-9)
+    for times_s in (one.pose_time_s, one.tick_time_s):
+        assert times_s[0] == pytest.approx(one.began_s - 1.0, abs=POSE_S)
+        assert times_s[-1] == pytest.approx(one.began_s + DURATION_S, abs=POSE_S)
+
+
+@recordings
+def test_what_was_sent_arrives_one_delay_later() -> None:
+    one = recorded()
+    applied = ~np.isnan(one.applied_sent_s)
+    assert applied[one.tick_row(one.began_s) :].all()
+    np.testing.assert_allclose((one.applied_at_s - one.applied_sent_s)[applied], DELAY_S, atol=TICK_S + 1e-9)
+    assert (np.diff(one.applied_sent_s[applied]) >= 0.0).all()
+    assert (one.applied_at_s[applied] <= one.tick_time_s[applied]).all()
+    # Each of a command every 4 ms is followed until the next one.
+    followed_s = (one.tick_time_s - one.applied_sent_s)[applied]
+    assert followed_s.min() >= DELAY_S - 1e-9
+    assert followed_s.max() < DELAY_S + 0.004 + TICK_S
+    seen_s = (one.tick_time_s - one.seen_sent_s)[~np.isnan(one.seen_sent_s)]
+    assert len(seen_s) > 1000
+    assert seen_s.min() >= DELAY_S - 1e-9
+    # Stiffness comes with each tick, or every few of them.
+    assert seen_s.max() < DELAY_S + 0.01
+
+
+@recordings
+def test_a_command_reaches_the_arm_after_the_delay_and_later_ones_no_sooner() -> None:
+    one = recorded()
+    sent = one.command_time_s[(one.command_time_s >= one.began_s) & (one.command_time_s < one.began_s + 1.5)]
+    arrives = np.array([one.arrives_s(float(time_s)) for time_s in sent])
+    assert len(sent) > 300
+    np.testing.assert_allclose(arrives - sent, DELAY_S, atol=TICK_S + 1e-9)
+    assert (np.diff(arrives) > 0.0).all()
+    # In between it is the next command that counts.
+    assert one.arrives_s(float(sent[0]) + 0.001) == one.arrives_s(float(sent[1]))
+    assert one.arrives_s(one.tick_time_s[-1]) == math.inf
+    assert one.arrives_s(one.began_s + DURATION_S - DELAY_S / 2.0) == math.inf
+
+
+@recordings
+def test_rows_are_the_newest_at_a_time() -> None:
+    one = recorded()
+    assert [one.pose_row(float(one.pose_time_s[row])) for row in (0, 7, 100)] == [0, 7, 100]
+    assert one.pose_row(float(one.pose_time_s[7]) + 0.0099) == 7
+    assert one.pose_row(float(one.pose_time_s[7]) - 0.0001) == 6
+    assert one.tick_row(float(one.tick_time_s[70]) + 0.0009) == 70
+    assert one.tick_row(float(one.tick_time_s[70])) == 70
+    for row_of, times_s in ((one.pose_row, one.pose_time_s), (one.tick_row, one.tick_time_s)):
+        assert row_of(0.0) == 0
+        assert row_of(1e6) == len(times_s) - 1
+
+
+@recordings
+def test_the_hand_pulls_as_the_pull_says_and_the_command_follows_it() -> None:
+    one = recorded()
+    before, settled = one.tick_time_s < one.began_s - 0.004, one.tick_time_s > one.began_s + 0.5
+    assert one.travel[before].max() == 0.0
+    force_n = make_pull("steady", SEED)(1.0).r2_n
+    np.testing.assert_allclose(one.travel[settled, 1], (force_n - SPRING_PRELOAD_N) / SPRING_RISE_N, atol=1e-3)
+    assert one.travel[:, 0].max() == 0.0
+    sensed = one.travel[settled, 1][0] / 0.75
+    commanded = one.command[one.command_time_s > one.began_s + 0.5]
+    np.testing.assert_allclose(commanded, (sensed - 0.05) / (0.98 - 0.05), atol=0.005)
+    assert one.command[one.command_time_s < one.began_s].max() == 0.0
+
+
+@recordings
+def test_each_command_is_the_hands_at_the_time_that_is_said() -> None:
+    """Sensed by the controller every 4 ms, and sent in the same instant."""
+    one = recorded()
+    rising = (one.command > 0.05) & (one.command < 0.6)
+    rows = [one.tick_row(float(time_s)) for time_s in one.command_time_s[rising]]
+    assert len(rows) >= 5
+    sensed = one.travel[rows, 1] / 0.75
+    np.testing.assert_allclose(one.command[rising], (sensed - 0.05) / (0.98 - 0.05), atol=0.005)
+
+
+@recordings
+def test_the_recorded_pose_moves_on_through_the_wall() -> None:
+    one = recorded()
+    scene = load_scene(DATA / "wall.xml", "tool")
+    posed = PosedScene(scene)
+    gaps_m = []
+    for positions, fingers in zip(one.joint_positions_rad, one.finger_positions, strict=True):
+        posed.put(positions, fingers, np.zeros(3))
+        gaps_m.append(posed.gap_m())
+    resting = one.pose_time_s < one.began_s + DELAY_S
+    np.testing.assert_allclose(np.array(gaps_m)[resting], 0.32, atol=1e-3)
+    assert gaps_m[-1] < -0.01
+    # It goes on at the speed that full travel means, in the wall as before it.
+    speed_m_s = 0.25 * float(one.command[-1])
+    assert speed_m_s > 0.2
+    joints = one.joint_positions_rad[one.pose_time_s > one.began_s + 0.6]
+    places = []
+    for positions in joints:
+        posed.put(positions, one.finger_positions[0], np.array([5.0, 0.0, 0.0]))
+        places.append(5.0 - posed.gap_m(9.0))
+    np.testing.assert_allclose(np.diff(places) / POSE_S, speed_m_s, rtol=0.03)
+
+
+@recordings
+def test_velocities_are_those_of_the_positions() -> None:
+    one = recorded()
+    means = 0.5 * (one.joint_velocities_rad_s[1:] + one.joint_velocities_rad_s[:-1])
+    np.testing.assert_allclose(np.diff(one.joint_positions_rad, axis=0) / POSE_S, means, atol=0.02)
+
+
+@recordings
+def test_the_loop_is_as_old_as_both_ways() -> None:
+    one = recorded()
+    pulling = one.pose_time_s > one.began_s + 0.5
+    assert one.loop_age_s[pulling].min() >= 2.0 * DELAY_S
+    assert one.loop_age_s[pulling].max() < 2.0 * DELAY_S + 0.04
+
+
+@recordings
+def test_a_seed_gives_the_same_record_and_another_one_another() -> None:
+    def short(seed: int) -> RecordedApproach:
+        return record_approach("random", "delay 20ms 10ms loss 5%", seed, 0.4)
+
+    first, again, other = short(3), short(3), short(4)
+    for one in fields(RecordedApproach):
+        np.testing.assert_array_equal(getattr(first, one.name), getattr(again, one.name), err_msg=one.name)
+    assert not np.array_equal(first.travel, other.travel)
+    assert not np.array_equal(first.applied_at_s, other.applied_at_s)
+    # Jitter lets no newer command wait for an older one.
+    sent_s = first.applied_sent_s[~np.isnan(first.applied_sent_s)]
+    assert (np.diff(sent_s) >= 0.0).all()
+    ages_s = first.applied_at_s - first.applied_sent_s
+    assert np.nanmin(ages_s) < 0.018
+    assert np.nanmax(ages_s) > 0.022
+
+
+def test_a_link_that_never_arms_the_robot_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_LONGEST_ARMING_S", 2.0)
+    with pytest.raises(FeelaheadError, match=r"not armed within 2 s over --link 'loss 100%'"):
+        record_approach("steady", "loss 100%", 0, 0.1)

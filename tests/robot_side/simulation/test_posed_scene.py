@@ -1,0 +1,284 @@
+"""A gripper that is put among the objects: distances against those that one can work out by hand."""
+
+import math
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.posed_scene import PosedScene, let_through, move_objects
+from robot_side.simulation.scene import load_scene
+from robot_side.simulation.true_contact import TrueContact
+from tests.helpers.repository import DATA
+
+# By hand: the tool is at (0.55, 0, 0.2) with the fingertips 15 mm ahead, the wall's face at x = 0.885; the fingers'
+# outer sides are 56.5 mm beside the tool when open, those of the palm 50 mm, and the wall beside begins at 81.5 mm.
+WALL_M = 0.32
+BESIDE_M = 0.025
+ALMOST_M = 2e-5
+NOWHERE = np.zeros(3)
+
+
+class Posed:
+    """A frozen scene, and where its keyframe has the joints."""
+
+    def __init__(self, name: str) -> None:
+        self.scene = load_scene(DATA / f"{name}.xml", "tool")
+        self.posed = PosedScene(self.scene)
+        robot, qpos = self.scene.robot, self.scene.data.qpos
+        self.arm_rad: FloatArray = qpos[robot.arm_positions].copy()
+        self.fingers: FloatArray = qpos[robot.finger_positions].copy()
+
+    def at(self, *shift_m: float, fingers: FloatArray | None = None, turned_rad: float = 0.0) -> PosedScene:
+        """`turned_rad`: of the first joint, which turns the whole arm about the vertical."""
+        arm_rad = self.arm_rad + turned_rad * np.eye(6)[0]
+        self.posed.put(arm_rad, self.fingers if fingers is None else fingers, np.array(shift_m or NOWHERE))
+        return self.posed
+
+
+@pytest.fixture(scope="module")
+def wall() -> Posed:
+    return Posed("wall")
+
+
+@pytest.fixture(scope="module")
+def beside() -> Posed:
+    return Posed("wall_beside")
+
+
+def test_before_a_wall_gap_and_way_are_the_distance(wall: Posed) -> None:
+    for shift_m in (0.0, -0.1, 0.02):
+        put = wall.at(shift_m, 0.05, -0.03)  # along the wall nothing changes
+        assert put.gap_m() == pytest.approx(WALL_M + shift_m, abs=ALMOST_M)
+        assert put.way_m(1.0) == pytest.approx(WALL_M + shift_m, abs=ALMOST_M)
+
+
+def test_no_farther_than_one_looks(wall: Posed) -> None:
+    put = wall.at()
+    assert (put.gap_m(0.1), put.way_m(0.1), put.way_m(0.319)) == (0.1, 0.1, 0.319)
+
+
+def test_beside_a_wall_the_way_is_free_however_near_it_is(beside: Posed) -> None:
+    for nearer_m in (0.0, 0.015, 0.02):
+        put = beside.at(0.0, -nearer_m, 0.0)
+        assert put.gap_m() == pytest.approx(BESIDE_M - nearer_m, abs=ALMOST_M)
+        assert put.way_m(0.4) == 0.4
+
+
+@pytest.mark.parametrize("gap_m", [0.002, 0.001, 0.0003])
+def test_a_way_that_grazes_something_is_free_as_well(beside: Posed, gap_m: float) -> None:
+    assert beside.at(0.0, gap_m - BESIDE_M, 0.0).way_m(0.35) == 0.35
+
+
+def test_closed_fingers_leave_the_palm_nearest(beside: Posed) -> None:
+    assert beside.at(fingers=np.zeros(2)).gap_m() == pytest.approx(0.0815 - 0.05, abs=ALMOST_M)
+    assert beside.at().gap_m() == pytest.approx(BESIDE_M, abs=ALMOST_M)
+
+
+def test_within_an_object_the_gap_is_negative_and_there_is_no_way(wall: Posed) -> None:
+    put = wall.at(-WALL_M - 0.005)
+    assert put.gap_m() == pytest.approx(-0.005, abs=ALMOST_M)
+    assert put.way_m(0.1) == 0.0
+    assert not put.stays_clear(0.0, 0.0)
+
+
+def test_an_inclined_wall_is_nearer_than_the_way_to_it() -> None:
+    put = Posed("wall_45").at()
+    assert put.way_m(1.0) == pytest.approx(WALL_M, abs=1e-4)
+    assert put.gap_m() == pytest.approx(WALL_M * math.cos(math.pi / 4.0), abs=1e-3)
+    # Moved along the normal by 10 mm it is that much farther off, and 14 mm along the approach.
+    away = Posed("wall_45").at(0.01 * math.cos(math.pi / 4.0), 0.01 * math.sin(math.pi / 4.0), 0.0)
+    assert away.way_m(1.0) == pytest.approx(WALL_M + 0.01 * math.sqrt(2.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "margin_m", "clear"),
+    [
+        (0.0, 0.3199, True),
+        (0.0, 0.3201, False),
+        (0.31, 0.0099, True),
+        (0.31, 0.0101, False),
+        (0.3149, 0.005, True),
+        (0.3151, 0.005, False),
+        (0.4, 0.0, False),
+    ],
+)
+def test_before_a_wall_it_stays_clear_up_to_the_margin(
+    wall: Posed, ahead_m: float, margin_m: float, *, clear: bool
+) -> None:
+    assert wall.at().stays_clear(ahead_m, margin_m) is clear
+
+
+def test_beside_a_wall_it_stays_clear_for_as_long_as_one_likes(beside: Posed) -> None:
+    assert beside.at().stays_clear(0.35, 0.0249)
+    assert not beside.at().stays_clear(0.35, 0.0251)
+    assert beside.at(0.0, -0.0245, 0.0).stays_clear(0.35, 0.0004)
+
+
+def test_clear_at_the_end_is_not_clear_on_the_way() -> None:
+    """A plate of 10 mm would be behind the gripper at the end."""
+    scene = Posed("plate")
+    assert not scene.at().stays_clear(0.9, 0.001)
+
+
+def test_looking_ahead_leaves_the_gripper_where_it_is(wall: Posed) -> None:
+    put = wall.at()
+    before = put.gap_m()
+    put.way_m(1.0)
+    assert put.gap_m() == before
+    for ahead_m in (0.1, 0.5):
+        put.stays_clear(ahead_m, 0.01)
+        assert put.gap_m() == before
+    assert put.way_m(1.0) == pytest.approx(WALL_M, abs=ALMOST_M)
+
+
+def test_a_pose_does_not_depend_on_the_one_before(wall: Posed) -> None:
+    first = wall.at(0.01, 0.02, 0.03).gap_m()
+    wall.at(-0.2, fingers=np.zeros(2), turned_rad=0.3).way_m(0.5)
+    assert wall.at(0.01, 0.02, 0.03).gap_m() == first
+
+
+def test_a_turned_arm_is_where_kinematics_put_it(wall: Posed) -> None:
+    put = wall.at(turned_rad=0.2)
+    np.testing.assert_allclose(put.approach_axis(), [math.cos(0.2), math.sin(0.2), 0.0], atol=1e-4)
+    # The foremost corner of the fingertips, 565 mm ahead of the base's axis and 54.5 mm beside it.
+    corner_m = 0.565 * math.cos(0.2) + 0.0545 * math.sin(0.2)
+    assert put.gap_m() == pytest.approx(0.885 - corner_m, abs=1e-4)
+    assert put.way_m(1.0) == pytest.approx((0.885 - corner_m) / math.cos(0.2), abs=1e-4)
+    np.testing.assert_allclose(wall.at().approach_axis(), [1.0, 0.0, 0.0], atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["wall", "ball", "slot", "u_mesh", "mug", "cluttered"])
+def test_at_home_it_is_what_the_live_scene_says(name: str) -> None:
+    scene = Posed(name)
+    truth, put = TrueContact(scene.scene), scene.at()
+    assert put.gap_m() == pytest.approx(truth.gap_m(None), abs=1e-9)
+    axis, _ = truth.approach()
+    assert put.way_m(0.5) == pytest.approx(truth.way_left_m(axis, None, 0.5), abs=1e-9)
+
+
+def test_the_live_scene_stays_as_it_is(wall: Posed) -> None:
+    before = wall.scene.data.geom_xpos.copy(), wall.scene.data.qpos.copy()
+    wall.at(-0.1, turned_rad=0.4).way_m(0.5)
+    wall.posed.stays_clear(0.5, 0.01)
+    np.testing.assert_array_equal(wall.scene.data.geom_xpos, before[0])
+    np.testing.assert_array_equal(wall.scene.data.qpos, before[1])
+
+
+# What a camera makes of it
+
+
+def centers_m(seen: PerceivedObjects) -> dict[str, FloatArray]:
+    """The mean of an object's centres and vertices."""
+    points: dict[str, list[FloatArray]] = {name: [] for name in seen.names}
+    for centers, objects in (
+        (seen.sphere_centers_m, seen.sphere_object),
+        (seen.box_centers_m, seen.box_object),
+        (seen.tetrahedron_vertices_m.mean(axis=1), seen.tetrahedron_object),
+        (seen.mesh_positions_m, seen.mesh_object),
+    ):
+        for center, index in zip(centers, objects, strict=True):
+            points[seen.names[index]].append(center)
+    return {name: np.mean(found, axis=0) for name, found in points.items()}
+
+
+@pytest.mark.parametrize("name", ["wall", "cluttered", "u_mesh"])
+def test_a_camera_without_error_sees_the_truth_and_one_with_errors_is_off_by_them(name: str) -> None:
+    scene = Posed(name)
+    names = [thing.name for thing in scene.scene.objects]
+    errors_m = 0.003 * np.random.default_rng(2).standard_normal((len(names), 3))
+    seen = scene.at().perceived(np.zeros((len(names), 3)))
+    true_m = centers_m(MujocoCamera(scene.scene).perceive(0.0))
+    assert seen.names == tuple(names)
+    off_m = centers_m(scene.at().perceived(errors_m))
+    shifted_m = centers_m(scene.at(0.1, -0.2, 0.3).perceived(errors_m))
+    for index, thing in enumerate(names):
+        np.testing.assert_allclose(centers_m(seen)[thing], true_m[thing], atol=1e-12)
+        np.testing.assert_allclose(off_m[thing], true_m[thing] + errors_m[index], atol=1e-12)
+        np.testing.assert_allclose(shifted_m[thing], true_m[thing] + errors_m[index] + [0.1, -0.2, 0.3], atol=1e-12)
+
+
+def test_the_camera_sees_by_the_scenes_roles() -> None:
+    scene = Posed("wall")
+    assert scene.at().perceived(np.zeros((1, 3))).roles == (Role.OBSTACLE,)
+    scene.scene.roles["wall"] = Role.TARGET
+    assert scene.at().perceived(np.zeros((1, 3))).roles == (Role.TARGET,)
+
+
+# Scenes that are changed before anything moves
+
+
+def test_let_through_lets_the_gripper_into_a_wall() -> None:
+    scene = load_scene(DATA / "wall.xml", "tool")
+    move_objects(scene, np.array([-WALL_M - 0.01, 0.0, 0.0]))
+    assert scene.data.ncon > 0
+    let_through(scene)
+    mujoco.mj_forward(scene.model, scene.data)
+    assert scene.data.ncon == 0
+    # The distance is still seen.
+    assert TrueContact(scene).gap_m(None) < -0.005
+
+
+@pytest.mark.parametrize("name", ["wall", "slot", "cluttered", "mug", "u_mesh", "table_mesh", "table_12_tetrahedra"])
+def test_every_object_is_moved_and_the_arm_is_not(name: str) -> None:
+    scene = load_scene(DATA / f"{name}.xml", "tool")
+    shift_m = np.array([0.01, -0.02, 0.03])
+    objects = [geom for thing in scene.objects for geom in thing.geoms]
+    expected = scene.data.geom_xpos.copy()
+    expected[objects] += shift_m
+    move_objects(scene, shift_m)
+    np.testing.assert_allclose(scene.data.geom_xpos, expected, atol=1e-12)
+    mujoco.mj_step(scene.model, scene.data)
+    np.testing.assert_allclose(scene.data.geom_xpos[objects], expected[objects], atol=1e-12)
+
+
+def test_a_moved_wall_is_as_far_as_it_was_moved() -> None:
+    scene = load_scene(DATA / "wall.xml", "tool")
+    move_objects(scene, np.array([0.05, 0.0, 0.0]))
+    assert TrueContact(scene).gap_m(None) == pytest.approx(WALL_M + 0.05, abs=ALMOST_M)
+    assert PosedScene(scene).scene is scene
+    seen = centers_m(MujocoCamera(scene).perceive(0.0))
+    np.testing.assert_allclose(seen["wall"], [0.935 + 0.05, 0.0, 0.2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name", ["wall", "plate", "ball", "post", "rod_2mm", "rod_10mm", "wall_45", "slot", "shelf_edge", "u_mesh", "mug"]
+)
+def test_what_was_moved_into_the_gripper_is_touched(name: str) -> None:
+    """MuJoCo looks for contacts in trees of its own, which know nothing of a move."""
+    scene = load_scene(DATA / f"{name}.xml", "tool")
+    assert scene.data.ncon == 0
+    axis, _ = TrueContact(scene).approach()
+    move_objects(scene, -(WALL_M + 0.004) * axis)
+    objects = {geom for thing in scene.objects for geom in thing.geoms}
+    assert any(objects & {int(geom) for geom in pair} for pair in scene.data.contact.geom)
+    assert TrueContact(scene).gap_m(None) == pytest.approx(-0.004, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["moving", "place_held"])
+def test_what_moves_on_joints_is_refused_and_left_where_it_is(name: str) -> None:
+    scene = load_scene(DATA / f"{name}.xml", "tool")
+    before = scene.data.geom_xpos.copy()
+    with pytest.raises(ValueError, match="move on joints; valid: objects that stand fixed"):
+        move_objects(scene, np.array([0.01, 0.0, 0.0]))
+    mujoco.mj_forward(scene.model, scene.data)
+    np.testing.assert_array_equal(scene.data.geom_xpos, before)
+
+
+def test_what_stands_at_the_origin_is_moved_as_well(tmp_path: Path) -> None:
+    """MuJoCo does not look at the place of a geom that is where its body is."""
+    path = tmp_path / "floor.xml"
+    path.write_text(
+        (DATA / "wall.xml")
+        .read_text()
+        .replace("arm.xml", str(DATA / "arm.xml"))
+        .replace('<geom name="wall"', '<geom name="floor" type="plane" size="2 2 0.1"/>\n    <geom name="wall"')
+    )
+    scene = load_scene(path, "tool")
+    move_objects(scene, np.array([0.0, 0.0, -0.1]))
+    np.testing.assert_allclose(scene.data.geom("floor").xpos, [0.0, 0.0, -0.1], atol=1e-12)
+    np.testing.assert_allclose(scene.data.geom("wall").xpos, [0.935, 0.0, 0.1], atol=1e-12)
