@@ -1,11 +1,17 @@
 """Work in several processes at a time: each result as soon as it is there, and nothing left behind on Ctrl-C."""
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
+from common.errors import FeelaheadError
+
+_LOOK_S = 1.0
 Result = TypeVar("Result")
 
 
@@ -17,7 +23,7 @@ def in_processes(
         for place, task in enumerate(tasks):
             yield place, call(*task)
         return
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent, (os.getpid(),))
     done = False
     try:
         # What is ignored as they start stays ignored in them: a Ctrl-C is ours to answer.
@@ -29,8 +35,24 @@ def in_processes(
         for future in as_completed(futures):
             yield futures[future], future.result()
         done = True
+    except BrokenProcessPool as error:
+        raise FeelaheadError(
+            "a worker process was ended from outside: run again, with --resume where there is"
+        ) from error
     finally:
         if not done:
             for child in multiprocessing.active_children():
                 child.terminate()
         pool.shutdown()
+
+
+def _end_with_parent(parent: int) -> None:
+    """In a worker: end soon after whoever started it was killed."""
+
+    def watch() -> None:
+        never = threading.Event()
+        while os.getppid() == parent:
+            never.wait(_LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -10,6 +10,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from common.clock import MonotonicClock
 
 _EVERY_S = 60.0
+_WHOLE_RUN_S = 1e6
+"""A piece may take minutes: the time left is reckoned from the whole run so far."""
 Advance = Callable[[float], None]
 
 
@@ -18,7 +20,8 @@ def progress(what: str, total: float) -> Iterator[Advance]:
     """Show on standard error how much of `total` is done; call what is yielded with each piece's share of it."""
     if sys.stderr.isatty():
         columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        screen = Console(stderr=True)
+        with Progress(*columns, console=screen, transient=True, speed_estimate_period=_WHOLE_RUN_S) as bars:
             bar = bars.add_task(what, total=total)
             yield lambda share: bars.advance(bar, share)
         return

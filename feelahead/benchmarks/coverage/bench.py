@@ -19,24 +19,27 @@ _PROGRAM = "feelahead bench coverage"
 
 
 def bench_coverage(arguments: Sequence[str]) -> int:
-    """Run the benchmark, print its tables, write the CSV and the picture."""
+    """Run the benchmark, print its tables, write the CSV and the picture; 1 where a part of it could not be done."""
     settings = parse_settings(CoverageSettings, _PROGRAM, arguments)
     plan, frozen = settings.plan(), frozen_hash()
     setup = {"plan": asdict(plan), "seed": settings.seed, "spoil": settings.spoil}
-    kept = Kept(settings.resume, setup)
     whole = pieces(plan, settings.seed, settings.spoil)
-    _work([piece for piece in whole if piece.name not in kept.done], kept, settings.workers)
+    kept = Kept(settings.resume, setup)
+    try:
+        _work([piece for piece in whole if piece.name not in kept.done], kept, settings.workers)
+    finally:
+        kept.close()
     records = [record for piece in whole for record in kept.done[piece.name]]
     cells = sorted((one for one in records if one["kind"] == "cell"), key=lambda one: one["cell"])
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
     console.print(coverage_table(cells, settings.laws))
     console.print(alarm_table(cells, settings.laws))
     console.print(law_table(records, settings.laws))
-    if unavoidable := sum(one["unavoidable"] for one in cells if one["law"] == settings.laws[0]):
-        places = sum(one["places"] for one in cells if one["law"] == settings.laws[0])
-        console.print(f"{unavoidable} of {places} places in which no release avoids the contact are not judged")
     for line in check_lines(records):
         console.print(line)
+    failed = [one for one in records if one["kind"] == "failed"]
+    for one in failed:
+        console.print(f"failed: {one['piece']}: {one['why']}", markup=False)
     console.print(f"frozen scenes and limits: {frozen}")
     if settings.csv is not None:
         with settings.csv.open("w", newline="", encoding="utf-8") as file:
@@ -46,7 +49,7 @@ def bench_coverage(arguments: Sequence[str]) -> int:
             writer.writerows(one | {"frozen": frozen} for one in cells)
     if settings.picture is not None:
         draw(records, settings.laws, frozen, settings.picture)
-    return 0
+    return 1 if failed else 0
 
 
 def _work(todo: list[Piece], kept: Kept, workers: int) -> None:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import FeelaheadError
 from feelahead.approaches.approach import Approach, PullRun
 from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.approaches.laws import Law
-from feelahead.approaches.pulls import make_pull
+from feelahead.approaches.pulls import PULL_KINDS, make_pull
 from feelahead.approaches.recording import record_approach
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion
 from feelahead.benchmarks.coverage.collisions import Collision, place
@@ -21,9 +22,10 @@ from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
 
-_SCENES = ("wall", "post", "rod_5mm")
-_LINKS = ("0 ms", "50 ms", "200 ms")
-_AROUND_S = 0.03
+_SCENES = ("wall", "post", "rod_5mm", "wall_45", "plate")
+_LINKS = ("0 ms", "50 ms", "200 ms", "400 ms")
+_KINDS = ("released early", "released late", "reacting")
+_AROUND_S = 0.02
 """So much before the last moment a release must avoid the contact, and so much after it must not."""
 _SETTLES_S = 1.5
 _PROBABILITY = 0.99
@@ -38,40 +40,42 @@ class Checked:
     kind_of_check: str
     """released early, released late, or reacting to the law's full strength"""
     law: str
+    pull: str
     link: str
     expected_contact: bool
     contact: bool
 
 
-def check(count: int, seed: int) -> Iterator[Checked]:
-    """Run `count` approaches again: a third let go just in time, a third just too late, a third by what they feel."""
-    done = 0
-    for number in range(count):
-        scene, link = _SCENES[number % 3], _LINKS[(number // 3) % 3]
-        for checked in _check_one(Cell(Motion("steady", link), scene), seed + number):
-            yield checked
-            done += 1
-            if done == count:
-                return
+def check(first: int, count: int, seed: int) -> Iterator[Checked]:
+    """Run the approaches `first` to `first + count` again: let go just in time, just too late, or by touch.
+
+    Scene, link and kind of pull change with the number; an approach in which nothing collides is passed over.
+    """
+    for number in range(first, first + count):
+        scene, link = _SCENES[number // 3 % len(_SCENES)], _LINKS[number // 15 % len(_LINKS)]
+        pull = PULL_KINDS[number // 5 % len(PULL_KINDS)]
+        own_seed = int(np.random.SeedSequence([seed, 0xC4EC, number]).generate_state(1)[0] >> 1)
+        yield from _check_one(Cell(Motion(pull, link), scene), _KINDS[number % 3], own_seed)
 
 
-def _check_one(cell: Cell, seed: int) -> Iterator[Checked]:
+def _check_one(cell: Cell, kind: str, seed: int) -> Iterator[Checked]:
     record = record_approach(cell.motion.pull, LINKS[cell.motion.link], seed)
     scene = load_scene(frozen_scene(cell.scene), SITE)
     posed, replay = PosedScene(scene), Replay(record, scene, EncoderSettings(), seed)
     collision = place(replay, posed, np.random.default_rng([seed, 0xC4EC]))
     if collision is None or collision.last_release_s is None:
         return
-    last_s = collision.last_release_s
-    for kind, let_go_s in (("released early", last_s - _AROUND_S), ("released late", last_s + _AROUND_S)):
-        if let_go_s > record.began_s:
-            contact = _touches(cell, seed, collision, "none", let_go_s)
-            yield Checked(kind, "none", cell.motion.link, kind == "released late", contact)
-    laws: tuple[Law, ...] = ("first", "full")
-    law = laws[seed % 2]
-    draw = Draw(replay, _as_perceived(posed, replay, collision, seed), 0.003)
-    judged = stood(Comparison(0.0).law(law, _PROBABILITY), draw, last_s)
-    yield Checked("reacting", law, cell.motion.link, not judged.covered, _touches(cell, seed, collision, law, None))
+    last_s, link = collision.last_release_s, cell.motion.link
+    if kind == "reacting":
+        law: Law = "full" if seed % 2 else "first"
+        draw = Draw(replay, _as_perceived(posed, replay, collision, seed), 0.003)
+        expected = not stood(Comparison(0.0).law(law, _PROBABILITY), draw, last_s).covered
+        yield Checked(kind, law, cell.motion.pull, link, expected, _touches(cell, seed, collision, law, None))
+        return
+    let_go_s = last_s + (_AROUND_S if kind == "released late" else -_AROUND_S)
+    if let_go_s > record.began_s:
+        contact = _touches(cell, seed, collision, "none", let_go_s)
+        yield Checked(kind, "none", cell.motion.pull, link, kind == "released late", contact)
 
 
 def _as_perceived(posed: PosedScene, replay: Replay, collision: Collision, seed: int) -> PerceivedObjects:
@@ -101,4 +105,6 @@ def _touches(cell: Cell, seed: int, collision: Collision, law: Law, let_go_s: fl
         gone_s = run.hands.let_go_s
         if gone_s is not None and now_s > gone_s + _SETTLES_S and abs(run.samples.speed_m_s[-1]) < 1e-3:
             break
+    if run.disarmed_because is not None:
+        raise FeelaheadError(f"{cell.key}, seed {seed}: the arm was stopped: {run.disarmed_because}")
     return run.onset is not None

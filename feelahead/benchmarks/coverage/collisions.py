@@ -11,8 +11,6 @@ from robot_side.simulation.posed_scene import PosedScene
 _FASTEST_M_S = 0.45
 """No part of the gripper is faster: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""
 _LEAST_STEP_S = 0.002
-_FIRST_S = 0.3
-"""No contact is sought before the pull has lasted for so long."""
 _LEAST_START_GAP_M = 0.015
 _ACROSS_M = 0.01
 """Things are put up to so far from where the scene has them, to each side and up or down."""
@@ -32,17 +30,19 @@ class Collision:
 
 
 def place(replay: Replay, posed: PosedScene, generator: np.random.Generator) -> Collision | None:
-    """Draw a place of the objects in which the approach collides, at an even chance for each moment of the pull.
+    """Draw a place of the objects in which the approach collides, at an even chance for each part of the way.
 
-    None where that was not found after 40 draws.
+    None where that was not found after 40 draws, or the approach goes nowhere.
     """
     record = replay.record
     posed.put(*_pose(replay, record.began_s), np.zeros(3))
     home_way_m = posed.way_m(1.0)
+    farthest_m = float(np.interp(replay.end_s, record.pose_time_s, replay.along_m))
+    if farthest_m <= _LEAST_START_GAP_M:
+        return None
     across = np.linalg.svd(replay.axis[None, :])[2][1:]
     for _ in range(_TRIES):
-        moment_s = float(generator.uniform(record.began_s + _FIRST_S, replay.end_s))
-        ahead_m = float(np.interp(moment_s, record.pose_time_s, replay.along_m)) - home_way_m
+        ahead_m = float(generator.uniform(_LEAST_START_GAP_M, farthest_m)) - home_way_m
         shift_m = ahead_m * replay.axis + generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
         posed.put(*_pose(replay, record.began_s), shift_m)
         if posed.gap_m() < _LEAST_START_GAP_M:

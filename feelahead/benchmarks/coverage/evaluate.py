@@ -12,7 +12,7 @@ from feelahead.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.approaches.recording import record_approach
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan
-from feelahead.benchmarks.coverage.collisions import Collision, place
+from feelahead.benchmarks.coverage.collisions import Collision, first_touch_s, place
 from feelahead.benchmarks.coverage.covered import false_alarms, stood
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import Comparison, Draw, FieldLaw
@@ -52,10 +52,14 @@ class Row:
     mean_strength: float | None
     """In the zone that the finger reaches, 0.25 s before the last moment to let go."""
     places: int
+    not_found: int
+    """Places that were sought and not found: the approach goes past the object, or nowhere."""
     unavoidable: int
     """Places in which no release since the pull's beginning avoids the contact; not among the draws."""
-    alarms_per_min: float
-    alarm_share: float
+    alarms_per_min: float | None
+    """None where nothing was pulled."""
+    alarm_share: float | None
+    """Of the time in which R2 was pulled."""
     judged_s: float
     margin_mm: float
     """The fixed margin that stands beside the first law: its mean enlargement while moving."""
@@ -101,7 +105,7 @@ def evaluate(
 ) -> Iterator[list[Row]]:
     """The rows of each cell in turn; the same seed gives the same rows."""
     records = [
-        record_approach(motion.pull, LINKS[motion.link], seed + number, scene_name=motion.home)
+        record_approach(motion.pull, LINKS[motion.link], _seed(seed, number), scene_name=motion.home)
         for number in range(plan.approaches)
     ]
     for cell in cells:
@@ -117,7 +121,7 @@ def _scene(name: str) -> Scene:
 
 
 def _seed(approach: int, number: int) -> int:
-    return int(np.random.SeedSequence([approach, number]).generate_state(1)[0])
+    return int(np.random.SeedSequence([approach, number]).generate_state(1)[0] >> 1)
 
 
 def _stage(cell: Cell, replay: Replay, places: int) -> _Staged:
@@ -138,15 +142,17 @@ def _evaluate_cell(cell: Cell, staged: Sequence[_Staged], plan: Plan, spoil: Spo
             counts, law = _Counts(), comparison.law(name, probability)
             _count_covered(counts, law, cell, staged, probability)
             _count_alarms(counts, law, cell, staged, probability)
-            rows.append(_row(cell, name, probability, counts, staged, margin_m))
+            rows.append(_row(cell, name, probability, counts, staged, margin_m, plan.places))
     return rows
 
 
 def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_Staged], probability: float) -> None:
     """At least n >= 10 / (1 - P) draws, as many for each approach that has a contact to avoid."""
     useful = [one for one in staged if one.avoidable]
-    each = math.ceil(draws_needed(probability) / max(1, len(useful)))
+    least = math.ceil(draws_needed(probability) / max(1, len(useful)))
     for one in useful:
+        # Every place as often as any other, at each P.
+        each = len(one.avoidable) * math.ceil(least / len(one.avoidable))
         hits = 0
         for number in range(each):
             collision, last_release_s = one.avoidable[number % len(one.avoidable)]
@@ -160,9 +166,11 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[
 def _count_alarms(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_Staged], probability: float) -> None:
     passed = cell.scene in PASSED
     for one in staged if passed else staged[:_ALARM_APPROACHES]:
-        places = (
-            [(np.zeros(3), one.replay.end_s)] if passed else [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
-        )
+        places = [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
+        if passed:
+            # A drift or a turn may touch what a straight approach passes.
+            touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
+            places = [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
         for shift_m, until_s in places:
             alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s, probability)
             counts.alarms += alarms.count
@@ -171,7 +179,7 @@ def _count_alarms(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_
 
 
 def mean_enlargement_m(replays: Sequence[Replay], cell: Cell, probability: float) -> float:
-    """The first law's largest enlargement over the gripper, on average over all rows in which the tool moves."""
+    """The first law's enlargement, on average over the gripper's spheres and all rows in which the tool moves."""
     settings = EnlargementSettings(probability=probability, camera_sd_m=1e-3 * cell.camera_mm)
     enlargement, found = Enlargement(settings), []
     for replay in replays:
@@ -184,11 +192,13 @@ def mean_enlargement_m(replays: Sequence[Replay], cell: Cell, probability: float
                 velocities = jacobians @ record.joint_velocities_rad_s[row]
                 covariances = position_covariance(jacobians, sigma_rad)
                 age_s = float(record.loop_age_s[row])
-                found.append(float(enlargement.distances(covariances, velocities, age_s).max()))
+                found.append(float(enlargement.distances(covariances, velocities, age_s).mean()))
     return float(np.mean(found)) if found else 0.0
 
 
-def _row(cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequence[_Staged], margin_m: float) -> Row:
+def _row(
+    cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequence[_Staged], margin_m: float, places: int
+) -> Row:
     covered = share(counts.hits, counts.draws)
     draws = sum(counts.draws)
     return Row(
@@ -208,9 +218,10 @@ def _row(cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequ
         holds=None if covered is None else covered.holds(probability),
         mean_strength=counts.strength / draws if draws else None,
         places=sum(len(one.collisions) for one in staged),
+        not_found=0 if cell.scene in PASSED else places * len(staged) - sum(len(one.collisions) for one in staged),
         unavoidable=sum(len(one.collisions) - len(one.avoidable) for one in staged),
-        alarms_per_min=60.0 * counts.alarms / counts.judged_s if counts.judged_s else 0.0,
-        alarm_share=counts.alarm_s / counts.judged_s if counts.judged_s else 0.0,
+        alarms_per_min=60.0 * counts.alarms / counts.judged_s if counts.judged_s else None,
+        alarm_share=counts.alarm_s / counts.judged_s if counts.judged_s else None,
         judged_s=counts.judged_s,
         margin_mm=1e3 * margin_m,
     )

@@ -7,6 +7,8 @@ import numpy as np
 
 _RESAMPLED = 2000
 _TAIL = 0.025
+_LEAST_APPROACHES = 10
+"""A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +22,8 @@ class Share:
     approaches: int
 
     def holds(self, probability: float) -> bool:
-        """Whether the interval's lower end is at least P - 0.1 (1 - P)."""
-        return self.low >= probability - 0.1 * (1.0 - probability)
+        """Whether the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more."""
+        return self.approaches >= _LEAST_APPROACHES and self.low >= probability - 0.1 * (1.0 - probability)
 
 
 def share(hits: Sequence[int], draws: Sequence[int], seed: int = 0) -> Share | None:

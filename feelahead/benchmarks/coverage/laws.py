@@ -20,7 +20,8 @@ from robot_side.simulation.encoders import Encoder
 from robot_side.stiffness.map import StiffnessMap
 
 _REMEMBERED_ROWS = 8
-"""80 ms before the first moment asked for: longer than any rate limit or hysteresis of the first law lasts."""
+"""80 ms before the first moment asked for: longer than the first law's rate limits last. Its bands remember more: one
+band, where the stiffness has just fallen."""
 
 
 @dataclass(frozen=True)

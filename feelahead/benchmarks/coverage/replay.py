@@ -12,6 +12,8 @@ from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.arm.resolved_rate import joint_velocities
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.joint_reference import MotionLimits
@@ -19,6 +21,10 @@ from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene
 
 _SPHERES = 16
+_SLOW_M_S = 0.01
+_ASKED_M_S = 0.05
+_STALLED_ROWS = 25
+"""An arm at half of what it is told for a quarter of a second is not just getting there."""
 _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
 """In the finger's time constants: from full travel to the dead zone it takes 3."""
@@ -34,7 +40,6 @@ class Replay:
         self.encoder = encoder
         self._kinematics = MujocoKinematics(scene, _SPHERES)
         self._seed = seed
-        self.end_s = float(record.pose_time_s[-1])
         true = [self._pose(row, record.joint_positions_rad[row]) for row in range(len(record.pose_time_s))]
         axis = true[record.pose_row(record.began_s)].tool_rotation[:, 2]
         start_m = true[record.pose_row(record.began_s)].tool_position_m
@@ -49,6 +54,10 @@ class Replay:
             ]
         )
         """(k,) û·v of the true tool"""
+        self._jacobians = [pose.tool_jacobian for pose in true]
+        self._axes = [pose.tool_rotation[:, 2] for pose in true]
+        self.end_s = self._end_s()
+        """When the record ends, or the arm no longer does what it is told: at the edge of its reach."""
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
@@ -102,11 +111,26 @@ class Replay:
         return float(np.interp(arrives_s, times, self.along_m) - np.interp(time_s, times, self.along_m))
 
     def deceleration_m_s2(self, time_s: float) -> float:
-        """What the joints' limit gives along the approach axis at `time_s`, for the present direction of motion."""
+        """What the joints' limit gives along the approach axis in the pose at `time_s`."""
         row = self.record.pose_row(time_s)
-        fastest = float(np.abs(self.record.joint_velocities_rad_s[row]).max())
-        speed = abs(float(self.approach_speed_m_s[row]))
-        return MotionLimits().acceleration_rad_s2 * speed / fastest if fastest > 0.0 and speed > 0.0 else 3.0
+        along = np.concatenate([_SLOW_M_S * self._axes[row], np.zeros(3)])
+        unlimited = np.full(self._jacobians[row].shape[1], np.inf)
+        fastest = float(np.abs(joint_velocities(self._jacobians[row], along, unlimited)).max())
+        return MotionLimits().acceleration_rad_s2 * _SLOW_M_S / fastest
+
+    def _end_s(self) -> float:
+        record = self.record
+        ticks = [record.tick_row(time_s) for time_s in record.pose_time_s]
+        sent_s = np.nan_to_num(record.applied_sent_s[ticks], nan=-np.inf)
+        rows = np.searchsorted(record.command_time_s, sent_s + 1e-9) - 1
+        asked = ToolMotionSettings().trigger_speed_m_s * np.where(rows >= 0, record.command[rows], 0.0)
+        behind = (asked > _ASKED_M_S) & (self.approach_speed_m_s < 0.5 * asked)
+        lasting = 0
+        for row, stalled in enumerate(behind):
+            lasting = lasting + 1 if stalled else 0
+            if lasting > _STALLED_ROWS:
+                return float(record.pose_time_s[row - lasting + 1])
+        return float(record.pose_time_s[-1])
 
 
 def coasting_s(braking_s: float, travel: float, finger_s: float = FINGER_TIME_CONSTANT_S) -> float:

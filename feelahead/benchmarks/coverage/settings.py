@@ -32,6 +32,8 @@ class CoverageSettings:
     """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
     checked: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """So many approaches again in full physics, closed loop, instead of the plan's own."""
+    raced: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Seeds for the time to a goal, instead of the plan's own; 0 leaves it out."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """For every draw: the same seed gives the same figures."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
@@ -58,8 +60,11 @@ class CoverageSettings:
         for probability in self.probabilities:
             if not 0.0 < probability <= _GREATEST:
                 raise ValueError(f"--probabilities {probability}: valid: above 0 up to {_GREATEST}")
-        if self.checked is not None and self.checked < 0:
-            raise ValueError(f"--checked {self.checked}: valid: 0 or more")
+        for name in ("checked", "raced"):
+            if (count := getattr(self, name)) is not None and count < 0:
+                raise ValueError(f"--{name} {count}: valid: 0 or more")
+        if len(set(self.laws)) < len(self.laws):
+            raise ValueError(f"--laws {' '.join(self.laws)}: valid: each law once")
         for path in (self.resume, self.csv, self.picture):
             if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
                 raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
@@ -74,4 +79,5 @@ class CoverageSettings:
             cells=tuple(cell for cell in whole.cells if self.only in cell.key),
             probabilities=tuple(sorted(set(self.probabilities))) or whole.probabilities,
             checked=whole.checked if self.checked is None else self.checked,
+            raced=whole.raced if self.raced is None else self.raced,
         )

@@ -6,17 +6,22 @@ from functools import cache
 from statistics import median
 
 from feelahead.approaches.approach import Approach, time_to_goal_s
-from feelahead.approaches.frozen import frozen_scene
+from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.approaches.laws import Law
-from feelahead.approaches.pulls import make_pull
-from feelahead.benchmarks.coverage.cells import LINKS
+from feelahead.approaches.pulls import PullKind, make_pull
+from feelahead.approaches.recording import record_approach
+from feelahead.approaches.spoilt import Spoil
+from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion
+from feelahead.benchmarks.coverage.evaluate import mean_enlargement_m
+from feelahead.benchmarks.coverage.replay import Replay
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.scene import load_scene
 
 SCENES = ("empty", "cluttered")
 GOAL_M = 0.25
 _LIMIT_S = 15.0
 _LINK = "200 ms"
-_MARGIN_M = 0.045
-"""The fixed margin's enlargement: the first law's mean at 200 ms each way (the table of coverage prints it)."""
+_PROBABILITY = 0.99
 
 
 @dataclass(frozen=True)
@@ -31,11 +36,11 @@ class Slowdown:
     seeds: int
 
 
-def race(scene: str, law: Law, seeds: Sequence[int]) -> Slowdown:
+def race(scene: str, law: Law, seeds: Sequence[int], spoil: Spoil = "nothing") -> Slowdown:
     """The ratio over hands that pull in bells and steadily."""
     ratios = []
     for seed in seeds:
-        free_s, felt_s = _time_s(scene, "none", seed), _time_s(scene, law, seed)
+        free_s, felt_s = _time_s(scene, "none", seed, "nothing"), _time_s(scene, law, seed, spoil)
         if free_s is not None:
             ratios.append(felt_s / free_s if felt_s is not None else float("inf"))
     arrived = sum(ratio < float("inf") for ratio in ratios)
@@ -44,7 +49,7 @@ def race(scene: str, law: Law, seeds: Sequence[int]) -> Slowdown:
 
 
 @cache
-def _time_s(scene: str, law: Law, seed: int) -> float | None:
+def _time_s(scene: str, law: Law, seed: int, spoil: Spoil) -> float | None:
     approach = Approach(
         model=frozen_scene(scene),
         force_n=0.0,
@@ -52,6 +57,20 @@ def _time_s(scene: str, law: Law, seed: int) -> float | None:
         law=law,
         duration_s=_LIMIT_S,
         seed=seed,
-        margin_m=_MARGIN_M,
+        probability=_PROBABILITY,
+        margin_m=_margin_m(seed) if law == "margin" else None,
+        spoil=spoil,
     )
-    return time_to_goal_s(approach, make_pull("bell" if seed % 2 else "steady", seed), GOAL_M)
+    return time_to_goal_s(approach, make_pull(_kind(seed), seed), GOAL_M)
+
+
+def _kind(seed: int) -> PullKind:
+    return "bell" if seed % 2 else "steady"
+
+
+@cache
+def _margin_m(seed: int) -> float:
+    """The first law's mean enlargement in this very pull."""
+    scene = load_scene(frozen_scene("empty"), SITE)
+    replay = Replay(record_approach(_kind(seed), LINKS[_LINK], seed), scene, EncoderSettings(), seed)
+    return mean_enlargement_m([replay], Cell(Motion(_kind(seed), _LINK), "empty"), _PROBABILITY)

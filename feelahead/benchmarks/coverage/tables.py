@@ -5,80 +5,102 @@ from pathlib import Path
 from typing import Any, Final
 
 from rich.table import Table
+from rich.text import Text
 
 _COLOURS: Final = {"first": "#0072b2", "paper": "#d55e00", "margin": "#cc79a7", "none": "#777777", "full": "#009e73"}
 _MARKS: Final = ("o", "s", "^", "D")
 Row = dict[str, Any]
 
 
+_CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
+
+
 def coverage_table(rows: Sequence[Row], laws: Sequence[str]) -> Table:
     """A row for each cell and P that has contacts to prevent, a column for each law."""
     table = Table(
         title="covered: full strength stood in time",
-        caption="share [95 % interval over approaches], * where it holds: lower end >= P - 0.1 (1 - P)",
+        caption=Text(
+            "n: draws (approaches). Share [95 % interval over approaches], * where it holds: lower end >="
+            " P - 0.1 (1 - P), 10 approaches or more. Apart: places that no release avoids / that were not found"
+        ),
     )
-    for heading in ("scene", "pull", "link", "camera", "P", "n", *laws):
+    for heading in ("scene", "pull", "link", "camera", "P", "n", "apart", *laws):
         table.add_column(heading)
-    for key, group in _grouped(rows, ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")):
+    for key, group in _grouped(rows, _CELL):
         by_law = {row["law"]: row for row in group}
         some = group[0]
-        if some["places"] == 0:
+        if some["places"] + some["not_found"] == 0:
             continue
-        scene, pull, link, camera_mm, encoders, probability = key
-        worse = f", encoders x{encoders:g}" if encoders != 1.0 else ""
         cells = [_covered(by_law.get(law)) for law in laws]
-        table.add_row(scene, pull, link, f"{camera_mm:g} mm{worse}", f"{probability:g}", str(some["draws"]), *cells)
+        count, apart = f"{some['draws']} ({some['approaches']})", f"{some['unavoidable']} / {some['not_found']}"
+        table.add_row(*(Text(text) for text in (*_named(key), count, apart, *cells)))
     return table
 
 
 def alarm_table(rows: Sequence[Row], laws: Sequence[str]) -> Table:
-    """A row for each cell, at the greatest P: false alarms a minute."""
+    """A row for each cell and P, a column for each law."""
     table = Table(
-        title="false alarms a minute (share of the time)",
+        title="false alarms a minute (share of the time in which R2 is pulled)",
         caption="strength of 4 or more under the finger while the zone's stopping path stays D_σ(P) + 15 mm clear",
     )
-    for heading in ("scene", "pull", "link", "P", "minutes", *laws):
+    for heading in ("scene", "pull", "link", "camera", "P", "minutes", *laws):
         table.add_column(heading)
-    for (scene, pull, link, probability), group in _grouped(rows, ("scene", "pull", "link", "probability")):
+    for key, group in _grouped(rows, _CELL):
         by_law = {row["law"]: row for row in group}
-        cells = [
-            ""
-            if (row := by_law.get(law)) is None
-            else f"{row['alarms_per_min']:.1f} ({100 * row['alarm_share']:.0f} %)"
-            for law in laws
-        ]
-        table.add_row(scene, pull, link, f"{probability:g}", f"{group[0]['judged_s'] / 60.0:.1f}", *cells)
+        cells = [_alarms(by_law.get(law)) for law in laws]
+        table.add_row(*_named(key), f"{group[0]['judged_s'] / 60.0:.1f}", *cells)
     return table
 
 
 def law_table(records: Iterable[Row], laws: Sequence[str]) -> Table:
-    """A row for each law: over all cells, and what it costs."""
+    """A row for each law and P: over all cells, and what it costs."""
     records = list(records)
     table = Table(
-        title="the laws side by side", caption="over all cells; slowdown: median time over time without haptics"
+        title="the laws side by side",
+        caption="means over the cells; slowdown at 200 ms and P = 0.99: median time over time without haptics",
     )
     for heading in (
-        *("law", "cells that hold", "covered", "strength that stood", "false alarms a minute"),
+        *("law", "P", "cells that hold", "covered", "strength that stood", "false alarms a minute", "share"),
         *("slowdown, empty", "slowdown, cluttered"),
     ):
         table.add_column(heading)
     for law in laws:
-        rows = [one for one in records if one["kind"] == "cell" and one["law"] == law]
-        judged = [one for one in rows if one["coverage"] is not None]
-        draws = sum(one["draws"] for one in judged)
-        minutes = sum(one["judged_s"] for one in rows) / 60.0
-        alarms = sum(one["alarms_per_min"] * one["judged_s"] / 60.0 for one in rows)
-        covered = sum(one["coverage"] * one["draws"] for one in judged) / draws if draws else None
-        strength = sum(one["mean_strength"] * one["draws"] for one in judged) / draws if draws else None
-        table.add_row(
-            law,
-            f"{sum(bool(one['holds']) for one in judged)} of {len(judged)}",
-            "" if covered is None else f"{covered:.3f}",
-            "" if strength is None else f"{strength:.2f} of 8",
-            f"{alarms / minutes:.1f}" if minutes else "",
-            *(_slowdown(records, law, scene) for scene in ("empty", "cluttered")),
-        )
+        for number, probability in enumerate(sorted({one["probability"] for one in records if one["kind"] == "cell"})):
+            rows = [
+                one
+                for one in records
+                if one["kind"] == "cell" and one["law"] == law and one["probability"] == probability
+            ]
+            judged = [one for one in rows if one["coverage"] is not None]
+            pulled = [one for one in rows if one["alarms_per_min"] is not None]
+            slow = [_slowdown(records, law, scene) if number == 0 else "" for scene in ("empty", "cluttered")]
+            table.add_row(
+                law if number == 0 else "",
+                f"{probability:g}",
+                f"{sum(bool(one['holds']) for one in judged)} of {len(judged)}",
+                _mean(judged, "coverage", ".3f"),
+                _mean(judged, "mean_strength", ".2f"),
+                _mean(pulled, "alarms_per_min", ".1f"),
+                _mean(pulled, "alarm_share", ".0%"),
+                *slow,
+            )
     return table
+
+
+def _mean(rows: Sequence[Row], name: str, form: str) -> str:
+    return format(sum(one[name] for one in rows) / len(rows), form) if rows else ""
+
+
+def _named(key: tuple[Any, ...]) -> tuple[str, ...]:
+    scene, pull, link, camera_mm, encoders, probability = key
+    worse = f", encoders x{encoders:g}" if encoders != 1.0 else ""
+    return scene, pull, link, f"{camera_mm:g} mm{worse}", f"{probability:g}"
+
+
+def _alarms(row: Row | None) -> str:
+    if row is None or row["alarms_per_min"] is None:
+        return ""
+    return f"{row['alarms_per_min']:.1f} ({100 * row['alarm_share']:.0f} %)"
 
 
 def check_lines(records: Iterable[Row]) -> list[str]:
@@ -122,13 +144,10 @@ def draw(records: Iterable[Row], laws: Sequence[str], frozen: str, path: Path) -
 
 
 def _point(rows: Sequence[Row]) -> tuple[float, float] | None:
-    """False alarms a minute, and the share that is covered, over these rows; None without any."""
-    judged = [one for one in rows if one["coverage"] is not None]
-    seconds, draws = sum(one["judged_s"] for one in rows), sum(one["draws"] for one in judged)
-    if seconds == 0.0 or draws == 0:
-        return None
-    alarms = sum(one["alarms_per_min"] * one["judged_s"] for one in rows) / seconds
-    return alarms, sum(one["coverage"] * one["draws"] for one in judged) / draws
+    """False alarms a minute and the share that is covered, means over the cells; None without any."""
+    judged = [one["coverage"] for one in rows if one["coverage"] is not None]
+    pulled = [one["alarms_per_min"] for one in rows if one["alarms_per_min"] is not None]
+    return (sum(pulled) / len(pulled), sum(judged) / len(judged)) if judged and pulled else None
 
 
 def _grouped(rows: Sequence[Row], names: tuple[str, ...]) -> list[tuple[tuple[Any, ...], list[Row]]]:

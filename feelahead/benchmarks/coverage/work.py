@@ -1,12 +1,14 @@
 """The benchmark's pieces, done by several processes, each as soon as one is free, and kept in a file as they end."""
 
+import fcntl
+import hashlib
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TextIO
 
-from common.errors import ConfigurationError
+from common.errors import ConfigurationError, FeelaheadError
 from feelahead.approaches.frozen import frozen_hash
 from feelahead.approaches.laws import Law
 from feelahead.approaches.processes import in_processes
@@ -17,6 +19,7 @@ from feelahead.benchmarks.coverage.evaluate import evaluate
 from feelahead.benchmarks.coverage.slowdown import SCENES, race
 
 Records = list[dict[str, Any]]
+_ROOT: Final = Path(__file__).parents[3]
 
 
 @dataclass(frozen=True)
@@ -38,10 +41,12 @@ def pieces(plan: Plan, seed: int, spoil: Spoil) -> list[Piece]:
     ]
     for scene in SCENES:
         for law in plan.laws:
-            found.append(Piece(f"race/{scene}/{law}", 3.0 * plan.raced, hurry, (scene, law, seed, plan.raced)))
+            if plan.raced > 0:
+                arguments = (scene, law, seed, plan.raced, spoil)
+                found.append(Piece(f"race/{scene}/{law}", 3.0 * plan.raced, hurry, arguments))
     found += [
-        Piece(f"check/{number}", 6.0, again, (count, seed + number))
-        for number, count in ((first, min(12, plan.checked - first)) for first in range(0, plan.checked, 12))
+        Piece(f"check/{first}", 5.0 * count, again, (first, count, seed))
+        for first, count in ((first, min(12, plan.checked - first)) for first in range(0, plan.checked, 12))
     ]
     return sorted(found, key=lambda piece: -piece.weight)
 
@@ -51,14 +56,14 @@ def judge(motion: Motion, cells: list[Cell], plan: Plan, seed: int, spoil: Spoil
     return [{"kind": "cell"} | asdict(row) for rows in evaluate(motion, cells, plan, seed, spoil) for row in rows]
 
 
-def hurry(scene: str, law: Law, seed: int, count: int) -> Records:
+def hurry(scene: str, law: Law, seed: int, count: int, spoil: Spoil) -> Records:
     """The time to a goal."""
-    return [{"kind": "slowdown"} | asdict(race(scene, law, range(seed, seed + count)))]
+    return [{"kind": "slowdown"} | asdict(race(scene, law, range(count * seed, count * (seed + 1)), spoil))]
 
 
-def again(count: int, seed: int) -> Records:
+def again(first: int, count: int, seed: int) -> Records:
     """Some approaches again, closed loop."""
-    return [{"kind": "check"} | asdict(one) for one in check(count, seed)]
+    return [{"kind": "check"} | asdict(one) for one in check(first, count, seed)]
 
 
 def do(todo: list[Piece], workers: int) -> Iterator[tuple[Piece, Records]]:
@@ -68,48 +73,83 @@ def do(todo: list[Piece], workers: int) -> Iterator[tuple[Piece, Records]]:
 
 
 def _call(piece: Piece) -> Records:
-    return piece.call(*piece.arguments)
+    try:
+        return piece.call(*piece.arguments)
+    except ConfigurationError:
+        raise
+    except FeelaheadError as error:
+        # One approach that cannot be recorded must not lose hours of others.
+        return [{"kind": "failed", "piece": piece.name, "why": str(error)}]
 
 
 class Kept:
-    """A file with a line for each piece that is done; of another set-up, nothing of it counts."""
+    """A file with a line for each piece that is done; of another set-up, or of other code, nothing of it counts."""
 
     def __init__(self, path: Path | None, setup: dict[str, Any]) -> None:
-        """ConfigurationError for a file that is there and holds another run, or none."""
-        self._path = path
-        self._setup: dict[str, Any] = json.loads(json.dumps(setup | {"frozen": frozen_hash()}))
+        """ConfigurationError for a file that is there and holds another run, or none, or that another run writes to."""
+        self._file: TextIO | None = None
+        self._setup: dict[str, Any] = json.loads(json.dumps(setup | {"frozen": frozen_hash(), "code": code_hash()}))
         self.done: dict[str, Records] = {}
-        if path is None or not path.exists():
+        if path is None:
             return
-        lines = path.read_text(encoding="utf-8").splitlines()
+        self._file = path.open("a+", encoding="utf-8")
         try:
-            # The last line may be torn: whoever wrote it was stopped.
-            entries = [json.loads(line) for line in lines[:1]] + [one for line in lines[1:] if (one := _read(line))]
-        except json.JSONDecodeError as error:
+            self._load(path, self._file)
+        except ConfigurationError:
+            self.close()
+            raise
+
+    def _load(self, path: Path, file: TextIO) -> None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            file.seek(0)
+            text = file.read()
+        except BlockingIOError as error:
+            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
+        except UnicodeDecodeError as error:
             raise ConfigurationError(
                 f"--resume {path}: it holds no run of this benchmark; valid: a new file"
             ) from error
+        # A line may be torn: whoever wrote it was stopped.
+        entries = [entry for line in text.splitlines() if isinstance(entry := _read(line), dict)]
+        if text and (not entries or "plan" not in entries[0]):
+            raise ConfigurationError(f"--resume {path}: it holds no run of this benchmark; valid: a new file")
         if entries and entries[0] != self._setup:
-            raise ConfigurationError(f"--resume {path}: it holds a run with other settings; valid: a new file")
-        self.done = {entry["piece"]: entry["records"] for entry in entries[1:]}
+            raise ConfigurationError(f"--resume {path}: it holds a run with other settings or code; valid: a new file")
+        if not text:
+            self._write(self._setup)
+        elif not text.endswith("\n"):
+            file.write("\n")
+        self.done = {entry["piece"]: entry["records"] for entry in entries if "piece" in entry}
 
     def keep(self, piece: Piece, records: Records) -> None:
-        """Write one piece down at once."""
+        """Write one piece down at once; one that failed is tried again next time."""
         self.done[piece.name] = records
-        if self._path is None:
-            return
-        before = self._path.read_bytes() if self._path.exists() else b""
-        with self._path.open("a", encoding="utf-8") as file:
-            if not before:
-                file.write(json.dumps(self._setup) + "\n")
-            elif not before.endswith(b"\n"):
-                file.write("\n")
-            file.write(json.dumps({"piece": piece.name, "records": records}) + "\n")
+        if not any(record["kind"] == "failed" for record in records):
+            self._write({"piece": piece.name, "records": records})
+
+    def close(self) -> None:
+        """Let others write to the file."""
+        if self._file is not None:
+            self._file.close()
+
+    def _write(self, entry: dict[str, Any]) -> None:
+        if self._file is not None:
+            self._file.write(json.dumps(entry) + "\n")
+            self._file.flush()
 
 
-def _read(line: str) -> dict[str, Any] | None:
+def code_hash() -> str:
+    """One hash of the code that the figures come from."""
+    digest = hashlib.sha256()
+    for folder in ("common", "operator_side", "robot_side", "feelahead/approaches", "feelahead/benchmarks/coverage"):
+        for path in sorted((_ROOT / folder).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _read(line: str) -> Any:
     try:
-        entry: dict[str, Any] = json.loads(line)
+        return json.loads(line)
     except json.JSONDecodeError:
         return None
-    return entry

@@ -10,6 +10,7 @@ from feelahead.approaches.approach import Approach, Outcome
 from feelahead.experiments.approach.table import scene_names
 
 _COLOURS: Final = {"none": "#777777", "first": "#0072b2", "paper": "#d55e00"}
+_APART_MS: Final = 6.0
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
 
 
@@ -63,7 +64,7 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
         1, len(forces), figsize=size, dpi=110, sharey=True, squeeze=False, layout="constrained"
     )
     for panel, force_n in zip(panels[0], forces, strict=True):
-        for law in laws:
+        for place, law in enumerate(laws):
             for number, (scene, name) in enumerate(scenes.items()):
                 points: dict[float, list[float]] = {}
                 for one, outcome in ended:
@@ -74,15 +75,16 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
                 delays = sorted(points)
                 label = f"{law}, {name}" if force_n == forces[0] else None
                 panel.plot(
-                    delays,
+                    [delay + _APART_MS * place for delay in delays],
                     [median(points[delay]) for delay in delays],
                     marker=_MARKS[number % len(_MARKS)],
                     color=_COLOURS.get(law, "#009e73"),
                     alpha=0.7,
                     label=label,
                 )
-        panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms", ylim=(-5.0, None))
+        panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms (beside each other: the laws)")
         panel.grid(alpha=0.3)
+    panels[0][0].set_ylim(bottom=-5.0)
     panels[0][0].set_ylabel("speed at contact, mm/s (0: none)")
     figure.legend(loc="outside right upper", fontsize=7)
     figure.suptitle(f"frozen {frozen}", fontsize=8)

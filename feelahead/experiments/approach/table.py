@@ -59,7 +59,7 @@ def comparison(ended: Sequence[Ended]) -> Table:
 
 def scene_names(models: Iterable[Path]) -> dict[Path, str]:
     """What each scene is called: its file's name, or the whole path where several have that name."""
-    known = set(models)
+    known = list(dict.fromkeys(models))
     stems = [model.stem for model in known]
     return {model: model.stem if stems.count(model.stem) == 1 else str(model) for model in known}
 
