@@ -1,17 +1,15 @@
 """One approach: a finger of constant force pulls R2, both sides and the link in virtual time. Does it hit?"""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-import numpy as np
-
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from feelahead.approaches.laws import Compensation, Law, stiffness_settings
+from feelahead.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.approaches.pulling_hands import PullingHands
 from feelahead.approaches.pulls import Pull, constant_force
 from feelahead.approaches.spoilt import Spoil, controller
@@ -23,19 +21,9 @@ from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
-SAMPLE_S = 0.01
-"""Speed, gap and zones are noted this often."""
-STANDS_M_S = 0.001
-"""Slower than this for the last second, the gripper has stopped."""
-SWING_M_S = 0.015
-"""A change of speed that counts when reversals are counted."""
 REACTION_S = 0.25
 """What a person needs from feeling to letting go (assumed)."""
-_LAST_S = 1.0
 _LONGEST_ARMING_S = 30.0
-
-End = Literal["contact", "stopped", "undecided", "disarmed", "failed"]
-"""disarmed: the robot side stopped the arm, whatever was felt. failed: never armed, or touching from the start."""
 
 
 @dataclass(frozen=True)
@@ -62,65 +50,6 @@ class Approach:
     """The fixed enlargement of the law `margin`."""
 
 
-@dataclass(frozen=True)
-class Trace:
-    """What happened from the beginning of the pull on, a row each 10 ms."""
-
-    time_s: FloatArray
-    """(k,) since the pull began"""
-    speed_m_s: FloatArray
-    """(k,) of the true tool along its approach axis"""
-    gap_m: FloatArray
-    """(k,) true, to whatever is nearest"""
-    travel: FloatArray
-    """(k,) mechanical, of R2, 0 to 1"""
-    strengths: IntArray
-    """(k, 10) of R2's zones, 0 to 8"""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How an approach ended."""
-
-    end: End
-    contact_speed_mm_s: float | None
-    """Closing speed along the true contact's normal at its onset; None without a contact."""
-    contact_with: str | None
-    least_gap_mm: float
-    """True, to whatever is nearest, over the whole pull."""
-    stops_at_mm: float | None
-    """The true gap at the end, where the gripper was slower than 1 mm/s for the last second; else None."""
-    way_left_mm: float | None
-    """How far it could still go along its approach axis, from there."""
-    reversals: int
-    """How often the speed turned from rising to falling or back, by more than 15 mm/s."""
-    ended_s: float
-    """Since the pull began."""
-    trace: Trace = field(repr=False)
-    why: str | None = None
-    """Of an end that says nothing about the law."""
-
-
-@dataclass
-class _Samples:
-    """A trace in the making."""
-
-    time_s: list[float] = field(default_factory=list)
-    speed_m_s: list[float] = field(default_factory=list)
-    gap_m: list[float] = field(default_factory=list)
-    travel: list[float] = field(default_factory=list)
-    strengths: list[tuple[int, ...]] = field(default_factory=list)
-
-    def trace(self) -> Trace:
-        return Trace(
-            np.array(self.time_s),
-            np.array(self.speed_m_s),
-            np.array(self.gap_m),
-            np.array(self.travel),
-            np.array(self.strengths, dtype=np.int64).reshape(-1, 10),
-        )
-
-
 class PullRun:
     """Both sides, their link and a hand that pulls, from the start until whoever runs it has seen enough."""
 
@@ -139,7 +68,7 @@ class PullRun:
         self.approach = approach
         self.onset: ContactOnset | None = None
         """The first contact since the pull began."""
-        self.samples = _Samples()
+        self.samples = Samples()
         robot = robot_settings(approach)
         operator = OperatorSettings(
             link=approach.link, link_model=approach.link_model, seed=approach.seed, haptics=approach.law != "none"
@@ -281,24 +210,3 @@ def _outcome(run: PullRun) -> Outcome:
         trace=trace,
         why=run.disarmed_because if end == "disarmed" else None,
     )
-
-
-def stands(trace: Trace) -> bool:
-    """Whether the gripper was slower than 1 mm/s throughout the last second."""
-    last = trace.time_s > trace.time_s[-1] - _LAST_S
-    whole = trace.time_s[-1] - trace.time_s[0] >= _LAST_S - 2.0 * SAMPLE_S
-    return bool(whole and (np.abs(trace.speed_m_s[last]) < STANDS_M_S).all())
-
-
-def reversals(speeds_m_s: Sequence[float], swing_m_s: float = SWING_M_S) -> int:
-    """How often the speed turned from rising to falling or from falling to rising, by more than `swing_m_s`.
-
-    It rises at first: an approach that goes on has none, one that slows down once has 1, a limit cycle has many.
-    """
-    count, sign, extreme = 0, 1.0, -math.inf
-    for speed in speeds_m_s:
-        if sign * speed >= sign * extreme:
-            extreme = speed
-        elif sign * (extreme - speed) > swing_m_s:
-            count, sign, extreme = count + 1, -sign, speed
-    return count

@@ -11,8 +11,9 @@ from typing import Any
 from rich.console import Console
 
 from common.command.command_line import parse_settings
-from feelahead.approaches.approach import Approach, Outcome, run_approach
+from feelahead.approaches.approach import Approach, run_approach
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.outcome import Outcome
 from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.picture import draw_comparison, draw_run

@@ -6,7 +6,8 @@ from statistics import median
 from typing import Final
 
 from common.emulation.spec import LinkSpec
-from feelahead.approaches.approach import Approach, Outcome
+from feelahead.approaches.approach import Approach
+from feelahead.approaches.outcome import Outcome
 from feelahead.experiments.approach.table import scene_names
 
 _COLOURS: Final = {"none": "#777777", "first": "#0072b2", "paper": "#d55e00"}

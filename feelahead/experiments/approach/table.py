@@ -7,7 +7,8 @@ from statistics import median
 from rich.table import Table
 from rich.text import Text
 
-from feelahead.approaches.approach import Approach, Outcome
+from feelahead.approaches.approach import Approach
+from feelahead.approaches.outcome import Outcome
 
 Ended = tuple[Approach, Outcome]
 _FARTHEST_MM = 1000.0

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
 from feelahead.approaches import approach as module
-from feelahead.approaches.approach import SAMPLE_S, Approach, Outcome, Trace, reversals, run_approach, stands
+from feelahead.approaches.approach import Approach, run_approach
+from feelahead.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
 from feelahead.approaches.pulls import Hands
 from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
 from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off

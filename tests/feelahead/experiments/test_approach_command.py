@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.approaches.approach import Approach, End, Outcome, Trace
+from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import AHEAD, frozen_hash
+from feelahead.approaches.outcome import End, Outcome, Trace
 from feelahead.experiments.approach import command as module
 from feelahead.experiments.approach.command import try_approach
 from feelahead.experiments.approach.table import cell, comparison, sentence
