@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 
 def in_processes(
     call: Callable[..., Result], tasks: Sequence[tuple[Any, ...]], workers: int
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     """The place of each of `tasks` with `call(*task)`, as they end; with 1 worker in this process, in order."""
     if workers == 1 or len(tasks) < 2:
         for place, task in enumerate(tasks):
