@@ -25,6 +25,7 @@ ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
 """So much farther off than D_σ nothing calls for strength."""
 ALARM_STEP_S: Final = 0.02
+_LATE_STEP_S: Final = 0.01
 _L2, _R2 = 0, 1
 _TRAVEL = TriggerTravel()
 
@@ -45,6 +46,21 @@ def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
     strengths = law.felt(draw, np.array([at_s]))[0, _R2]
     strength = int(strengths[reached_zone(draw.replay, at_s, last_release_s)])
     return Stood(strength == MAX_STRENGTH, strength)
+
+
+def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float) -> float:
+    """How much later than `stood` asks full strength first stands in the zone under the finger; infinite for never.
+
+    Looked for every 10 ms from there until the touch; 0 where it stands in time, in the zone that the finger reaches.
+    """
+    due_s = last_release_s - REACTION_S
+    if stood(law, draw, last_release_s).covered:
+        return 0.0
+    times = np.arange(due_s, touch_s, _LATE_STEP_S)
+    record = draw.replay.record
+    zones = [zone_of(float(record.travel[record.tick_row(time_s), _R2])) for time_s in times]
+    full = law.felt(draw, times)[np.arange(len(times)), _R2, zones] == MAX_STRENGTH
+    return float(times[int(np.argmax(full))] - due_s) if full.any() else math.inf
 
 
 def reached_zone(replay: Replay, from_s: float, to_s: float) -> int:

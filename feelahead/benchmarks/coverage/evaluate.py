@@ -13,7 +13,7 @@ from feelahead.approaches.recording import record_approach
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan
 from feelahead.benchmarks.coverage.collisions import Collision, first_touch_s, place
-from feelahead.benchmarks.coverage.covered import false_alarms, stood
+from feelahead.benchmarks.coverage.covered import false_alarms, lateness_s, stood
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import Comparison, Draw, FieldLaw
 from feelahead.benchmarks.coverage.replay import Replay
@@ -49,6 +49,10 @@ class Row:
     draws: int
     approaches: int
     holds: bool | None
+    late_ms: float | None
+    """Median over the places: how much too late full strength stands, of those in which it does before the touch."""
+    never: float | None
+    """Share of the places in which it does not."""
     mean_strength: float | None
     """In the zone that the finger reaches, 0.25 s before the last moment to let go."""
     places: int
@@ -72,6 +76,7 @@ class _Counts:
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)
     strength: int = 0
+    late_s: list[float] = field(default_factory=list)
     alarms: int = 0
     alarm_s: float = 0.0
     judged_s: float = 0.0
@@ -159,6 +164,10 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[
             judged = stood(law, one.draw(collision.shift_m, cell, number), last_release_s)
             hits += judged.covered
             counts.strength += judged.strength
+        counts.late_s += [
+            lateness_s(law, one.draw(collision.shift_m, cell, number), last_release_s, collision.touch_s)
+            for number, (collision, last_release_s) in enumerate(one.avoidable)
+        ]
         counts.hits.append(hits)
         counts.draws.append(each)
 
@@ -216,6 +225,8 @@ def _row(
         draws=draws,
         approaches=0 if covered is None else covered.approaches,
         holds=None if covered is None else covered.holds(probability),
+        late_ms=1e3 * float(np.median(came)) if (came := [late for late in counts.late_s if late < math.inf]) else None,
+        never=1.0 - len(came) / len(counts.late_s) if counts.late_s else None,
         mean_strength=counts.strength / draws if draws else None,
         places=sum(len(one.collisions) for one in staged),
         not_found=0 if cell.scene in PASSED else places * len(staged) - sum(len(one.collisions) for one in staged),

@@ -60,7 +60,8 @@ def law_table(records: Iterable[Row], laws: Sequence[str]) -> Table:
         caption="means over the cells; slowdown at 200 ms and P = 0.99: median time over time without haptics",
     )
     for heading in (
-        *("law", "P", "cells that hold", "covered", "strength that stood", "false alarms a minute", "share"),
+        *("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never"),
+        *("false alarms a minute", "share"),
         *("slowdown, empty", "slowdown, cluttered"),
     ):
         table.add_column(heading)
@@ -80,6 +81,8 @@ def law_table(records: Iterable[Row], laws: Sequence[str]) -> Table:
                 f"{sum(bool(one['holds']) for one in judged)} of {len(judged)}",
                 _mean(judged, "coverage", ".3f"),
                 _mean(judged, "mean_strength", ".2f"),
+                _mean([one for one in judged if one["late_ms"] is not None], "late_ms", ".0f"),
+                _mean(judged, "never", ".0%"),
                 _mean(pulled, "alarms_per_min", ".1f"),
                 _mean(pulled, "alarm_share", ".0%"),
                 *slow,

@@ -25,6 +25,7 @@ from feelahead.benchmarks.coverage.collisions import first_touch_s, last_release
 from feelahead.benchmarks.coverage.covered import (
     HORIZON_S,
     false_alarms,
+    lateness_s,
     statistical_distance_m,
     stood,
     stopping_path_m,
@@ -186,6 +187,25 @@ def test_a_stopping_path_is_what_is_under_way_the_horizon_and_the_braking() -> N
     assert replay.under_way_m(time_s) == pytest.approx(0.2 * 0.24, abs=0.006)
     assert statistical_distance_m(draw, time_s, 0.5) == pytest.approx(0.0, abs=1e-9)
     assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
+
+
+def lateness(law: Law, spoil: Spoil = "nothing") -> float:
+    replay, posed, draw = staged("wall")
+    touch_s = first_touch_s(replay, posed, np.zeros(3))
+    assert touch_s is not None
+    last_s = last_release_s(replay, posed, np.zeros(3), touch_s)
+    assert last_s is not None
+    return lateness_s(Comparison(0.02, spoil).law(law, 0.99), draw, last_s, touch_s)
+
+
+def test_lateness_is_none_in_time_grows_with_a_delay_and_is_without_end_on_the_other_trigger() -> None:
+    assert lateness("full") == 0.0
+    assert lateness("none") == math.inf
+    late_s = lateness("first")
+    # Between the moment at which it is due and the touch, 0.25 s and the braking later.
+    assert 0.1 < late_s < 0.4
+    assert lateness("first", "delayed") in (pytest.approx(late_s + 0.1, abs=0.011), math.inf)
+    assert lateness("first", "swapped") == math.inf
 
 
 TINY = Plan((), approaches=1, places=2, probabilities=(0.5,), laws=("first", "none", "full"), checked=1, raced=1)
