@@ -115,4 +115,4 @@ def quick_plan(laws: tuple[Law, ...]) -> Plan:
     cells = (
         *(Cell(motion, scene) for motion in (near, far) for scene in ("wall", "rod_5mm", "wall_beside", "table_1_box")),
     )
-    return Plan(cells, approaches=5, places=4, probabilities=(0.5, 0.9), laws=laws, checked=4, raced=1)
+    return Plan(cells, approaches=10, places=4, probabilities=(0.5, 0.9), laws=laws, checked=6, raced=2)
