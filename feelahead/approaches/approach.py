@@ -8,6 +8,7 @@ from pathlib import Path
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
+from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.laws import Compensation, Law, stiffness_settings
 from feelahead.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.approaches.pulling_hands import PullingHands
@@ -15,15 +16,15 @@ from feelahead.approaches.pulls import Pull, constant_force
 from feelahead.approaches.spoilt import Spoil, controller
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
-from robot_side.settings import CameraSettings, EnlargementOptions, RobotSettings
+from robot_side.settings import EnlargementOptions, RobotSettings
 from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
 REACTION_S = 0.25
 """What a person needs from feeling to letting go (assumed)."""
-_LONGEST_ARMING_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,6 @@ class Approach:
     seed: int = 0
     grip: bool = False
     spoil: Spoil = "nothing"
-    camera_sd_m: float = 0.003
     margin_m: float | None = None
     """The fixed enlargement of the law `margin`."""
 
@@ -104,13 +104,10 @@ class PullRun:
 
     def arm(self) -> float:
         """Go on until the pull begins; when that is. FeelaheadError where the robot is not armed in time."""
-        while self.hands.pull_began_s is None:
-            self.loopback.run_until(self.loopback.clock.now() + SAMPLE_S)
-            if self.loopback.clock.now() > _LONGEST_ARMING_S:
-                raise FeelaheadError(self._not_armed())
+        began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
         if self.truth.touched:
             raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
-        return self.hands.pull_began_s
+        return began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:
         """Go on until a contact, a stop or `until_s`, with a pause each 10 ms for the caller to look or to leave."""
@@ -118,15 +115,6 @@ class PullRun:
         while self.onset is None and self.disarmed_because is None and clock.now() < until_s:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
-
-    def _not_armed(self) -> str:
-        robot, link = self.loopback.robot, self.approach.link
-        why = f"{robot.session.safety.stops[-1][1]}; " if robot.session.safety.stops else ""
-        grip = " and did not grip" if self.approach.grip else ""
-        return (
-            f"the robot was not armed{grip} within {_LONGEST_ARMING_S:g} s over --link {link!r}: {why}loop age"
-            f" {robot.loop_age_s(self.loopback.clock.now()):.2f} s, {robot.session.motion_received} commands arrived"
-        )
 
     def _after_robot_tick(self, now_s: float) -> None:
         if self.onset is not None:
@@ -137,10 +125,8 @@ class PullRun:
             return
         self.onset = onset
         strengths, travel = run.device.effects[1].zone_strengths, run.device.travel[1]
-        if self._lets_go and hands.let_go_s is None:
-            zone = min(int(travel * len(strengths)), len(strengths) - 1)
-            if strengths[zone] == MAX_STRENGTH:
-                hands.let_go_s = now_s + REACTION_S
+        if self._lets_go and hands.let_go_s is None and strengths[zone_of(travel)] == MAX_STRENGTH:
+            hands.let_go_s = now_s + REACTION_S
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             self.samples.time_s.append(now_s - hands.pull_began_s)
@@ -160,7 +146,6 @@ def robot_settings(approach: Approach) -> RobotSettings:
         seed=approach.seed,
         probability=approach.probability,
         stiffness=stiffness_settings(approach.law),
-        camera=CameraSettings(sd_m=approach.camera_sd_m),
         enlargement=EnlargementOptions(fixed_m=approach.margin_m if approach.law == "margin" else None),
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
+from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.approaches.pulling_hands import PullingHands
 from feelahead.approaches.pulls import PullKind, make_pull
@@ -25,7 +26,6 @@ POSE_S = 0.01
 """The true pose is noted this often."""
 TICK_S = 0.001
 """And what each side has of the other, this often."""
-_LONGEST_ARMING_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,11 @@ def record_approach(
         person=lambda _: hands,
         after_robot_tick=lambda now_s: notes.take(run, now_s),
     )
-    while hands.pull_began_s is None:
-        run.run_until(run.clock.now() + POSE_S)
-        if run.clock.now() > _LONGEST_ARMING_S:
-            raise FeelaheadError(f"the robot was not armed within {_LONGEST_ARMING_S:g} s over --link {link!r}")
-    run.run_until(hands.pull_began_s + duration_s)
+    began_s = wait_for_pull(run, hands, link)
+    run.run_until(began_s + duration_s)
     if run.robot.session.safety.stops:
         raise FeelaheadError(f"the arm was stopped over --link {link!r}: {run.robot.session.safety.stops[-1][1]}")
-    return notes.record(pull, link, seed, hands.pull_began_s)
+    return notes.record(pull, link, seed, began_s)
 
 
 class _Notes:

@@ -1,4 +1,4 @@
-"""Controllers that spoil what is felt, to see that a figure notices."""
+"""Controllers that do not do what they are told: spoilt, to see that a figure notices, or always full."""
 
 from collections import deque
 from dataclasses import replace

@@ -87,7 +87,7 @@ class TrueContact:
     def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
         """How far the gripper could go along the unit vector `direction` (3,) until it touches; at most `farthest_m`.
 
-        Conservative advancement: no step is longer than the least distance.
+        See `free_way`.
         """
         model, thought = self._model, self._thought
         thought.qpos[:] = self._data.qpos

@@ -1,6 +1,6 @@
 """What is varied: motion and link (recorded), scene, camera and encoders (drawn afterwards)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from feelahead.approaches.frozen import AHEAD, PASSED
@@ -45,7 +45,7 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """What names it in tables and where it is resumed."""
+        """What names it in tables, and for --only."""
         return "/".join(
             (
                 self.scene,
@@ -72,10 +72,6 @@ class Plan:
     """Approaches that are run again in full physics, closed loop."""
     raced: int = 10
     """Seeds for the time to a goal."""
-
-    def of(self, cells: tuple[Cell, ...]) -> "Plan":
-        """The same for some of the cells."""
-        return replace(self, cells=cells)
 
     def motions(self) -> dict[Motion, list[Cell]]:
         """The cells by what is recorded for them."""

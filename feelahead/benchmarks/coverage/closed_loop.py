@@ -14,10 +14,10 @@ from feelahead.approaches.recording import record_approach
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion
 from feelahead.benchmarks.coverage.collisions import Collision, place
 from feelahead.benchmarks.coverage.covered import stood
-from feelahead.benchmarks.coverage.laws import Comparison, Draw
+from feelahead.benchmarks.coverage.laws import Draw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.settings import EncoderSettings
+from robot_side.settings import CameraSettings, EncoderSettings
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
@@ -68,8 +68,8 @@ def _check_one(cell: Cell, kind: str, seed: int) -> Iterator[Checked]:
     last_s, link = collision.last_release_s, cell.motion.link
     if kind == "reacting":
         law: Law = "full" if seed % 2 else "first"
-        draw = Draw(replay, _as_perceived(posed, replay, collision, seed), 0.003)
-        expected = not stood(Comparison(0.0).law(law, _PROBABILITY), draw, last_s).covered
+        draw = Draw(replay, _as_perceived(posed, replay, collision, seed), CameraSettings().sd_m)
+        expected = not stood(make_law(law, _PROBABILITY), draw, last_s).covered
         yield Checked(kind, law, cell.motion.pull, link, expected, _touches(cell, seed, collision, law, None))
         return
     let_go_s = last_s + (_AROUND_S if kind == "released late" else -_AROUND_S)
@@ -83,7 +83,7 @@ def _as_perceived(posed: PosedScene, replay: Replay, collision: Collision, seed:
     _, camera_seed, _ = np.random.SeedSequence(seed).generate_state(3)
     names = tuple(thing.name for thing in posed.scene.objects)
     posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], collision.shift_m)
-    return posed.perceived(CameraError(names, 0.0, 0.003, 0.0, int(camera_seed)).next_frame())
+    return posed.perceived(CameraError(names, 0.0, CameraSettings().sd_m, 0.0, int(camera_seed)).next_frame())
 
 
 def _touches(cell: Cell, seed: int, collision: Collision, law: Law, let_go_s: float | None) -> bool:

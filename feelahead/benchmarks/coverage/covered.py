@@ -13,10 +13,10 @@ from feelahead.benchmarks.coverage.laws import Draw, FieldLaw
 from feelahead.benchmarks.coverage.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.posed_scene import PosedScene
 
 HORIZON_S: Final = 0.30
@@ -26,7 +26,7 @@ CLEAR_M: Final = 0.015
 """So much farther off than D_σ nothing calls for strength."""
 ALARM_STEP_S: Final = 0.02
 _LATE_STEP_S: Final = 0.01
-_L2, _R2 = 0, 1
+_R2 = 1
 _TRAVEL = TriggerTravel()
 
 
@@ -49,13 +49,11 @@ def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
 
 
 def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float) -> float:
-    """How much later than `stood` asks full strength first stands in the zone under the finger; infinite for never.
+    """How much later than it is due full strength first stands in the zone under the finger; infinite for never.
 
-    Looked for every 10 ms from there until the touch; 0 where it stands in time, in the zone that the finger reaches.
+    Looked for every 10 ms, from 0.25 s before the last moment to let go until the touch.
     """
     due_s = last_release_s - REACTION_S
-    if stood(law, draw, last_release_s).covered:
-        return 0.0
     times = np.arange(due_s, touch_s, _LATE_STEP_S)
     record = draw.replay.record
     zones = [zone_of(float(record.travel[record.tick_row(time_s), _R2])) for time_s in times]
@@ -70,13 +68,8 @@ def reached_zone(replay: Replay, from_s: float, to_s: float) -> int:
     return zone_of(float(record.travel[rows, _R2].max()))
 
 
-def zone_of(travel: float) -> int:
-    """The zone, 0 to 9, of a mechanical travel, 0 to 1."""
-    return min(int(travel * ZONE_COUNT), ZONE_COUNT - 1)
-
-
 def zone_speed_m_s(zone: int) -> float:
-    """What the middle of a zone commands: its calibrated travel times the full speed."""
+    """What the middle of a zone commands: the calibrated travel there times the full speed."""
     raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
     return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
 
@@ -132,9 +125,7 @@ def statistical_distance_m(draw: Draw, time_s: float, probability: float) -> flo
     """D_σ(P) = max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)) (eq. 9-10 without the delay), the largest of the gripper's spheres."""
     replay = draw.replay
     pose = replay.estimated[replay.record.pose_row(time_s)]
-    encoder = Encoder(replay.encoder.sigma_rad, replay.encoder.resolution_rad)
-    sigma_rad = np.full(pose.tool_jacobian.shape[1], encoder.standard_deviation_rad())
-    covariances = position_covariance(pose.sphere_jacobians, sigma_rad)
+    covariances = position_covariance(pose.sphere_jacobians, replay.encoder_sigma_rad)
     directions = np.broadcast_to(pose.tool_rotation[:, 2], (len(covariances), 1, 3))
     variance = float(np.max(directional_variance(covariances, directions))) + draw.camera_sd_m**2
     return max(0.0, float(ndtri(probability)) * math.sqrt(variance))

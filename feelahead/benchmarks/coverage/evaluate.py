@@ -1,4 +1,4 @@
-"""Everything about the cells of one motion: its approaches are recorded once and judged for every cell, law and P."""
+"""Everything about the cells of one motion: the approaches are recorded once and judged for every cell, law and P."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,13 +15,12 @@ from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan
 from feelahead.benchmarks.coverage.collisions import Collision, first_touch_s, place
 from feelahead.benchmarks.coverage.covered import false_alarms, lateness_s, stood
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
-from feelahead.benchmarks.coverage.laws import Comparison, Draw, FieldLaw
+from feelahead.benchmarks.coverage.laws import Draw, FieldLaw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
 from robot_side.enlargement.distance import Enlargement, EnlargementSettings
 from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.camera_error import CameraError
-from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import Scene, load_scene
 
@@ -65,8 +64,8 @@ class Row:
     alarm_share: float | None
     """Of the time in which R2 was pulled."""
     judged_s: float
-    margin_mm: float
-    """The fixed margin that stands beside the first law: its mean enlargement while moving."""
+    margin_mm: float | None
+    """The fixed enlargement of the law `margin`: the first law's mean while moving. None where that law is left out."""
 
 
 @dataclass
@@ -90,6 +89,8 @@ class _Staged:
     posed: PosedScene
     collisions: tuple[Collision, ...]
     """Empty where nothing collides: the objects then stand where the scene has them."""
+    sought: int
+    """How many were looked for."""
 
     @property
     def avoidable(self) -> tuple[tuple[Collision, float], ...]:
@@ -132,22 +133,22 @@ def _seed(approach: int, number: int) -> int:
 def _stage(cell: Cell, replay: Replay, places: int) -> _Staged:
     posed = PosedScene(_scene(cell.scene))
     if cell.scene in PASSED:
-        return _Staged(replay, posed, ())
+        return _Staged(replay, posed, (), 0)
     generator = np.random.default_rng([replay.record.seed, 0x71ACE])
     found = [place(replay, posed, generator) for _ in range(places)]
-    return _Staged(replay, posed, tuple(one for one in found if one is not None))
+    return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
 
 
 def _evaluate_cell(cell: Cell, staged: Sequence[_Staged], plan: Plan, spoil: Spoil) -> list[Row]:
     rows = []
     for probability in plan.probabilities:
-        margin_m = mean_enlargement_m([one.replay for one in staged], cell, probability)
-        comparison = Comparison(margin_m, spoil)
+        replays = [one.replay for one in staged]
+        margin_m = mean_enlargement_m(replays, cell, probability) if "margin" in plan.laws else None
         for name in plan.laws:
-            counts, law = _Counts(), comparison.law(name, probability)
+            counts, law = _Counts(), make_law(name, probability, margin_m, spoil)
             _count_covered(counts, law, cell, staged, probability)
             _count_alarms(counts, law, cell, staged, probability)
-            rows.append(_row(cell, name, probability, counts, staged, margin_m, plan.places))
+            rows.append(_row(cell, name, probability, counts, staged, margin_m))
     return rows
 
 
@@ -161,13 +162,13 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[
         hits = 0
         for number in range(each):
             collision, last_release_s = one.avoidable[number % len(one.avoidable)]
-            judged = stood(law, one.draw(collision.shift_m, cell, number), last_release_s)
+            draw = one.draw(collision.shift_m, cell, number)
+            judged = stood(law, draw, last_release_s)
             hits += judged.covered
             counts.strength += judged.strength
-        counts.late_s += [
-            lateness_s(law, one.draw(collision.shift_m, cell, number), last_release_s, collision.touch_s)
-            for number, (collision, last_release_s) in enumerate(one.avoidable)
-        ]
+            if number < len(one.avoidable):
+                late_s = 0.0 if judged.covered else lateness_s(law, draw, last_release_s, collision.touch_s)
+                counts.late_s.append(late_s)
         counts.hits.append(hits)
         counts.draws.append(each)
 
@@ -193,20 +194,18 @@ def mean_enlargement_m(replays: Sequence[Replay], cell: Cell, probability: float
     enlargement, found = Enlargement(settings), []
     for replay in replays:
         record = replay.record
-        encoder = Encoder(replay.encoder.sigma_rad, replay.encoder.resolution_rad)
-        sigma_rad = np.full(record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
         for row in range(0, len(record.pose_time_s), 5):
             if abs(replay.approach_speed_m_s[row]) > _MOVING_M_S:
                 jacobians = replay.estimated[row].sphere_jacobians
                 velocities = jacobians @ record.joint_velocities_rad_s[row]
-                covariances = position_covariance(jacobians, sigma_rad)
+                covariances = position_covariance(jacobians, replay.encoder_sigma_rad)
                 age_s = float(record.loop_age_s[row])
                 found.append(float(enlargement.distances(covariances, velocities, age_s).mean()))
     return float(np.mean(found)) if found else 0.0
 
 
 def _row(
-    cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequence[_Staged], margin_m: float, places: int
+    cell: Cell, law: str, probability: float, counts: _Counts, staged: Sequence[_Staged], margin_m: float | None
 ) -> Row:
     covered = share(counts.hits, counts.draws)
     draws = sum(counts.draws)
@@ -229,10 +228,10 @@ def _row(
         never=1.0 - len(came) / len(counts.late_s) if counts.late_s else None,
         mean_strength=counts.strength / draws if draws else None,
         places=sum(len(one.collisions) for one in staged),
-        not_found=0 if cell.scene in PASSED else places * len(staged) - sum(len(one.collisions) for one in staged),
+        not_found=sum(one.sought - len(one.collisions) for one in staged),
         unavoidable=sum(len(one.collisions) - len(one.avoidable) for one in staged),
         alarms_per_min=60.0 * counts.alarms / counts.judged_s if counts.judged_s else None,
         alarm_share=counts.alarm_s / counts.judged_s if counts.judged_s else None,
         judged_s=counts.judged_s,
-        margin_mm=1e3 * margin_m,
+        margin_mm=None if margin_m is None else 1e3 * margin_m,
     )

@@ -16,7 +16,6 @@ from operator_side.hands.travel_calibration import TravelCalibration
 from robot_side.enlargement.distance import Enlargement, EnlargementSettings
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.sensing import AheadSensing
-from robot_side.simulation.encoders import Encoder
 from robot_side.stiffness.map import StiffnessMap
 
 _REMEMBERED_ROWS = 8
@@ -55,13 +54,13 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class FirstLaw:
-    """The shipped pipeline, tick by tick, with the messages' own delays: the first law, the paper's, a fixed margin."""
+class Pipeline:
+    """The shipped pipeline, tick by tick, with the messages' own delays, under one law that it can follow."""
 
+    law: Law
     probability: float
-    name: Law = "first"
     margin_m: float | None = None
-    """A fixed enlargement in place of eq. 8-10."""
+    """A fixed enlargement in place of eq. 8-10: the law `margin`."""
     spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
@@ -78,20 +77,14 @@ class FirstLaw:
             strengths[known] = by_row[rows[known] - first]
         return strengths[:, ::-1] if self.spoil == "swapped" else strengths
 
-    def enlargement(self, draw: Draw) -> Enlargement:
-        """The enlargement as this law has it."""
-        settings = EnlargementSettings(
-            probability=self.probability, camera_sd_m=draw.camera_sd_m, fixed_m=self.margin_m
-        )
-        return Enlargement(settings)
-
     def _rows(self, draw: Draw, first: int, last: int) -> IntArray:
         """Strengths (rows, 2, 10) that follow from the poses' rows `first` to `last`."""
         replay, record = draw.replay, draw.replay.record
-        encoder = Encoder(replay.encoder.sigma_rad, replay.encoder.resolution_rad)
-        sigma_rad = np.full(record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
-        settings = stiffness_settings("paper" if self.name == "paper" else "first")
-        sensing = AheadSensing(self.enlargement(draw), StiffnessMap(settings), sigma_rad)
+        settings = EnlargementSettings(
+            probability=self.probability, camera_sd_m=draw.camera_sd_m, fixed_m=self.margin_m
+        )
+        stiffness_map = StiffnessMap(stiffness_settings(self.law))
+        sensing = AheadSensing(Enlargement(settings), stiffness_map, replay.encoder_sigma_rad)
         rendering = TriggerRendering(RenderingSettings(), TravelCalibration())
         strengths = np.empty((last + 1 - first, 2, ZONE_COUNT), dtype=np.int64)
         for row in range(first, last + 1):
@@ -114,17 +107,8 @@ class FirstLaw:
         return strengths
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """The laws that are set side by side, each made for a P."""
-
-    margin_m: float
-    """Of the law `margin`: the mean enlargement of the first law while it moves."""
-    spoil: Spoil = "nothing"
-
-    def law(self, name: Law, probability: float) -> FieldLaw:
-        """The law `name` at P."""
-        if name in ("none", "full"):
-            return Constant(MAX_STRENGTH if name == "full" else 0)
-        margin_m = self.margin_m if name == "margin" else None
-        return FirstLaw(probability, name, margin_m, self.spoil)
+def make_law(law: Law, probability: float, margin_m: float | None = None, spoil: Spoil = "nothing") -> FieldLaw:
+    """`law` at P. margin_m: the fixed enlargement of `margin`, which the other laws do not look at."""
+    if law in ("none", "full"):
+        return Constant(MAX_STRENGTH if law == "full" else 0)
+    return Pipeline(law, probability, margin_m if law == "margin" else None, spoil)

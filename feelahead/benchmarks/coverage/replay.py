@@ -60,6 +60,12 @@ class Replay:
         """When the record ends, or the arm no longer does what it is told: at the edge of its reach."""
 
     @cached_property
+    def encoder_sigma_rad(self) -> FloatArray:
+        """(n,) what the robot side takes the encoders' errors for (eq. 3)"""
+        encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad)
+        return np.full(self.record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
+
+    @cached_property
     def estimated(self) -> list[GripperPose]:
         """The gripper where noisy encoders put it, for each row of the poses."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)

@@ -6,7 +6,9 @@ from typing import Annotated
 
 import tyro
 
+from common.files.output_file import require_output_file
 from feelahead.approaches.laws import LAWS, Law
+from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import Plan, full_plan, quick_plan
 
@@ -65,9 +67,9 @@ class CoverageSettings:
                 raise ValueError(f"--{name} {count}: valid: 0 or more")
         if len(set(self.laws)) < len(self.laws):
             raise ValueError(f"--laws {' '.join(self.laws)}: valid: each law once")
-        for path in (self.resume, self.csv, self.picture):
-            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-                raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
+        require_output_file("--resume", self.resume)
+        require_output_file("--csv", self.csv)
+        require_output_file("--picture", self.picture, PICTURES)
         if not self.plan().cells:
             raise ValueError(f"--only {self.only!r}: no cell's name contains it; valid: as wall/bell/200 ms")
 

@@ -7,7 +7,8 @@ from typing import Any, Final
 from rich.table import Table
 from rich.text import Text
 
-_COLOURS: Final = {"first": "#0072b2", "paper": "#d55e00", "margin": "#cc79a7", "none": "#777777", "full": "#009e73"}
+from feelahead.approaches.pictures import LAW_COLOURS
+
 _MARKS: Final = ("o", "s", "^", "D")
 Row = dict[str, Any]
 
@@ -107,14 +108,15 @@ def _alarms(row: Row | None) -> str:
 
 
 def check_lines(records: Iterable[Row]) -> list[str]:
-    """How often the closed loop in full physics did what the reckoning says."""
+    """How often the closed loop in full physics did what the reckoning says, and where it did not."""
     checks = [one for one in records if one["kind"] == "check"]
     lines = []
     for kind in ("released early", "released late", "reacting"):
         some = [one for one in checks if one["kind_of_check"] == kind]
-        agreed = sum(one["expected_contact"] == one["contact"] for one in some)
+        others = [f"{one['pull']}, {one['link']}" for one in some if one["expected_contact"] != one["contact"]]
         if some:
-            lines.append(f"closed loop, {kind}: {agreed} of {len(some)} as reckoned")
+            but = f"; not: {'; '.join(others)}" if others else ""
+            lines.append(f"closed loop, {kind}: {len(some) - len(others)} of {len(some)} as reckoned{but}")
     return lines
 
 
@@ -126,7 +128,7 @@ def draw(records: Iterable[Row], laws: Sequence[str], frozen: str, path: Path) -
     probabilities = sorted({one["probability"] for one in rows})
     figure, axes = plt.subplots(figsize=(7.2, 4.6), dpi=110, layout="constrained")
     for law in laws:
-        colour = _COLOURS.get(law, "black")
+        colour = LAW_COLOURS[law]
         axes.plot([], [], color=colour, linewidth=4.0, label=law)
         points = [_point([one for one in rows if one["law"] == law and one["probability"] == p]) for p in probabilities]
         known = [point for point in points if point is not None]

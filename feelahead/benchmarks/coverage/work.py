@@ -4,7 +4,7 @@ import fcntl
 import hashlib
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TextIO
 
@@ -36,7 +36,7 @@ class Piece:
 def pieces(plan: Plan, seed: int, spoil: Spoil) -> list[Piece]:
     """Everything that is to be done, the longest first."""
     found = [
-        Piece(f"{motion}", 10.0 + 10.0 * len(cells), judge, (motion, cells, plan.of(()), seed, spoil))
+        Piece(f"{motion}", 10.0 + 10.0 * len(cells), judge, (motion, cells, replace(plan, cells=()), seed, spoil))
         for motion, cells in plan.motions().items()
     ]
     for scene in SCENES:

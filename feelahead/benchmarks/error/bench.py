@@ -12,7 +12,9 @@ from rich.console import Console
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
+from common.files.output_file import require_output_file
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.progress import progress
 from feelahead.benchmarks.error.figures import prediction_figures, propagation_figures, write_figures
 from feelahead.benchmarks.error.gripper import PosedGripper
@@ -74,12 +76,9 @@ class ErrorBenchSettings:
                 f"--draws {self.draws}: valid: {100 * BATCHES} to {_MOST_DRAWS}, a multiple of {BATCHES}, whose parts"
                 " tell the standard error"
             )
-        for name in ("csv", "table", "picture"):
-            path: Path | None = getattr(self, name)
-            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-                raise ValueError(f"--{name} {path}: valid: a file in a folder that is there")
-        if self.picture is not None and self.picture.suffix.lower() != ".png":
-            raise ValueError(f"--picture {self.picture}: valid: a file whose name ends in .png")
+        require_output_file("--csv", self.csv)
+        require_output_file("--table", self.table)
+        require_output_file("--picture", self.picture, PICTURES)
 
 
 @dataclass(frozen=True)

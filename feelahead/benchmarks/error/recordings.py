@@ -1,14 +1,13 @@
 """Which approaches are recorded, and how: each in turn, or several processes at a time."""
 
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
 from common.errors import FeelaheadError
 from feelahead.approaches.frozen import SITE, frozen_scene
+from feelahead.approaches.processes import in_processes
 from feelahead.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.approaches.recording import record_approach
 from feelahead.benchmarks.error.gripper import PosedGripper
@@ -55,24 +54,13 @@ def jobs(first_seed: int, seeds: int, *, quick: bool) -> list[Job]:
 
 def judge_all(wanted: Sequence[Job], workers: int, advance: Callable[[], None]) -> tuple[list[Judged], list[str]]:
     """Record and judge them; what could not be recorded is told in words. `advance` is called after each."""
-    outcomes = list(_outcomes(wanted, workers, advance))
-    judged = [outcome for outcome in outcomes if isinstance(outcome, Judged)]
-    return judged, [outcome for outcome in outcomes if isinstance(outcome, str)]
-
-
-def _outcomes(wanted: Sequence[Job], workers: int, advance: Callable[[], None]) -> Iterator[Judged | str]:
-    """In the order in which they were asked for."""
-    if workers == 1:
-        for job in wanted:
-            yield judge_job(job)
-            advance()
-        return
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = [pool.submit(judge_job, job) for job in wanted]
-        for future in as_completed(futures):
-            future.result()
-            advance()
-        yield from (future.result() for future in futures)
+    outcomes: dict[int, Judged | str] = {}
+    for place, outcome in in_processes(judge_job, [(job,) for job in wanted], workers):
+        outcomes[place] = outcome
+        advance()
+    in_order = [outcomes[place] for place in sorted(outcomes)]
+    judged = [outcome for outcome in in_order if isinstance(outcome, Judged)]
+    return judged, [outcome for outcome in in_order if isinstance(outcome, str)]
 
 
 def judge_job(job: Job) -> Judged | str:

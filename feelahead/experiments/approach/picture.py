@@ -8,9 +8,9 @@ from typing import Final
 from common.emulation.spec import LinkSpec
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.outcome import Outcome
+from feelahead.approaches.pictures import LAW_COLOURS
 from feelahead.experiments.approach.table import scene_names
 
-_COLOURS: Final = {"none": "#777777", "first": "#0072b2", "paper": "#d55e00"}
 _APART_MS: Final = 6.0
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
 
@@ -79,7 +79,7 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
                     [delay + _APART_MS * place for delay in delays],
                     [median(points[delay]) for delay in delays],
                     marker=_MARKS[number % len(_MARKS)],
-                    color=_COLOURS.get(law, "#009e73"),
+                    color=LAW_COLOURS[law],
                     alpha=0.7,
                     label=label,
                 )

@@ -10,12 +10,13 @@ import tyro
 
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
+from common.files.output_file import require_output_file
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import AHEAD, GRIPPED, SCENES, SITE, frozen_scene
 from feelahead.approaches.laws import Compensation
+from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.spoilt import Spoil
 
-_PICTURES = (".png", ".svg", ".pdf")
 _LONGEST_LOOP_S = 2.0
 """Beyond this loop age the robot side is never armed (SafetySettings.max_delay_s)."""
 
@@ -110,11 +111,8 @@ class ApproachSettings:
         for model in self.model:
             if not model.is_file():
                 raise ValueError(f"--model {model}: there is no such file; valid: an MJCF file")
-        for path in (self.summary, self.picture):
-            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-                raise ValueError(f"{path}: is a folder, or its folder is not there; valid: a file's path")
-        if self.picture is not None and self.picture.suffix not in _PICTURES:
-            raise ValueError(f"--picture {self.picture}: valid: a file's path that ends in {', '.join(_PICTURES)}")
+        require_output_file("--summary", self.summary)
+        require_output_file("--picture", self.picture, PICTURES)
 
     def models(self) -> tuple[Path, ...]:
         """The scenes to try; ConfigurationError where the frozen ones are not there."""

@@ -60,6 +60,11 @@ def equilibrium_travel(
     return 1.0
 
 
+def zone_of(travel: float) -> int:
+    """The zone, 0 to 9, of a mechanical travel, 0 to 1."""
+    return min(int(travel * ZONE_COUNT), ZONE_COUNT - 1)
+
+
 class SimulatedTrigger:
     """A trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
 
@@ -91,12 +96,12 @@ class SimulatedTrigger:
     @property
     def zone(self) -> int:
         """The zone the trigger is in, 0 to 9."""
-        return min(int(self._travel * ZONE_COUNT), ZONE_COUNT - 1)
+        return zone_of(self._travel)
 
     @property
     def loaded(self) -> bool:
         """The finger presses the trigger into, or against the edge of, a zone that resists."""
-        reach = min(int((self._travel + _TOUCHING_TRAVEL) * ZONE_COUNT), ZONE_COUNT - 1)
+        reach = zone_of(self._travel + _TOUCHING_TRAVEL)
         strengths = self._strengths()
         return self._finger_force_n > 0.0 and (strengths[self.zone] > 0 or strengths[reach] > 0)
 

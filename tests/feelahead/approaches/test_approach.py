@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from feelahead.approaches import approach as module
 from feelahead.approaches.approach import Approach, run_approach
 from feelahead.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
 from feelahead.approaches.pulls import Hands
@@ -188,7 +187,7 @@ def test_an_approach_does_not_depend_on_those_before_it() -> None:
 
 
 def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_LONGEST_ARMING_S", 3.0)
+    monkeypatch.setattr("feelahead.approaches.arming.LONGEST_ARMING_S", 3.0)
     for changes, why in (
         ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
         ({"grip": True}, "grip"),

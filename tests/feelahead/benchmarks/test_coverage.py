@@ -18,7 +18,7 @@ from feelahead.approaches.frozen import AHEAD, PASSED, SITE, frozen_scene
 from feelahead.approaches.laws import Law
 from feelahead.approaches.recording import RecordedApproach, record_approach
 from feelahead.approaches.spoilt import Spoil
-from feelahead.benchmarks.coverage import bench, cells, closed_loop
+from feelahead.benchmarks.coverage import bench, closed_loop
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan, full_plan, quick_plan
 from feelahead.benchmarks.coverage.closed_loop import check
 from feelahead.benchmarks.coverage.collisions import first_touch_s, last_release_s
@@ -29,15 +29,15 @@ from feelahead.benchmarks.coverage.covered import (
     statistical_distance_m,
     stood,
     stopping_path_m,
-    zone_of,
     zone_speed_m_s,
 )
 from feelahead.benchmarks.coverage.evaluate import Row, evaluate
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
-from feelahead.benchmarks.coverage.laws import Comparison, Draw
+from feelahead.benchmarks.coverage.laws import Draw, make_law
 from feelahead.benchmarks.coverage.replay import Replay, coasting_s
 from feelahead.benchmarks.coverage.settings import CoverageSettings
 from feelahead.benchmarks.coverage.work import Kept, Piece, pieces
+from operator_side.dualsense.simulated.trigger_model import zone_of
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
@@ -132,7 +132,7 @@ def covered(law: Law, spoil: Spoil = "nothing", ahead_m: float = 0.0) -> tuple[b
     assert touch_s is not None
     last_s = last_release_s(replay, posed, ahead_m * replay.axis, touch_s)
     assert last_s is not None
-    judged = stood(Comparison(0.02, spoil).law(law, 0.99), draw, last_s)
+    judged = stood(make_law(law, 0.99, 0.02, spoil), draw, last_s)
     return judged.covered, judged.strength
 
 
@@ -145,7 +145,7 @@ def strengths_before_contact(spoil: Spoil) -> np.ndarray[Any, Any]:
     replay, posed, draw = staged("wall")
     touch_s = first_touch_s(replay, posed, np.zeros(3))
     assert touch_s is not None
-    return Comparison(0.02, spoil).law("first", 0.99).felt(draw, np.array([touch_s - 0.11, touch_s - 0.01]))
+    return make_law("first", 0.99, 0.02, spoil).felt(draw, np.array([touch_s - 0.11, touch_s - 0.01]))
 
 
 def test_spoilt_laws_show() -> None:
@@ -162,16 +162,15 @@ def test_spoilt_laws_show() -> None:
 def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
     replay, posed, draw = staged("empty")
     began_s = replay.record.began_s
-    comparison = Comparison(0.02)
-    full = false_alarms(comparison.law("full", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    full = false_alarms(make_law("full", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
     assert full.count == 1
     assert full.alarm_s == pytest.approx(full.judged_s)
     assert full.judged_s == pytest.approx(replay.end_s - began_s, abs=0.1)
-    none = false_alarms(comparison.law("none", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    none = false_alarms(make_law("none", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
     assert (none.count, none.alarm_s) == (0, 0.0)
     # With a wall so near that any zone's stopping path meets it, nothing is a false alarm.
     replay, posed, draw = staged("wall", ahead_m=-0.30)
-    near = false_alarms(comparison.law("full", 0.99), draw, posed, -0.30 * replay.axis, began_s + 0.1, 0.99)
+    near = false_alarms(make_law("full", 0.99), draw, posed, -0.30 * replay.axis, began_s + 0.1, 0.99)
     assert near.count == 0
 
 
@@ -195,7 +194,7 @@ def lateness(law: Law, spoil: Spoil = "nothing") -> float:
     assert touch_s is not None
     last_s = last_release_s(replay, posed, np.zeros(3), touch_s)
     assert last_s is not None
-    return lateness_s(Comparison(0.02, spoil).law(law, 0.99), draw, last_s, touch_s)
+    return lateness_s(make_law(law, 0.99, 0.02, spoil), draw, last_s, touch_s)
 
 
 def test_lateness_is_none_in_time_grows_with_a_delay_and_is_without_end_on_the_other_trigger() -> None:
@@ -325,7 +324,8 @@ def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> 
         ({"raced": -1}, "--raced"),
         ({"laws": ("first", "first")}, "--laws"),
         ({"only": "no such cell"}, "--only"),
-        ({"csv": Path("/no/such/folder/file.csv")}, "file.csv"),
+        ({"csv": Path("/no/such/folder/file.csv")}, "--csv"),
+        ({"picture": Path("picture.xyz")}, "--picture picture.xyz: .*.png"),
     ],
 )
 def test_bad_settings_are_named(flags: dict[str, Any], named: str) -> None:
@@ -356,4 +356,3 @@ def test_the_command_prints_its_tables_writes_its_files_and_resumes(
     monkeypatch.setattr("feelahead.benchmarks.coverage.work.evaluate", None)
     assert bench.bench_coverage([*arguments, *files]) == 0
     assert capsys.readouterr().out == first
-    assert math.isfinite(cells.full_plan(("first",)).approaches)

@@ -76,9 +76,9 @@ def test_it_prints_its_tables_and_writes_its_files(
         (["--workers", "0"], "--workers 0: valid: 1 to"),
         (["--draws", "100001"], "--draws 100001: valid: 2000 to 10000000, a multiple of 20"),
         (["--draws", "20"], "--draws 20: valid: 2000 to"),
-        (["--csv", "/nowhere/out.csv"], "--csv /nowhere/out.csv: valid: a file in a folder"),
-        (["--table", "/"], "--table /: valid: a file"),
-        (["--picture", "out.jpg"], "--picture out.jpg: valid: a file whose name ends in .png"),
+        (["--csv", "/nowhere/out.csv"], "--csv /nowhere/out.csv: is a folder, or its folder is not there"),
+        (["--table", "/"], "--table /: is a folder"),
+        (["--picture", "out.jpg"], "--picture out.jpg: valid: a file's path that ends in .png"),
         (["--seeds", "x"], "--seeds: 'x'; valid: a number"),
     ],
 )
