@@ -1,6 +1,7 @@
 """The operator side without I/O: bytes in, bytes out, and `now` with every call.
 
 control payloads ─▶ receive ─▶ newest stiffness ─▶ output_report ─▶ controller
+                                                     ▲ own commands under way
 controller reports ─▶ read_report ─▶ newest intent ─▶ motion ─▶ control payloads
 view payloads ─▶ receive_view ─▶ screen
 """
@@ -12,25 +13,23 @@ from common.command.live_view import LINK_LOST, LINK_REFUSED, LINK_UP
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.messages import Compensation, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, build_output_report
-from operator_side.feel.rendering import RenderingSettings, TriggerRendering
-from operator_side.feel.write_bound import WriteBound
+from operator_side.feel.blindness import Blindness, Sight
+from operator_side.feel.haptics import Haptics
+from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.standing import Standing
 
 STIFFNESS_EXPIRES_S = 0.2
-"""Triggers are released this long after the last stiffness that was received."""
+"""Triggers are released, and the hands move nothing, this long after the last stiffness that was received."""
 INTENT_EXPIRES_S = 0.1
 """Without a controller report for this long nothing is sent, so that the robot stops."""
 HEARTBEAT_PERIOD_S = 0.2
 """A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""
-_REMEMBERED_LEASES = 100
-NOTICE_EXPIRES_S = 0.5
-"""Without a notice for this long nobody knows whose lease it is."""
 
 
 class OperatorSide:
@@ -44,6 +43,7 @@ class OperatorSide:
         haptics: bool = True,
         calibration: TravelCalibration | None = None,
         rendering: RenderingSettings | None = None,
+        compensation: Compensation = "operator",
         swap_sides: bool = False,
         seed: int = 0,
         asymmetry_s: float = 0.0,
@@ -54,33 +54,37 @@ class OperatorSide:
         """The newest view of the robot; None before the first."""
         self.stiffness: StiffnessUpdate | None = None
         """The newest stiffness; None before the first and once it has expired."""
-        self.lease: LeaseNotice | None = None
-        """Where we stand with the robot side; None before the first notice and once it has expired."""
-        self.leases: list[str] = []
-        """Each standing that we had in turn, the latest ones."""
         self.rejected = 0
         self.other_version: str | None = None
         """What the robot side's messages said when they were of another version; None once they are not."""
         self.stiffness_received = 0
         self.motion_sent = 0
         self.applied_age = RunningStatistics(seed)
-        self._haptics = haptics
+        self._feels = haptics
         self._calibration = calibration or TravelCalibration()
+        self._compensation: Compensation = compensation
         self._swap_sides = swap_sides
-        self._rendering_settings = rendering or RenderingSettings()
+        self._haptics = Haptics(
+            rendering or RenderingSettings(),
+            self._calibration,
+            enabled=haptics,
+            swap_sides=swap_sides,
+            compensation=compensation,
+        )
+        self._blindness = Blindness()
+        self._standing = Standing()
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
         self._stiffness_s = 0.0
         self._hello_s = -math.inf
-        self._lease_s = 0.0
         self._screen_order = (-1, -1)
-        self.writes = 0
-        """Output reports that were made."""
-        self._rendering = self._new_rendering()
-        self._write_bound = WriteBound()
-        self._written: OutputReport | None = RELEASED
         self._lost_s: float | None = None
         self._has_been_armed = False
+
+    @property
+    def lease(self) -> LeaseNotice | None:
+        """Where we stand with the robot side; None before the first notice and once it has expired."""
+        return self._standing.lease
 
     @property
     def intent(self) -> OperatorIntent | None:
@@ -103,12 +107,16 @@ class OperatorSide:
         known_epoch = self.link.peer_epoch
         arrival = self.link.arrived(message, now_s)
         if self.link.peer_epoch != known_epoch:
-            self.lease = None  # it was another robot side's
+            self._standing.forget()
         if isinstance(message, LeaseNotice) and arrival.fresh:
-            self._follow_lease(message, now_s)
+            self._standing.follow(message, now_s)
+            if not self._standing.owns:
+                self._blindness.end()
         if isinstance(message, StiffnessUpdate):
             self.stiffness_received += 1
             if arrival.fresh:
+                self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
+                self._blindness.end()
                 self.stiffness, self._stiffness_s = message, now_s
                 self._has_been_armed |= message.state == "armed"
                 if arrival.one_way_s is not None:
@@ -140,20 +148,18 @@ class OperatorSide:
             return
         self._intent = operator_intent(state, self._calibration, swap_sides=self._swap_sides)
         self._intent_s = now_s
+        self._blindness.see_hands(released=self._intent.triggers_released)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Read the triggers and sticks of the controller that has just been found through `calibration`."""
         if calibration != self._calibration:
             self._calibration = calibration
-            self._rendering = self._new_rendering()
-
-    def _new_rendering(self) -> TriggerRendering:
-        return TriggerRendering(self._rendering_settings, self._calibration, swap_sides=self._swap_sides)
+            self._haptics.calibrate(calibration)
 
     def controller_found(self, now_s: float) -> None:
         """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
         del now_s
-        self._written = None if self._haptics else RELEASED
+        self._haptics.controller_found()
 
     def controller_lost(self, now_s: float) -> None:
         """The controller went: what the hands did last counts no more, and not again before the arm has stopped."""
@@ -161,11 +167,15 @@ class OperatorSide:
 
     def motion(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
-        if self.lease is not None and now_s - self._lease_s > NOTICE_EXPIRES_S:
-            self.lease = None
+        self._look(now_s)
+        self._standing.expire(now_s)
         linked = self.stiffness is not None and now_s - self._stiffness_s < 2 * HEARTBEAT_PERIOD_S
         payloads = []
         command = self._command(now_s)
+        if self._standing.owns:
+            self._haptics.commanded(command, now_s)
+        else:
+            self._haptics.forget_commands()
         if command is not None:
             self.motion_sent += 1
             payloads.append(encode(command))
@@ -176,13 +186,13 @@ class OperatorSide:
 
     def _command(self, now_s: float) -> MotionCommand | None:
         """What the hands do; None while there is no lease to send it under, or no controller."""
-        intent, lease = self._intent, self.lease
-        if intent is None or now_s - self._intent_s > INTENT_EXPIRES_S:
-            return None
-        if lease is None or lease.session not in OWNING:
+        intent, lease = self._present_intent(now_s), self.lease
+        if intent is None or lease is None or not self._standing.owns:
             return None
         if self._must_stop_first() and not intent.emergency_stop:
             return None
+        if self._blindness.holds:
+            intent = intent.resting()
         return MotionCommand(
             self.link.stamp(now_s),
             l2=intent.l2,
@@ -196,7 +206,18 @@ class OperatorSide:
             next_target=intent.next_target,
             hand_over=intent.hand_over,
             token=lease.token,
+            compensation=self._compensation,
         )
+
+    def _present_intent(self, now_s: float) -> OperatorIntent | None:
+        return None if now_s - self._intent_s > INTENT_EXPIRES_S else self._intent
+
+    def _look(self, now_s: float) -> None:
+        """Once the stiffness has expired there is none, and who drives is blind."""
+        if self.stiffness is not None and now_s - self._stiffness_s > STIFFNESS_EXPIRES_S:
+            self.stiffness = None
+            if self._standing.owns:
+                self._blindness.lose(now_s)
 
     def _must_stop_first(self) -> bool:
         """Whether the arm may still be armed from before the controller was lost: then silence disarms it."""
@@ -206,35 +227,20 @@ class OperatorSide:
             self._lost_s = None
         return self._lost_s is not None
 
-    def _follow_lease(self, notice: LeaseNotice, now_s: float) -> None:
-        standing = "owner" if notice.session in OWNING else str(notice.session)
-        if not self.leases or self.leases[-1] != standing:
-            self.leases = [*self.leases, standing][-_REMEMBERED_LEASES:]
-        self.lease, self._lease_s = notice, now_s
-
     def output_report(self, now_s: float) -> bytes | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait."""
-        if self.stiffness is not None and now_s - self._stiffness_s > STIFFNESS_EXPIRES_S:
-            self.stiffness = None
-        felt = self.stiffness if self._haptics else None
+        self._look(now_s)
+        felt, intent = self.stiffness, self._present_intent(now_s)
         if felt is not None and felt.state != "armed":
             felt = None
-        wanted = self._rendering.render(felt, now_s)
-        if wanted == self._written:
-            return None
-        before, shown = self._written, self._write_bound.next(self._written, wanted, now_s)
-        if shown is None:
-            return None
-        self._written, self.writes = shown, self.writes + 1
-        if before is None:
-            return build_output_report(shown)
-        return build_output_report(shown.change_from(before))
+        pulled = (0.0, 0.0) if intent is None else (intent.l2, intent.r2)
+        return self._haptics.output_report(felt, pulled, self._blindness, now_s)
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
         """What a person is shown; L2 and R2 are the controller's own, whatever the sides mean."""
         mean_s, lease, screen = self.link.delay.mean, self.lease, self.screen
-        felt = (None, None) if self.stiffness is None else (self.stiffness.l2, self.stiffness.r2)
-        intent = None if now_s - self._intent_s > INTENT_EXPIRES_S else self._intent
+        felt = (None, None) if self.stiffness is None else (self.stiffness.l2.stiffness, self.stiffness.r2.stiffness)
+        intent, sight = self._present_intent(now_s), self._blindness.sight
         pulled = (None, None) if intent is None else (intent.l2, intent.r2)
         order = -1 if self._swap_sides else 1
         (left, right), (left_pulled, right_pulled) = felt[::order], pulled[::order]
@@ -248,8 +254,9 @@ class OperatorSide:
             "R2": right,
             "L2_pulled": left_pulled,
             "R2_pulled": right_pulled,
-            "haptics": self._haptics,
-            "feel": f"L2 {self._rendering.l2.status()}, R2 {self._rendering.r2.status()}",
+            "haptics": self._feels,
+            "feel": self._haptics.status() if sight is Sight.SEEING else sight,
+            "release_first": sight is Sight.WAITING,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
         if screen is not None and values["link"] == LINK_UP:
@@ -283,8 +290,9 @@ class OperatorSide:
                 "rejected": self.rejected,
                 "stale": self.link.stale,
             },
-            "lease_states": self.leases,
-            "rendering": self._rendering.summary() | {"writes": self.writes},
+            "lease_states": self._standing.history,
+            "zones": self._haptics.rendering.zones(),
+            "rendering": self._haptics.summary() | {"blind": self._blindness.times},
             "delay_ms": {
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),

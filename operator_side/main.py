@@ -60,6 +60,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         haptics=settings.haptics,
         calibration=settings.calibration,
         rendering=settings.rendering,
+        compensation=settings.compensation,
         swap_sides=settings.swap_sides,
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),

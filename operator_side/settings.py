@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from common.command.run_options import RunOptions
+from common.protocol.messages import Compensation
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.person import PersonSettings
@@ -37,13 +38,15 @@ class OperatorSettings(RunOptions):
     """A real controller, which is waited for while it is not there, or a simulated one with a scripted person."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
+    compensation: Compensation = "operator"
+    """Who reckons with the delay: this side, by its own commands still under way, or the robot side, by eq. 8."""
     swap_sides: bool = False
     """Left and right swapped: L2 advances and R2 retreats, R1 is held to run, the right stick moves across and the left
     one turns."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
     """Which part of the triggers' and sticks' travel counts."""
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
-    """How stiffness becomes what the fingers feel."""
+    """How what lies ahead becomes what the fingers feel."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
 

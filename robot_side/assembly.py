@@ -2,23 +2,22 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
-from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
-from robot_side.arm.port import Arm, ArmState
+from robot_side.ahead.law import Law
+from robot_side.ahead.paper_law import PaperLaw
+from robot_side.ahead.swept_law import SweptLaw
+from robot_side.arm.port import Arm
 from robot_side.core import RobotSide
-from robot_side.enlargement.distance import Enlargement
-from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.figures import RunFigures
 from robot_side.objects.perceived import Role
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
-from robot_side.sensing import AheadSensing
 from robot_side.settings import RobotSettings
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import MujocoCamera
@@ -28,10 +27,7 @@ from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
-from robot_side.stiffness.map import StiffnessMap
-from robot_side.stiffness.predicted_contact import ContactPredictor
 
-_SAMPLED_CONFIGURATIONS = 256
 _NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
 
@@ -54,56 +50,56 @@ def build_robot_side(
     clock_domain: str,
     watch: Callable[[Arm], Arm] | None = None,
     scene: Scene | None = None,
+    other_law: Callable[[Law], Law] | None = None,
 ) -> RobotSide:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
-    that the settings name, so that the caller can look at it.
+    that the settings name, so that the caller can look at it. `other_law`: makes another law of the settings' own.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
     scene = scene or load_scene(settings.model, settings.site, settings.roles)
-    noise, camera_noise, samples = np.random.SeedSequence(settings.seed).generate_state(3)
+    noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
     arm = MujocoArm(scene, encoder, limits)
-    kinematics = MujocoKinematics(scene, settings.spheres)
+    kinematics = MujocoKinematics(scene, settings.cover_m)
     camera = MujocoCamera(
         scene,
         CameraError(
             tuple(thing.name for thing in scene.objects),
-            settings.camera.mean_m,
+            settings.camera.mean_vector_m,
             settings.camera.sd_m,
             settings.camera.frame_sd_m,
             int(camera_noise),
         ),
     )
-    encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
-    sampled = None
-    if settings.enlargement.mode == "once":
-        sampled = _sampled_covariances(scene, arm, kinematics, encoder_sigma_rad, int(samples))
+    joint_limits = limits.of_joints(arm.joint_count)
+    prediction, prediction_note = _prediction_errors(settings, scene)
+    law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(
+        settings.uncertainty(prediction),
+        np.full(arm.joint_count, encoder.standard_deviation_rad()),
+        joint_limits,
+        settings.motion,
+    )
     return RobotSide(
         arm if watch is None else watch(arm),
         kinematics,
         camera,
-        AheadSensing(
-            Enlargement(settings.enlargement_settings(), sampled),
-            StiffnessMap(settings.stiffness),
-            encoder_sigma_rad,
-        ),
+        law if other_law is None else other_law(law),
         OperatorSession(
             lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
             Safety(settings.safety),
             settings.seed,
         ),
         LoopAge(settings.assumed_delay_s),
-        np.full(arm.joint_count, limits.velocity_rad_s),
+        joint_limits,
         settings.motion,
-        ContactPredictor(settings.contact, settings.motion.trigger_speed_m_s),
         SimulationObserver(scene),
         settings.seed,
-        _notes(scene),
+        (*_notes(scene), *prediction_note),
     )
 
 
@@ -142,22 +138,16 @@ def _roles(roles: Mapping[str, Role]) -> str:
     return "; ".join(shown) or "none"
 
 
-def _sampled_covariances(
-    scene: Scene, arm: MujocoArm, kinematics: MujocoKinematics, encoder_sigma_rad: FloatArray, seed: int
-) -> FloatArray:
-    """Σ_ee (k, m, 3, 3) of every gripper sphere in configurations all over the joints' ranges."""
-    generator = np.random.default_rng(seed)
-    # A joint without limits is sampled over one turn.
-    lower = np.where(np.isfinite(scene.robot.lower_rad), scene.robot.lower_rad, -np.pi)
-    upper = np.where(np.isfinite(scene.robot.upper_rad), scene.robot.upper_rad, np.pi)
-    present: ArmState = arm.state(0.0)
-    configurations = generator.uniform(lower, upper, (_SAMPLED_CONFIGURATIONS, arm.joint_count))
-    return np.stack(
-        [
-            position_covariance(
-                kinematics.pose(replace(present, joint_positions_rad=configuration)).sphere_jacobians,
-                encoder_sigma_rad,
-            )
-            for configuration in configurations
-        ]
+def _prediction_errors(settings: RobotSettings, scene: Scene) -> tuple[PredictionErrors, tuple[str, ...]]:
+    """The table that holds for this arm, and what a person should know about it."""
+    if settings.prediction_errors is not None:
+        return load_prediction_errors(settings.prediction_errors), ()
+    built_in = load_prediction_errors(BUILT_IN)
+    if built_in.arm == scene.robot.fingerprint:
+        return built_in, ()
+    note = (
+        "what the prediction of the commands under way misses on this arm has not been measured: a fifth of the way"
+        " that full speed goes in the loop age is added (to measure it: feelahead bench error --table FILE.toml, then"
+        " --prediction-errors FILE.toml)"
     )
+    return PredictionErrors(), (note,)

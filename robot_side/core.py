@@ -1,7 +1,7 @@
 """The robot side without I/O: payloads in, payloads out, and `now` with every call.
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-arm ─▶ kinematics ─▶ sensing of what is ahead ─▶ stiffness, telemetry ─▶ payloads
+arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemetry ─▶ payloads
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,8 @@ from common.arrays import FloatArray
 from common.command.live_view import LINK_LOST, LINK_UP
 from common.statistics import RunningStatistics
 from common.timing.ages import LoopAge
+from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
@@ -24,8 +26,6 @@ from robot_side.objects.target import next_target, object_centers, target_index
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
-from robot_side.sensing import AheadSensing, Sensed
-from robot_side.stiffness.predicted_contact import Contact, ContactPredictor
 
 TELEMETRY_PERIOD_S = 0.02
 OBSERVER_PERIOD_S = 0.02
@@ -51,12 +51,11 @@ class RobotSide:
         arm: Arm,
         kinematics: GripperKinematics,
         camera: ObjectSource,
-        sensing: AheadSensing,
+        law: Law,
         session: OperatorSession,
         loop_age: LoopAge,
-        velocity_limits_rad_s: FloatArray,
+        limits: JointLimits,
         motion: ToolMotionSettings,
-        contact: ContactPredictor,
         observer: Observer | None = None,
         seed: int = 0,
         notes: Sequence[str] = (),
@@ -69,15 +68,12 @@ class RobotSide:
         self._arm = arm
         self._kinematics = kinematics
         self._camera = camera
-        self._sensing = sensing
+        self._law = law
         self._loop_age = loop_age
-        self._velocity_limits_rad_s = velocity_limits_rad_s
+        self._limits = limits
         self._motion = motion
-        self._contact = contact
         self._observer = observer
         self._start_s: float | None = None
-        self._was_armed = False
-        self._was_carrying = False
         self._held: HeldObject | None = None
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
@@ -118,30 +114,27 @@ class RobotSide:
         self._follow_target(objects, pose)
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
-        loop_age_s = self._loop_age.value(now_s)
-        sensed = self._sensing.sense(
-            whole,
-            state.joint_velocities_rad_s,
-            objects,
-            loop_age_s,
-            state.gripper_opening_m if pose.sphere_on_finger.any() else None,
-            None if self._held is None else self._held.index,
-            now_s,
-        )
         permission = self.session.permission(now_s)
         self._move(permission, pose, now_s)
-        armed = permission.state == "armed"
-        carrying = self._held is not None
-        if (armed and not self._was_armed) or carrying != self._was_carrying:
-            # What the gripper carries changes its shape: the support counts anew from there.
-            self._sensing.stiffness_map.set_support_baseline()
-        self._was_armed, self._was_carrying = armed, carrying
-        target = target_index(objects) if armed and not carrying else None
-        contact = self._contact.predict(whole, objects, target, loop_age_s, now_s)
+        command = permission.command
+        sensed = self._law.sense(
+            Situation(
+                pose=whole,
+                joint_velocities_rad_s=state.joint_velocities_rad_s,
+                objects=objects,
+                loop_age_s=self._loop_age.value(now_s),
+                loop_age_known=self._loop_age.known,
+                compensation="operator" if command is None else command.compensation,
+                gap_m=state.gripper_opening_m if pose.sphere_on_finger.any() else None,
+                held=None if self._held is None else self._held.index,
+                lateral=(0.0, 0.0) if command is None else command.lateral,
+            ),
+            now_s,
+        )
         self._last = sensed, whole, objects
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
-        self._record(sensed, objects, speed_m_s, armed, now_s)
-        return self._outgoing(permission, pose, objects, state, sensed, contact, speed_m_s, now_s)
+        self._record(sensed, objects, speed_m_s, permission.state == "armed", now_s)
+        return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
 
     def _perceive(self, now_s: float) -> PerceivedObjects:
         objects = self._camera.perceive(now_s)
@@ -182,7 +175,7 @@ class RobotSide:
             self._arm.command_gripper(0.0, now_s)
             return
         twist = tool_twist(command, pose.tool_rotation, self._motion)
-        velocity = joint_velocities(pose.tool_jacobian, twist, self._velocity_limits_rad_s)
+        velocity = joint_velocities(pose.tool_jacobian, twist, self._limits.velocity_rad_s)
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
@@ -202,19 +195,17 @@ class RobotSide:
         objects: PerceivedObjects,
         state: ArmState,
         sensed: Sensed,
-        contact: Contact,
         speed_m_s: float,
         now_s: float,
     ) -> list[Outgoing]:
         outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in self.session.take_answers(now_s)]
-        stiffness = sensed.stiffness
         if (owner := self.session.owner(now_s)) is not None:
             self.stiffness_sent += 1
-            outgoing.append(stiffness_message(owner, stiffness, contact, permission.state))
+            outgoing.append(stiffness_message(owner, sensed, permission.state))
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             observers = self.session.observers(now_s)
-            outgoing += [stiffness_message(one, stiffness, contact, permission.state) for one in observers]
+            outgoing += [stiffness_message(one, sensed, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
             outgoing.append(
@@ -258,9 +249,9 @@ class RobotSide:
             target, held = target_index(objects), None if self._held is None else self._held.index
             apart = perceived_distances(pose, objects, target, held)
             values |= {
-                "L2": sensed.stiffness.l2,
-                "R2": sensed.stiffness.r2,
-                "enlargement_mm": 1e3 * float(sensed.enlargement_m.max()),
+                "L2": sensed.l2.stiffness,
+                "R2": sensed.r2.stiffness,
+                "enlargement_mm": 1e3 * sensed.enlargement_m,
                 "holding": "nothing" if self._held is None else self._held.name[:SHOWN_NAME],
                 "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
                 "nearest_mm": _millimetres(apart.nearest_m),
@@ -274,7 +265,7 @@ class RobotSide:
         start_s = self._start_s or 0.0
         stops = [{"time_s": when_s - start_s, "reason": reason} for when_s, reason in self.session.safety.stops]
         return self.figures.summary() | {
-            "skipped": vars(self._sensing.skipped) | {"contact_out_of_reach": self._contact.out_of_reach},
+            "skipped": self._law.summary(),
             "messages": {
                 "stiffness_sent": self.stiffness_sent,
                 "motion_received": self.session.motion_received,

@@ -8,8 +8,8 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.statistics import RunningStatistics
+from robot_side.ahead.law import Sensed
 from robot_side.objects.perceived import Role
-from robot_side.sensing import Sensed
 
 if TYPE_CHECKING:
     from robot_side.simulation.ground_truth import Truth
@@ -44,13 +44,12 @@ class RunFigures:
     def tick(self, sensed: Sensed, tool_speed_m_s: float) -> None:
         """One tick's enlargement, overlap and stiffness."""
         self.ticks += 1
-        largest_m = float(sensed.enlargement_m.max())
-        self._enlargement.add(largest_m)
+        self._enlargement.add(sensed.enlargement_m)
         if tool_speed_m_s > MOVING_M_S:
-            self._enlargement_moving.add(largest_m)
+            self._enlargement_moving.add(sensed.enlargement_m)
         self._overlap.add(sensed.overlap_m3)
-        self._l2.add(sensed.stiffness.l2)
-        self._r2.add(sensed.stiffness.r2)
+        self._l2.add(sensed.l2.stiffness)
+        self._r2.add(sensed.r2.stiffness)
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""

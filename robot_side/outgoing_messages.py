@@ -8,11 +8,9 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
+from robot_side.ahead.law import Sensed
 from robot_side.arm.port import GripperPose
 from robot_side.operators.operator_session import Receiver
-from robot_side.sensing import Sensed
-from robot_side.stiffness.map import Stiffness
-from robot_side.stiffness.predicted_contact import Contact
 
 OutgoingStream = Literal["haptics", "telemetry"]
 
@@ -31,16 +29,16 @@ class Outgoing:
     payload: bytes
 
 
-def stiffness_message(receiver: Receiver, stiffness: Stiffness, contact: Contact, state: MotionState) -> Outgoing:
+def stiffness_message(receiver: Receiver, sensed: Sensed, state: MotionState) -> Outgoing:
     """What `receiver` is to feel."""
     update = StiffnessUpdate(
         receiver.header,
-        l2=stiffness.l2,
-        r2=stiffness.r2,
-        rumble=stiffness.rumble,
+        l2=sensed.l2,
+        r2=sensed.r2,
+        speed_m_s=sensed.speed_m_s,
+        horizon_m=sensed.horizon_m,
+        rumble=sensed.rumble,
         state=state,
-        l2_contact=contact[0],
-        r2_contact=contact[1],
     )
     return Outgoing("haptics", receiver.peer, encode(update))
 
@@ -70,9 +68,9 @@ def telemetry_message(
         up_in_tool=_vector3(pose.tool_rotation[2]),
         gripper_opening_m=max(0.0, gripper_opening_m),
         holding=holding,
-        enlargement_m=min(float(sensed.enlargement_m.max()), _LARGEST_M),
-        l2=sensed.stiffness.l2,
-        r2=sensed.stiffness.r2,
+        enlargement_m=min(sensed.enlargement_m, _LARGEST_M),
+        l2=sensed.l2.stiffness,
+        r2=sensed.r2.stiffness,
     )
     return Outgoing("telemetry", b"", encode(view))
 

@@ -3,18 +3,17 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
 from common.command.run_options import RunOptions
+from robot_side.ahead.law import LawName
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.enlargement.distance import EnlargementSettings
-from robot_side.enlargement.kinematic_error import VarianceMeasure
+from robot_side.enlargement.distance import Uncertainty, Vector3
+from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
 from robot_side.operators.safety import SafetySettings
-from robot_side.stiffness.map import StiffnessSettings
-from robot_side.stiffness.predicted_contact import ContactSettings
 
 
 def _require(name: str, value: float, low: float, high: float) -> None:
@@ -40,32 +39,23 @@ class EncoderSettings:
 class CameraSettings:
     """The camera's error of each perceived position, per axis (eq. 1-2); the enlargement knows these figures."""
 
-    mean_m: float = 0.0
+    mean_m: float | Vector3 = 0.0
+    """μ_c, true minus perceived, of every axis of the world or of each."""
     sd_m: float = 0.003
     """Drawn once for each object: 3 mm is a depth camera at half a metre (assumed)."""
     frame_sd_m: float = 0.0
     """Drawn anew in each frame, on top."""
 
     def __post_init__(self) -> None:
-        _require("mean_m", self.mean_m, -1.0, 1.0)
+        for mean_m in self.mean_vector_m:
+            _require("mean_m", mean_m, -1.0, 1.0)
         _require("sd_m", self.sd_m, 0.0, 1.0)
         _require("frame_sd_m", self.frame_sd_m, 0.0, 1.0)
 
-
-@dataclass(frozen=True)
-class EnlargementOptions:
-    """How the enlargement is worked out (eq. 8-10)."""
-
-    kinematic_mean_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """μ_ee, the mean error of the forward kinematics in the world frame."""
-    measure: VarianceMeasure = "isotropic"
-    """One variance from Σ: its largest eigenvalue, or the paper's trace."""
-    mode: Literal["once", "per_configuration"] = "per_configuration"
-    """`once` takes the largest over sampled configurations, as the paper does."""
-    direction: Literal["isotropic", "towards_object"] = "isotropic"
-    """One distance a sphere (the paper), or one for each sphere and object."""
-    fixed_m: float | None = None
-    """A fixed enlargement in place of eq. 8-10, to compare with."""
+    @property
+    def mean_vector_m(self) -> Vector3:
+        """μ_c along each axis."""
+        return self.mean_m if isinstance(self.mean_m, tuple) else (self.mean_m,) * 3
 
 
 @dataclass(frozen=True)
@@ -93,40 +83,41 @@ class RobotSettings(RunOptions):
     keyframe, else in the middle of its joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
-    spheres: int = 16
-    """How many spheres cover the gripper."""
+    law: LawName = "swept"
+    """How what is ahead is felt. swept: in time to let go, along each trigger. paper: the paper's plain law, to compare
+    with."""
+    cover_m: float = 0.003
+    """How far the spheres that cover the gripper may stand out of it: fewer of them for more."""
+    prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """What the prediction of the commands under way misses on this arm, from: feelahead bench error --table FILE.toml.
+    Known for the built-in arm; without it a fifth of the way that full speed goes in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
     assumed_delay_s: float = 1.0
-    """The loop age that eq. 8 takes while none has been measured."""
+    """The loop age that is reckoned with while none has been measured."""
+    kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
+    """μ_ee, the mean error of the forward kinematics in the world frame, true minus estimated."""
     roles: Annotated[dict[str, Role], tyro.conf.Suppress] = field(default_factory=dict)
     """TOML only: [roles] name = "obstacle", "target", "support" or "ignored"; else the names tell."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
-    enlargement: EnlargementOptions = field(default_factory=EnlargementOptions)
-    stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
-    contact: ContactSettings = field(default_factory=ContactSettings)
     motion: ToolMotionSettings = field(default_factory=ToolMotionSettings)
     safety: SafetySettings = field(default_factory=SafetySettings)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 1 <= self.spheres <= 1000:
-            raise ValueError(f"--spheres {self.spheres}: valid: 1 to 1000")
+        _require("cover_m", self.cover_m, 0.0005, 0.05)
         if self.keys is not None and self.insecure:
             raise ValueError("--insecure with --keys: valid: one of them, as keys already say who may come in")
         _require("assumed_delay_s", self.assumed_delay_s, 0.001, 60.0)
-        self.enlargement_settings()
+        self.uncertainty(PredictionErrors())
 
-    def enlargement_settings(self) -> EnlargementSettings:
+    def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:
         """What eq. 10 is computed from; ConfigurationError for a probability outside (0, 1)."""
-        return EnlargementSettings(
+        return Uncertainty(
             probability=self.probability,
-            camera_mean_m=self.camera.mean_m,
+            camera_mean_m=self.camera.mean_vector_m,
             camera_sd_m=math.hypot(self.camera.sd_m, self.camera.frame_sd_m),
-            kinematic_mean_m=self.enlargement.kinematic_mean_m,
-            measure=self.enlargement.measure,
-            mode=self.enlargement.mode,
-            direction=self.enlargement.direction,
-            fixed_m=self.enlargement.fixed_m,
+            kinematic_mean_m=self.kinematic_mean_m,
+            prediction=prediction,
         )

@@ -96,8 +96,12 @@ def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
             return word, link.removeprefix(beginning), True
     if state == "stopped":
         return "STOPPED", because, True
-    if controller == "lost":
-        return "CONTROLLER LOST", None, True
+    for word, so in (
+        ("CONTROLLER LOST", controller == "lost"),
+        ("RELEASE BOTH TRIGGERS", state == "armed" and values.get("release_first") is True),
+    ):
+        if so:
+            return word, None, True
     if state == "disarmed" and because is not None:
         return "DISARMED", because, True
     if link not in (None, LINK_UP):

@@ -12,10 +12,11 @@ import msgspec
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.messages import AnyMessage, Message
 
-PROTOCOL_VERSION = 3
-"""2: the lease, with its token in every command. 3: predicted contact in each stiffness."""
+PROTOCOL_VERSION = 4
+"""2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
+each trigger in place of stiffness and contact, and in each command who reckons with the delay."""
 MAXIMUM_BYTES = 4096
-"""The largest message is a tenth of this; a longer payload is not looked into."""
+"""The largest message is an eighth of this; a longer payload is not looked into."""
 
 
 def encode(message: Message) -> bytes:

@@ -8,6 +8,7 @@ A field out of range or not finite makes the whole message invalid: nothing of i
 """
 
 import math
+from itertools import pairwise
 from typing import Literal
 
 import msgspec
@@ -18,8 +19,13 @@ Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
 MotionState = Literal["disarmed", "armed", "stopped"]
+Ways = tuple[float, float, float, float, float, float, float, float]
+Compensation = Literal["operator", "robot"]
+"""Who reckons with the delay: the operator side by its own commands under way, or the robot side by eq. 8."""
 
 _LARGEST = 2**63 - 1
+_FARTHEST_M = 100.0
+_SLOWEST = 1e-6
 _LONGEST_REASON = 200
 
 
@@ -110,6 +116,8 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     """The button that passes the lease on to whoever has waited longest is down."""
     token: int = 0
     """The fencing token of the lease under which it was sent; none is 0."""
+    compensation: Compensation = "operator"
+    """Whose prediction of the delay's displacement is felt: eq. 10 takes that one's errors."""
 
     def __post_init__(self) -> None:
         _in_range("l2", 0.0, 1.0, self.l2)
@@ -141,25 +149,51 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
         _in_range("place", 0, 1000, self.place)
 
 
-class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
-    """What the operator's fingers are to feel (§4.2)."""
+class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What lies ahead along one trigger: how far the gripper may go before each of eight strengths is due (§4.2)."""
 
-    l2: float
-    r2: float
-    rumble: float
-    """Danger that lies along neither trigger, 0 to 1."""
-    state: MotionState
-    l2_contact: float | None = None
-    """The calibrated travel, 0 to 1, from which on the left trigger leads to contact; None: to none that is near."""
-    r2_contact: float | None = None
+    fast_m: Ways
+    """The ways from here, never falling, at which strengths 1 to 8 begin; `horizon_m` for those beyond it. Below 0: the
+    gripper is past it."""
+    slow_m: Ways
+    """The same for zones so slow that what is to be touched may be touched."""
+    full_speed_m_s: float
+    """v_max: what a fully pulled trigger commands in this pose."""
+    acceleration_m_s2: float
+    """a: the least that the joints give along the trigger's direction in this pose."""
+    displacement_m: float
+    """δ by the robot side, along the trigger: v t_d (eq. 8); v_max t_d while it does not know what is under way."""
+    stiffness: float
+    """s(δ) of the fast list, 0 to 1."""
 
     def __post_init__(self) -> None:
-        _in_range("l2", 0.0, 1.0, self.l2)
-        _in_range("r2", 0.0, 1.0, self.r2)
+        for name, ways in (("fast_m", self.fast_m), ("slow_m", self.slow_m)):
+            _in_range(name, -_FARTHEST_M, _FARTHEST_M, *ways)
+            if any(after < before for before, after in pairwise(ways)):
+                raise ValueError(f"{name} = {ways}; valid: eight ways, none shorter than the one before")
+        _in_range("full_speed_m_s", _SLOWEST, _FARTHEST_M, self.full_speed_m_s)
+        _in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
+        _in_range("displacement_m", -_FARTHEST_M, _FARTHEST_M, self.displacement_m)
+        _in_range("stiffness", 0.0, 1.0, self.stiffness)
+
+
+class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
+    """What the operator's fingers are to feel (§4.2): fields that the operator side renders over the travel."""
+
+    l2: TriggerField
+    r2: TriggerField
+    speed_m_s: float
+    """v of the gripper along the direction in which R2 advances."""
+    horizon_m: float
+    """So far both fields look ahead; what is beyond is not known."""
+    rumble: float
+    """Danger where the stick leads, in eighths, 0 to 1; 0 while the stick rests."""
+    state: MotionState
+
+    def __post_init__(self) -> None:
+        _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)
+        _in_range("horizon_m", 0.0, _FARTHEST_M, self.horizon_m)
         _in_range("rumble", 0.0, 1.0, self.rumble)
-        for name, travel in (("l2_contact", self.l2_contact), ("r2_contact", self.r2_contact)):
-            if travel is not None:
-                _in_range(name, 0.0, 1.0, travel)
 
 
 class Telemetry(Message, frozen=True, tag="telemetry"):

@@ -43,6 +43,11 @@ class LoopAge:
         self._quantile.clear()
         self._held_s = self._worst_case_s
 
+    @property
+    def known(self) -> bool:
+        """Whether a sample has been taken in since the start or the last reset."""
+        return self._quantile.value is not None
+
     def value(self, now_s: float) -> float:
         """The delay to reckon with at `now_s`, in seconds; never 0 for want of samples."""
         quantile_s = self._quantile.value

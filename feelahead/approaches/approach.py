@@ -3,13 +3,16 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
+from common.reaction import REACTION_S
 from feelahead.approaches.arming import wait_for_pull
-from feelahead.approaches.laws import Compensation, Law, stiffness_settings
+from feelahead.approaches.laws import Law, compensation_of, law_of_robot
+from feelahead.approaches.margin_law import MarginLaw
 from feelahead.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.approaches.pulling_hands import PullingHands
 from feelahead.approaches.pulls import Pull, constant_force
@@ -18,13 +21,10 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
-from robot_side.settings import EnlargementOptions, RobotSettings
+from robot_side.settings import RobotSettings
 from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
-
-REACTION_S = 0.25
-"""What a person needs from feeling to letting go (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,7 @@ class Approach:
     """The force that the strongest effect adds (an assumption: no trigger has been measured)."""
     link: str = ""
     link_model: LinkModel = "datagram"
-    law: Law = "first"
-    compensation: Compensation = "robot"
+    law: Law = "swept"
     probability: float = 0.99
     duration_s: float = 8.0
     """From the beginning of the pull."""
@@ -47,7 +46,7 @@ class Approach:
     grip: bool = False
     spoil: Spoil = "nothing"
     margin_m: float | None = None
-    """The fixed enlargement of the law `margin`."""
+    """The distance of the law `margin`."""
 
 
 class PullRun:
@@ -71,7 +70,11 @@ class PullRun:
         self.samples = Samples()
         robot = robot_settings(approach)
         operator = OperatorSettings(
-            link=approach.link, link_model=approach.link_model, seed=approach.seed, haptics=approach.law != "none"
+            link=approach.link,
+            link_model=approach.link_model,
+            seed=approach.seed,
+            haptics=approach.law != "none",
+            compensation=compensation_of(approach.law),
         )
         scene = load_scene(robot.model, robot.site, robot.roles)
         if shift_m is not None:
@@ -85,6 +88,7 @@ class PullRun:
             device=device,
             person=lambda _: self.hands,
             after_robot_tick=self._after_robot_tick,
+            other_law=partial(MarginLaw, margin_m=approach.margin_m or 0.0) if approach.law == "margin" else None,
         )
         self._scene = scene
         self._lets_go = lets_go
@@ -145,8 +149,7 @@ def robot_settings(approach: Approach) -> RobotSettings:
         link_model=approach.link_model,
         seed=approach.seed,
         probability=approach.probability,
-        stiffness=stiffness_settings(approach.law),
-        enlargement=EnlargementOptions(fixed_m=approach.margin_m if approach.law == "margin" else None),
+        law=law_of_robot(approach.law),
     )
 
 

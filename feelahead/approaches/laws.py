@@ -2,17 +2,32 @@
 
 from typing import Final, Literal, get_args
 
-from robot_side.stiffness.map import StiffnessSettings
+from common.protocol.messages import Compensation
+from robot_side.ahead.law import LawName
 
-Law = Literal["first", "paper", "margin", "none", "full"]
-"""first: stiffness by direction, 1 where a plane would be touched (README's). paper: the plain one of §4.2, the total
-overlap over a fixed share of the enlarged gripper. margin: the first one with a fixed enlargement. none: no haptics.
-full: always the strongest effect on both triggers, whatever is ahead."""
+Law = Literal["swept", "swept_robot", "paper", "margin", "none", "full"]
+"""swept: ways along each trigger, rendered over its travel (docs/feel.md), with the commands under way as the operator
+side knows them. swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the plain law (§4.2),
+the total overlap over a fixed share of the enlarged gripper. margin: the ways of swept, felt within a fixed distance at
+every speed. none: no haptics. full: always the strongest effect on both triggers, whatever is ahead."""
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
-Compensation = Literal["robot", "operator"]
-"""Who reckons with the delay: the robot side by eq. 8, or the operator side by the commands that are under way."""
 
 
-def stiffness_settings(law: Law) -> StiffnessSettings:
-    """The robot side's settings of a law."""
-    return StiffnessSettings(mode="total", reference="fraction") if law == "paper" else StiffnessSettings()
+def with_compensation(law: Law, compensation: Compensation) -> Law:
+    """`law`, with the delay reckoned by that side; of all laws only swept leaves the choice."""
+    return "swept_robot" if law == "swept" and compensation == "robot" else law
+
+
+def without_compensation(law: Law) -> str:
+    """What --law calls it."""
+    return "swept" if law == "swept_robot" else law
+
+
+def compensation_of(law: Law) -> Compensation:
+    """Whose reckoning of the delay is felt."""
+    return "robot" if law in ("swept_robot", "paper") else "operator"
+
+
+def law_of_robot(law: Law) -> LawName:
+    """What the robot side is set to."""
+    return "paper" if law == "paper" else "swept"

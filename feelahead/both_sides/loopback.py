@@ -22,6 +22,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
+from robot_side.ahead.law import Law
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
@@ -63,19 +64,24 @@ class Loopback:
         device: SimulatedDualSense | None = None,
         person: Callable[[SimulatedDualSense], Person] | None = None,
         after_robot_tick: Callable[[float], None] | None = None,
+        other_law: Callable[[Law], Law] | None = None,
     ) -> None:
         """`scene`: instead of the one that the settings name; `person`: instead of the scripted one.
 
+        other_law: makes another law of the one that the settings name.
         after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
         """
         self.clock = VirtualClock()
-        self.robot: RobotSide = build_robot_side(settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK, scene=scene)
+        self.robot: RobotSide = build_robot_side(
+            settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK, scene=scene, other_law=other_law
+        )
         # After the scene, which decides what kernels there are.
         warm_up()
         self.operator = OperatorSide(
             2,
             _VIRTUAL_CLOCK,
             haptics=settings.operator.haptics,
+            compensation=settings.operator.compensation,
             calibration=settings.operator.calibration,
             rendering=settings.operator.rendering,
             swap_sides=settings.operator.swap_sides,

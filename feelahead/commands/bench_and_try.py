@@ -110,6 +110,12 @@ try_out = Menu(
             "a finger of constant force pulls the gripper towards things: does it hit them, and how fast",
             "pip install 'feelahead[robot,operator,bench]'",
         ),
+        "field": Entry(
+            "feelahead.experiments.field.command",
+            "try_field",
+            "how far from things each strength begins, and what a look ahead costs",
+            "pip install 'feelahead[robot,bench]'",
+        ),
         "haptics": Entry(
             "feelahead.experiments.haptics_on_off",
             "try_haptics",

@@ -7,7 +7,6 @@ from rich.text import Text
 
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.feel.force_profiles import force_profiles
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _BAR = 40
@@ -40,10 +39,9 @@ def calibration_lines(calibration: TravelCalibration) -> list[str]:
 
 
 def _trigger_line(name: str, trigger: TriggerTravel) -> str:
-    profiles = force_profiles(trigger.reachable_zones)
     return (
         f"{name:<12} released to {trigger.dead_zone:.3f}, full from {trigger.saturation:.3f}; a full pull reaches"
-        f" {profiles.reachable_zones} of 10 zones, in which {profiles.distinct_levels} of 81 levels differ"
+        f" {trigger.reachable_zones} of 10 zones"
     )
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -19,6 +19,7 @@ from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
+from common.protocol.messages import Compensation
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
 
@@ -50,6 +51,10 @@ class DemoSettings(RunOptions):
     """How long to run from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    law: Literal["swept", "paper"] = "swept"
+    """How what is ahead is felt: in time to let go, along each trigger; or by the paper's plain law."""
+    compensation: Compensation = "operator"
+    """Who reckons with the delay: the operator side by the commands under way, or the robot side by v t_d (eq. 8)."""
     haptics: bool = True
     """Whether the triggers are stiffened; without, the same person sees only."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
@@ -142,7 +147,7 @@ def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Pa
     arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     if settings.robot_config is not None:
         arguments.append(f"--config={settings.robot_config}")
-    for name in ("model", "site", "probability"):
+    for name in ("model", "site", "probability", "law"):
         if name in given:
             arguments.append(f"--{name}={getattr(settings, name)}")
     return arguments
@@ -155,6 +160,8 @@ def _operator_arguments(
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
+    if "compensation" in given:
+        arguments.append(f"--compensation={settings.compensation}")
     if "haptics" in given:
         arguments.append("--haptics" if settings.haptics else "--no-haptics")
     return arguments

@@ -1,1 +1,1 @@
-"""What the fingers get: stiffness becomes trigger effects."""
+"""What the fingers get: what lies ahead becomes trigger effects."""

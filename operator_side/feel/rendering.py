@@ -1,149 +1,143 @@
-"""What both triggers and the motors have to feel like now: stiffness, contact and time to effects.
+"""From the field ahead to what both triggers and the motors do.
 
-stiffness ─▶ band ─▶ level ─▶ limit on sustained force ─▶ profile ─▶ detent at contact ─▶ effect
+field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ effects
 """
 
-from dataclasses import dataclass, field
-from typing import Any
+import math
+from dataclasses import dataclass
+from typing import Any, Final
 
-from common.protocol.messages import StiffnessUpdate
-from operator_side.dualsense.effects.official import ZONE_COUNT, TriggerEffect
+from common.protocol.messages import StiffnessUpdate, TriggerField
+from common.reaction import HORIZON_S
+from operator_side.dualsense.effects.official import (
+    MAX_STRENGTH,
+    ZONE_COUNT,
+    MultiPositionFeedback,
+    Off,
+    TriggerEffect,
+)
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.dualsense.reports.output_report import OutputReport, Rumble
-from operator_side.feel.bands import Band, BandSettings
-from operator_side.feel.contact_detent import DetentSelector, with_detent
-from operator_side.feel.force_profiles import force_profiles
-from operator_side.feel.level import LevelSelector
-from operator_side.feel.sustained_force import SustainedForceLimit, SustainedForceSettings
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
+from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
-_RUMBLE_STEPS = 8
-"""Coarse steps: a motor needs no more, and each is a write."""
+FALL_S: Final = 0.1
+"""From full strength to none, unless the trigger is released."""
+_FREE: Final = (0,) * ZONE_COUNT
+_ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True)
 class RenderingSettings:
-    """How stiffness becomes what a finger feels."""
+    """How what lies ahead becomes what a finger feels."""
 
-    bands: BandSettings = field(default_factory=BandSettings)
-    sustained: SustainedForceSettings = field(default_factory=SustainedForceSettings)
-    detent: bool = True
-    """A bump in the travel where the gripper would touch."""
+    horizon_s: float = HORIZON_S
+    """h: so long a speed goes on before anything felt can change it (reaction, the finger's way, a write)."""
 
     def __post_init__(self) -> None:
-        if not self.bands.marked:
-            return
-        lowered = ZONE_COUNT * self.sustained.sustainable_strength
-        near = self.bands.exact_level(self.bands.danger, Band.NEAR)
-        if lowered <= near:
-            raise ValueError(
-                f"sustained.sustainable_strength = {self.sustained.sustainable_strength} with bands.danger ="
-                f" {self.bands.danger}; valid: above {near / ZONE_COUNT:g}, lest lasting danger feel weaker than near"
-            )
+        if not 0.0 <= self.horizon_s <= 2.0:  # false for NaN, too
+            raise ValueError(f"horizon_s = {self.horizon_s}; valid: 0 to 2")
 
 
 class RenderedTrigger:
-    """One trigger's way from stiffness to effect, and what it has to remember."""
+    """One trigger's zones, and what they have to remember."""
 
     def __init__(self, settings: RenderingSettings, travel: TriggerTravel) -> None:
-        self.profiles = force_profiles(travel.reachable_zones)
-        self.band_changes = 0
-        self.limited_s = 0.0
-        """How long its force has been lowered because it had lasted."""
+        self.first_stiff: int | None = None
+        """The lowest zone that ever was stiff."""
+        self.max_strength = 0
+        self.beyond_horizon = 0
+        """How many zones, over all renderings, were full because nobody knew what lay so far ahead."""
         self._settings = settings
         self._travel = travel
-        self._levels = LevelSelector(settings.bands)
-        self._limit = SustainedForceLimit(settings.sustained)
-        self._detent = DetentSelector()
-        self._limited = False
-        self._last_s: float | None = None
+        self._travels = zone_travels(travel)
+        self._levels = [0.0] * ZONE_COUNT
+        self._last_s = -math.inf
+        self._strengths: tuple[int, ...] = _FREE
+        self._effect: TriggerEffect = Off()
 
-    @property
-    def band(self) -> Band:
-        """The band in force."""
-        return self._levels.band
+    def render(
+        self, field: TriggerField, horizon_m: float, other_travel: float, moving: Displacement, now_s: float
+    ) -> TriggerEffect:
+        """The effect at `now_s`; the other arguments are `zone_strengths`'."""
+        zones = zone_strengths(
+            field, horizon_m, self._travels, other_travel, moving, horizon_s=self._settings.horizon_s
+        )
+        self.beyond_horizon += zones.beyond_horizon
+        fallen = MAX_STRENGTH * max(now_s - self._last_s, 0.0) / FALL_S
+        self._last_s = now_s
+        self._levels = [
+            max(float(strength), level - fallen) for strength, level in zip(zones.strengths, self._levels, strict=True)
+        ]
+        self._show(tuple(math.ceil(level - _ROUNDING) for level in self._levels))
+        return self._effect
 
-    @property
-    def limited(self) -> bool:
-        """Whether its force is lowered now, because it has lasted."""
-        return self._limited
+    def release(self) -> None:
+        """Let go at once."""
+        self._levels = [0.0] * ZONE_COUNT
+        self._show(_FREE)
 
-    def render(self, stiffness: float, contact: float | None, now_s: float) -> TriggerEffect:
-        """The effect for `stiffness`, 0 to 1, with contact predicted at the calibrated travel `contact`, or none.
-
-        At one `now_s` and `contact` no zone's strength falls as the stiffness grows. ValueError for what is out of
-        range, and for a time before the last one.
-        """
-        before = self.band
-        level = self._levels.select(stiffness)
-        self.band_changes += self.band is not before
-        if self._limited and self._last_s is not None:
-            self.limited_s += now_s - self._last_s
-        felt = self._limit.limited(level, now_s)
-        self._limited, self._last_s = felt < level, now_s
-        shown = contact if self._settings.detent else None
-        zone = self._detent.select(None if shown is None else SENSED_TRAVEL * self._travel.raw(shown))
-        return with_detent(self.profiles.effects[felt], zone)
+    def _show(self, strengths: tuple[int, ...]) -> None:
+        if strengths == self._strengths:
+            return
+        self._strengths = strengths
+        self._effect = MultiPositionFeedback(strengths) if any(strengths) else Off()
+        self.max_strength = max(self.max_strength, strengths[-1])
+        free = strengths.count(0)
+        if free < ZONE_COUNT and (self.first_stiff is None or free < self.first_stiff):
+            self.first_stiff = free
 
     def status(self) -> str:
-        """A word or two for people."""
-        return self.band.name.lower() + (" (eased)" if self._limited else "")
+        """Its free way for people: as far as it is pulled, by what the controller reports, before it stiffens."""
+        free = self._strengths.count(0)
+        way = self._travel.travel(min(free / ZONE_COUNT / SENSED_TRAVEL, 1.0))
+        if free == ZONE_COUNT or way == 1.0:
+            return "free"
+        least, most = self._strengths[free], self._strengths[-1]
+        return f"free to {100.0 * way:.0f} %, then {least}" + (f" to {most}" if most > least else "")
 
-    def summary(self) -> dict[str, Any]:
-        """The run's figures."""
-        return {
-            "reachable_zones": self.profiles.reachable_zones,
-            "distinct_levels": self.profiles.distinct_levels,
-            "band_changes": self.band_changes,
-            "limited_s": self.limited_s,
-        }
-
-
-class RumbleSelector:
-    """Danger along neither trigger to the motors' drive, with hysteresis: each change of a step is a write.
-
-    The drive changes once the exact one has left it by a whole step, so that noise of half a step to either side makes
-    no write once it has settled. Exactly 0 is always off, and 1 always full.
-    """
-
-    def __init__(self) -> None:
-        self._step = 0
-
-    def select(self, rumble: float) -> Rumble:
-        """The motors' drive for `rumble`, 0 to 1."""
-        exact = _RUMBLE_STEPS * rumble
-        if rumble == 0.0 or abs(exact - self._step) >= 1.0:
-            self._step = round(exact)
-        return Rumble(left=self._step / _RUMBLE_STEPS)
+    def zones(self) -> dict[str, int | None]:
+        """The run's figures of its zones."""
+        return {"first_stiff": self.first_stiff, "max": self.max_strength}
 
 
 class TriggerRendering:
-    """Both triggers, and the motors for danger that lies along neither."""
+    """Both triggers, and the motors for danger where the stick leads."""
 
     def __init__(
         self, settings: RenderingSettings, calibration: TravelCalibration, *, swap_sides: bool = False
     ) -> None:
         """`swap_sides`: what the robot side says of L2 is for R2, and the other way round."""
-        self._swap_sides = swap_sides
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
-        self._rumble = RumbleSelector()
+        self._swap_sides = swap_sides
 
-    def render(self, felt: StiffnessUpdate | None, now_s: float) -> OutputReport:
-        """What both triggers and the motors have to do at `now_s`; all off for None."""
+    def render(
+        self, felt: StiffnessUpdate | None, pulled: tuple[float, float], known: Displacement | None, now_s: float
+    ) -> OutputReport:
+        """What both triggers and the motors have to do at `now_s`; all off, at once, for None.
+
+        pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
+        our own commands under way; None where the robot side's are to be taken.
+        """
         if felt is None:
-            return OutputReport(
-                self.l2.render(0.0, None, now_s), self.r2.render(0.0, None, now_s), self._rumble.select(0.0)
-            )
-        left, right = (felt.l2, felt.l2_contact), (felt.r2, felt.r2_contact)
-        if self._swap_sides:
-            left, right = right, left
-        return OutputReport(
-            l2=self.l2.render(*left, now_s),
-            r2=self.r2.render(*right, now_s),
-            rumble=self._rumble.select(felt.rumble),
+            self.l2.release()
+            self.r2.release()
+            return RELEASED
+        retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
+        back, forth = moving_along(felt, known)
+        effects = (
+            retreating.render(felt.l2, felt.horizon_m, pulled[1], back, now_s),
+            advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s),
         )
+        l2, r2 = reversed(effects) if self._swap_sides else effects
+        return OutputReport(l2=l2, r2=r2, rumble=Rumble(left=felt.rumble))
+
+    def zones(self) -> dict[str, Any]:
+        """The run's figures of the controller's own triggers."""
+        return {"l2": self.l2.zones(), "r2": self.r2.zones()}
 
     def summary(self) -> dict[str, Any]:
-        """The run's figures."""
-        return {"l2": self.l2.summary(), "r2": self.r2.summary()}
+        """What else is to be known of the run."""
+        return {"l2": {"beyond_horizon": self.l2.beyond_horizon}, "r2": {"beyond_horizon": self.r2.beyond_horizon}}

@@ -1,6 +1,6 @@
 """The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from operator_side.dualsense.reports.controller_state import ControllerState, Stick
@@ -35,6 +35,11 @@ class OperatorIntent:
     def triggers_released(self) -> bool:
         """Both triggers are within their dead zones, as arming needs them."""
         return self.l2 == 0.0 and self.r2 == 0.0
+
+    def resting(self) -> "OperatorIntent":
+        """The same hands moving nothing and arming nothing; the other buttons as they are held."""
+        rest = (0.0, 0.0)
+        return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, arm=False)
 
 
 def operator_intent(

@@ -1,9 +1,10 @@
 """A scripted person who sees late, steers with a person's limits, and feels the triggers with their fingers.
 
-They see only what the screen shows, `visual_reaction_s` after it was shown, and act only through the
-controller: a finger pushes with a force, and how far the trigger yields is up to its spring and its effect.
-So haptics act on this person mechanically and at once: where the trigger stiffens, the same force travels
-less. Figures: the operator's table of facts (McRuer's crossover model; reaction times).
+They see only what the screen shows, `visual_reaction_s` after it was shown, and the controller's warning light, and
+act only through the controller: a finger pushes with a force, and how far the trigger yields is up to its spring and
+its effect. So haptics act on this person mechanically and at once: where the trigger stiffens, the same force travels
+less, and they never push harder for it. Figures: the operator's table of facts (McRuer's crossover model; reaction
+times).
 
     wait ─▶ arm ─▶ advance ─▶ close ─▶ lift ─▶ done
                      ▲          │ nothing held
@@ -20,6 +21,7 @@ import numpy as np
 
 from common.protocol.messages import Telemetry, Vector2, Vector3
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.dualsense.reports.output_report import WARNING_LIGHT
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import (
     NORMAL_FINGER_FORCE_N,
@@ -35,8 +37,8 @@ FULL_STICK_M_S = 0.1
 """And a fully deflected stick."""
 _DROPPED_S = 0.5
 """After so long without the target in the fingers they believe it."""
-_FELT_SHARE = 0.8
-"""A trigger that yields less than this share of what was meant is noticed."""
+_CALM_S = 0.5
+"""So long after the controller's warning light they let their hands rest."""
 
 Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "done"]
 _DOING: Final[dict[Phase, str]] = {
@@ -68,11 +70,9 @@ class PersonSettings:
     grasp_depth_m: float = 0.02
     """How far past the point between the fingertips they bring the target's centre: well in, up to the palm."""
     lift_m: float = 0.1
-    insistence_per_s: float = 0.5
-    """How fast they push harder, in normal finger forces a second, while a trigger yields less than they meant."""
 
     def __post_init__(self) -> None:
-        for name in ("visual_reaction_s", "depth_error_sd_m", "grasp_depth_m", "lift_m", "insistence_per_s"):
+        for name in ("visual_reaction_s", "depth_error_sd_m", "grasp_depth_m", "lift_m"):
             if not 0.0 <= getattr(self, name) < 10.0:
                 raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to below 10")
         # From 90° on a person would not correct what they see, or make it worse.
@@ -120,9 +120,8 @@ class SimulatedOperator:
         self._holding_s = 0.0
         self._calibration = calibration or TravelCalibration()
         self._swap_sides = swap_sides
-        self._insistence_n = 0.0
-        self._pulling: int | None = None
-        self._hands_s: float | None = None
+        self._began = False
+        self._warned_s = -math.inf
 
     @property
     def doing(self) -> str:
@@ -132,14 +131,16 @@ class SimulatedOperator:
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
-        if self._hands_s is None:
-            self._since_s = now_s
+        if not self._began:
+            self._began, self._since_s = True, now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
             self._seen.append((now_s, screen))
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
             self._view = self._seen.popleft()[1]
-        if self._view is None:
-            self._hands(now_s, 0.0, (0.0, 0.0))
+        if self._device.output.lightbar == WARNING_LIGHT:
+            self._warned_s = now_s
+        if self._view is None or now_s - self._warned_s < _CALM_S:
+            self._hands(0.0, (0.0, 0.0))
             return
         if self._view.state != "armed" and self.phase not in ("wait", "arm", "done"):
             self._enter("wait", now_s)
@@ -158,13 +159,13 @@ class SimulatedOperator:
 
     def _wait(self, look: Glance) -> None:
         """Rest the hands for the healthy second that arming asks for."""
-        self._hands(look.now_s, 0.0, (0.0, 0.0))
+        self._hands(0.0, (0.0, 0.0))
         if look.now_s - self._since_s > 1.2 + self._settings.visual_reaction_s:
             self._enter("arm", look.now_s)
 
     def _arm(self, look: Glance) -> None:
         pressing = look.now_s - self._since_s < 0.2
-        self._hands(look.now_s, 0.0, (0.0, 0.0), {Button.OPTIONS} if pressing else set())
+        self._hands(0.0, (0.0, 0.0), {Button.OPTIONS} if pressing else set())
         if look.view.state == "armed":
             self._judge_depth()
             self._enter("advance", look.now_s)
@@ -177,7 +178,7 @@ class SimulatedOperator:
     def _advance(self, look: Glance) -> None:
         """Centre the target with the stick, then pull R2 until it seems to lie between the fingers."""
         if look.view.target_in_tool_m is None:
-            self._hands(look.now_s, 0.0, (0.0, 0.0))
+            self._hands(0.0, (0.0, 0.0))
             return
         across = look.view.target_in_tool_m[:2]
         depth_m = look.view.target_in_tool_m[2] + self._settings.grasp_depth_m + self._depth_error_m
@@ -188,10 +189,10 @@ class SimulatedOperator:
             self._enter("close", look.now_s)
         # Off the line a person slows down; far off, they centre first.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
-        self._hands(look.now_s, eagerness * look.gain * depth_m / FULL_TRIGGER_M_S, stick)
+        self._hands(eagerness * look.gain * depth_m / FULL_TRIGGER_M_S, stick)
 
     def _close(self, look: Glance) -> None:
-        self._hands(look.now_s, 0.0, (0.0, 0.0), {Button.CROSS})
+        self._hands(0.0, (0.0, 0.0), {Button.CROSS})
         if look.view.holding and look.now_s - self._since_s > 0.3:
             self._lift_from, self._holding_s = look.view.tool_position_m, look.now_s
             self._enter("lift", look.now_s)
@@ -201,7 +202,7 @@ class SimulatedOperator:
 
     def _retreat(self, look: Glance) -> None:
         """Open, draw back a little, and look again."""
-        self._hands(look.now_s, -0.4, (0.0, 0.0), {Button.SQUARE})
+        self._hands(-0.4, (0.0, 0.0), {Button.SQUARE})
         if look.now_s - self._since_s > 1.0:
             self._judge_depth()
             self._enter("advance", look.now_s)
@@ -218,10 +219,10 @@ class SimulatedOperator:
         if risen_m > self._settings.lift_m or dropped:
             self._enter("done", look.now_s)
         # Half speed: a person carries with care.
-        self._hands(look.now_s, 0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
+        self._hands(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
 
     def _done(self, look: Glance) -> None:
-        self._hands(look.now_s, 0.0, (0.0, 0.0), {Button.CROSS} if look.view.holding else set())
+        self._hands(0.0, (0.0, 0.0), {Button.CROSS} if look.view.holding else set())
 
     @staticmethod
     def _deflection(across_m: tuple[float, ...], gain: float) -> Vector2:
@@ -229,31 +230,19 @@ class SimulatedOperator:
         x, y = (gain * component / FULL_STICK_M_S for component in across_m)
         return _within_unit_circle(x, -y)
 
-    def _hands(self, now_s: float, advance: float, stick: Vector2, buttons: AbstractSet[Button] = frozenset()) -> None:
+    def _hands(self, advance: float, stick: Vector2, buttons: AbstractSet[Button] = frozenset()) -> None:
         """Pull R2 (advance > 0) or L2 as far as the person means to, 0 to 1; hold-to-run is always held.
 
-        With the sides swapped, it is the other one of everything.
-        They know by habit which force that takes on a free trigger. One that resists yields less, which they
-        feel, and after a while they push harder, up to a normal finger's force.
+        With the sides swapped, it is the other one of everything. They know by habit which force that takes on a free
+        trigger, and push with that one, whatever the trigger does.
         """
         meant = min(1.0, abs(advance))
         trigger = int((advance > 0) != self._swap_sides)
-        step_s = 0.0 if self._hands_s is None else now_s - self._hands_s
-        self._hands_s = now_s
         force_n = 0.0
-        if trigger != self._pulling:
-            self._pulling, self._insistence_n = trigger, 0.0
         if meant > 0.0:
             calibrated = self._calibration.r2 if trigger == 1 else self._calibration.l2
-            acting = calibrated.travel(min(1.0, self._device.travel[trigger] / SENSED_TRAVEL))
-            yields_less = acting < _FELT_SHARE * meant
-            insisting = self._settings.insistence_per_s * NORMAL_FINGER_FORCE_N * step_s
-            self._insistence_n = max(0.0, self._insistence_n + (insisting if yields_less else -insisting))
             force_n = SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * calibrated.raw(meant)
-            self._insistence_n = min(self._insistence_n, max(0.0, NORMAL_FINGER_FORCE_N - force_n))
-            force_n = min(force_n + self._insistence_n, NORMAL_FINGER_FORCE_N)
-        else:
-            self._insistence_n = 0.0
+            force_n = min(force_n, NORMAL_FINGER_FORCE_N)
         self._device.set_finger_force(force_n if trigger == 0 else 0.0, force_n if trigger == 1 else 0.0)
         across = self._beyond_dead_zone(stick)
         if self._swap_sides:

@@ -1,7 +1,10 @@
 """The Arm port: what feelahead asks of a robot, simulated or real, and what it gets back."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
+
+import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 
@@ -62,10 +65,16 @@ class GripperPose:
     """(m, 3)"""
     sphere_radii_m: FloatArray
     """(m,) not enlarged"""
-    sphere_jacobians: FloatArray
-    """(m, 3, n) positional Jacobian of each centre."""
     sphere_on_finger: BoolArray
     """(m,) whether the sphere belongs to a finger."""
+
+    @cached_property
+    def sphere_jacobians(self) -> FloatArray:
+        """(m, 3, n) positional Jacobian of each centre, as it moves with the tool: v + ω × r for each joint."""
+        lever = self.sphere_centers_m - self.tool_position_m
+        turned = np.cross(self.tool_jacobian[3:].T, lever[:, None])
+        jacobians: FloatArray = self.tool_jacobian[:3] + turned.swapaxes(1, 2)
+        return jacobians
 
 
 class GripperKinematics(Protocol):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
-from common.protocol.messages import MotionCommand
+from common.protocol.messages import MotionCommand, Vector2
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,11 @@ def tool_twist(command: MotionCommand, tool_rotation: FloatArray, settings: Tool
     return np.concatenate([tool_rotation @ linear, tool_rotation @ angular])
 
 
-def trigger_directions(tool_rotation: FloatArray, count: int) -> dict[str, FloatArray]:
-    """û of §4.2: the unit directions (count, 3) in which pulling each trigger moves the gripper's spheres.
-
-    Both triggers translate the whole gripper, so that one direction holds for every sphere.
-    """
-    directions = np.empty((2, count, 3))
-    directions[1] = tool_rotation[:, 2]
-    np.negative(directions[1], out=directions[0])
-    return {"l2": directions[0], "r2": directions[1]}
+def deflected(lateral: Vector2, tool_rotation: FloatArray) -> tuple[FloatArray, float]:
+    """Where the stick leads: the unit vector (3,) in the world frame, and the deflection, 0 to 1; any for 0."""
+    right, up = lateral
+    deflection = math.hypot(right, up)
+    if deflection == 0.0:
+        return np.ascontiguousarray(tool_rotation[:, 0]), 0.0
+    direction: FloatArray = (right * tool_rotation[:, 0] - up * tool_rotation[:, 1]) / deflection
+    return direction, min(deflection, 1.0)

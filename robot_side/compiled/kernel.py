@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numba.extending
+import numpy as np
 
 from robot_side.compiled.numba_inside import WithoutMachineCode, keep_on_disk
 from robot_side.compiled.sources import digest
@@ -43,6 +44,11 @@ def input_indices() -> Any:
 def output_indices() -> Any:
     """The Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
     return numba.types.Array(numba.types.int64, 1, "C")
+
+
+def record_array(dtype: np.dtype) -> Any:
+    """The Numba type of a contiguous array (n,) of records with named fields, which the kernel reads and fills."""
+    return numba.types.Array(numba.from_dtype(dtype), 1, "C")
 
 
 NUMBER: Any = numba.types.float64

@@ -1,22 +1,13 @@
 """How encoder error becomes position error of points on the gripper (eq. 3-7)."""
 
 import math
-from typing import Literal
 
 import numpy as np
 
 from common.arrays import FloatArray, require_finite
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
-
-VarianceMeasure = Literal["isotropic", "trace"]
-"""How a covariance becomes one variance: its largest eigenvalue, or the paper's sum over the axes."""
+from robot_side.compiled.kernel import TRUTH, compiled, input_array, output_array
 
 _UNIT_TOLERANCE = 1e-6
-
-_NEGLIGIBLE = 1e-17
-"""Share of the trace below which what lies off the diagonal changes no digit of the largest eigenvalue."""
-_MOST_SWEEPS = 20
-"""Jacobi's method converges quadratically: five sweeps are usual."""
 
 
 def encoder_sigma(specified_rad: FloatArray, quantisation_step_rad: FloatArray) -> FloatArray:
@@ -75,59 +66,6 @@ def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: Floa
                 covariances[point, row, column] = covariance
                 covariances[point, column, row] = covariance
     return valid
-
-
-def scalar_variance(covariances: FloatArray, measure: VarianceMeasure = "isotropic") -> FloatArray:
-    """One variance σ_p² (...,) in m² for each covariance (..., 3, 3) (eq. 5 and 7).
-
-    `isotropic`: the largest eigenvalue, the variance along the worst direction. `trace`: the paper's sum of
-    the variances along the axes, up to three times as much. ValueError for another measure.
-    """
-    if measure == "trace":
-        total: FloatArray = np.trace(covariances, axis1=-2, axis2=-1)
-        return total
-    if measure == "isotropic":
-        largest: FloatArray = np.empty(covariances.shape[:-2])
-        _largest_eigenvalue_loop(np.ascontiguousarray(covariances).reshape(-1, 3, 3), largest.reshape(-1))
-        return largest
-    raise ValueError(f"measure = {measure!r} is unknown; valid: 'isotropic', 'trace'")
-
-
-@inlined
-def _rotated(pp: float, qq: float, pq: float, rp: float, rq: float) -> tuple[float, float, float, float]:
-    """The entries pp, qq, rp and rq of a symmetric matrix after the rotation that makes its entry pq 0."""
-    if pq == 0.0:
-        return pp, qq, rp, rq
-    ratio = (qq - pp) / (2.0 * pq)
-    # The smaller of the two angles, so that the iteration converges.
-    tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
-    cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
-    sine = tangent * cosine
-    return pp - tangent * pq, qq + tangent * pq, cosine * rp - sine * rq, sine * rp + cosine * rq
-
-
-@compiled(input_array(3), output_array(1))
-def _largest_eigenvalue_loop(matrices: FloatArray, largest: FloatArray) -> None:
-    """The largest eigenvalue of each symmetric matrix (k, 3, 3), or 0 where all are negative, by Jacobi's method.
-
-    Golub and Van Loan, Matrix Computations, section 8.5. A singular covariance (n < 3 joints) may have -1e-20
-    where it has 0. NaN for a matrix that is not finite.
-    """
-    for k in range(largest.size):
-        xx, yy, zz = matrices[k, 0, 0], matrices[k, 1, 1], matrices[k, 2, 2]
-        xy, xz, yz = matrices[k, 1, 0], matrices[k, 2, 0], matrices[k, 2, 1]
-        trace = abs(xx) + abs(yy) + abs(zz)
-        if not math.isfinite(trace + abs(xy) + abs(xz) + abs(yz)):
-            largest[k] = math.nan
-            continue
-        for _ in range(_MOST_SWEEPS):
-            if abs(xy) + abs(xz) + abs(yz) <= _NEGLIGIBLE * trace:
-                break
-            xx, yy, xz, yz = _rotated(xx, yy, xy, xz, yz)
-            xx, zz, xy, yz = _rotated(xx, zz, xz, 0.0, yz)
-            yy, zz, xy, xz = _rotated(yy, zz, yz, xy, 0.0)
-            yz = 0.0
-        largest[k] = max(xx, yy, zz, 0.0)
 
 
 def directional_variance(covariances: FloatArray, directions: FloatArray) -> FloatArray:

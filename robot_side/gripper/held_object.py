@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.ahead.distances import distance_to_object
 from robot_side.arm.port import GripperPose
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.pairs.nearest_object import distance_to_object
-
-_SPHERES_PER_BOX = 4
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject
     radii = [objects.sphere_radii_m[objects.sphere_object == index]]
     boxes = _boxes(objects, index)
     if len(boxes[0]):
-        cover = cover_boxes(*boxes, _SPHERES_PER_BOX * len(boxes[0]))
+        cover = cover_boxes(*boxes)
         centers.append(cover.centers_m)
         radii.append(cover.radii_m)
     vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
@@ -83,21 +81,11 @@ def _boxes(objects: PerceivedObjects, index: int) -> tuple[FloatArray, FloatArra
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
     """The gripper's spheres and after them the held object's, all moving with the tool."""
     lever = held.centers_in_tool_m @ pose.tool_rotation.T
-    linear, angular = pose.tool_jacobian[:3], pose.tool_jacobian[3:]
-    # Velocity of a point fixed to the tool: v + ω × r, for each joint's unit velocity.
-    own, all_of_them = len(pose.sphere_radii_m), len(pose.sphere_radii_m) + len(lever)
-    jacobians = np.empty((all_of_them, 3, linear.shape[1]))
-    jacobians[:own] = pose.sphere_jacobians
-    for axis in range(3):
-        second, third = (axis + 1) % 3, (axis + 2) % 3
-        turning = lever[:, third, None] * angular[second] - lever[:, second, None] * angular[third]
-        jacobians[own:, axis] = linear[axis] + turning
     return GripperPose(
         tool_position_m=pose.tool_position_m,
         tool_rotation=pose.tool_rotation,
         tool_jacobian=pose.tool_jacobian,
         sphere_centers_m=np.concatenate([pose.sphere_centers_m, pose.tool_position_m + lever]),
         sphere_radii_m=np.concatenate([pose.sphere_radii_m, held.radii_m]),
-        sphere_jacobians=jacobians,
         sphere_on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(lever), dtype=np.bool_)]),
     )

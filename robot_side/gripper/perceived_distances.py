@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.arrays import FloatArray
+from robot_side.ahead.distances import object_distances
+from robot_side.ahead.scene_table import scene_table
 from robot_side.arm.port import GripperPose
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.pairs.candidates import candidate_pairs
-from robot_side.pairs.overlaps import nearest_surfaces
 
 _FIRST_REACH_M = 0.1
 _FARTHEST_M = 3.2
@@ -33,10 +32,11 @@ def perceived_distances(
     wanted = target if target != held else None
     reach_m, distances_m = _FIRST_REACH_M, np.full(len(objects.names), np.inf)
     # No object that is nearer than the reach is missed, so that the search ends as soon as both are.
+    scene = scene_table(objects)
     while reach_m <= _FARTHEST_M:
-        distances_m = _within(pose, objects, reach_m)
+        distances_m = object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m)
         distances_m[np.array(passed_over, dtype=np.bool_)] = np.inf
-        if (distances_m <= reach_m).any() and (wanted is None or distances_m[wanted] <= reach_m):
+        if np.isfinite(distances_m).any() and (wanted is None or np.isfinite(distances_m[wanted])):
             break
         reach_m *= 2.0
     if not np.isfinite(distances_m).any():
@@ -44,12 +44,3 @@ def perceived_distances(
     nearest = int(np.argmin(distances_m))
     target_m = None if wanted is None or not np.isfinite(distances_m[wanted]) else float(distances_m[wanted])
     return PerceivedDistances(objects.names[nearest], float(distances_m[nearest]), target_m)
-
-
-def _within(pose: GripperPose, objects: PerceivedObjects, reach_m: float) -> FloatArray:
-    """The distance (k,) to each object, at least where it is no more than `reach_m`; infinite for those far off."""
-    pairs = candidate_pairs(pose.sphere_centers_m, pose.sphere_radii_m + reach_m, objects)
-    apart_m = nearest_surfaces(pose.sphere_centers_m, objects, pairs).signed_distance_m
-    distances_m = np.full(len(objects.names), np.inf)
-    np.minimum.at(distances_m, pairs.object_index, apart_m - pose.sphere_radii_m.take(pairs.sphere_index))
-    return distances_m

@@ -1,32 +1,61 @@
-"""Cover a gripper's boxes with spheres: the volume that is enlarged and overlapped (§4.1)."""
+"""Cover a gripper's boxes with spheres: the volume that is enlarged and overlapped (§4.1).
 
-import heapq
+Every sphere's centre is in its box, and its radius is the depth of the centre below the nearest face plus what a
+sphere may stand out. Such a sphere covers a disc of each face that it reaches. From the edges inwards, frames of
+spheres cover a band of every face each: one sphere near each corner of the box, and rows along the edges between them.
+Deeper frames have larger spheres. What is left when a frame is as deep as the box is thick is covered by one layer of
+spheres in the middle of the box, each of which reaches both sides. A thin box has that layer only.
+"""
+
+import math
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 
+_MOST_SPHERES_OF_A_BOX = 2000
+# A plan leaves this part of the stand-out unused, far above rounding: no corner is left just outside.
+_MARGIN = 1e-6
+_FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
+
 
 @dataclass(frozen=True)
 class SphereCover:
-    """Spheres whose union contains every box that they were made for, in the boxes' common or own frames."""
+    """Spheres whose union contains the surface of every box that they were made for.
+
+    The inside of a thick box may be empty: what comes from outside meets a sphere at the surface first.
+    """
 
     centers_m: FloatArray
     """(m, 3) each in the frame that its box was given in"""
     radii_m: FloatArray
     """(m,)"""
     box: IntArray
-    """(m,) the index of the box that a sphere covers a part of"""
+    """(m,) the index of the box that a sphere covers a part of, ascending"""
+    stand_out_m: FloatArray
+    """(k,) how far the spheres of a box stand out of it: what was asked for, or more for a very large box"""
 
 
-def cover_boxes(centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray, count: int = 16) -> SphereCover:
-    """Cover oriented boxes with `count` spheres, each circumscribed to one cell of a box.
+class _Lattice(NamedTuple):
+    """Evenly spaced centres from minus to plus a span along each axis; a count of 1 is in the middle."""
 
-    centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3). The cell with the largest sphere is
-    halved across its longest edge until there are `count` cells. Where there are more boxes than that, each
-    gets the one sphere that it needs. The spheres are in a fixed order for the same boxes.
-    ValueError for no box, a wrong shape, a negative or non-finite value, or a count below 1.
+    spans_m: tuple[float, ...]
+    counts: tuple[int, ...]
+
+
+def cover_boxes(
+    centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray, stand_out_m: float = 0.003
+) -> SphereCover:
+    """Cover the surface of oriented boxes with spheres, none of which stands out of its box by more than stand_out_m.
+
+    centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3); a half size may be 0. The spheres of a
+    box are mirror-symmetric in its three middle planes, and in a fixed order. A box that would need more than 2000
+    gets as much more stand-out as it takes for 2000.
+    ValueError for no box, a wrong shape, a negative or non-finite value, or a stand-out that is not above 0.
     """
     boxes = centers_m.shape[0] if centers_m.ndim == 2 else 0
     for name, values, shape in (
@@ -40,28 +69,126 @@ def cover_boxes(centers_m: FloatArray, rotations: FloatArray, half_sizes_m: Floa
             raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")
     if (half_sizes_m < 0.0).any():
         raise ValueError(f"half_sizes_m = {half_sizes_m.min()} is negative; valid: 0 or more")
-    if count < 1:
-        raise ValueError(f"count = {count}; valid: 1 or more")
+    if not (math.isfinite(stand_out_m) and stand_out_m > 0.0):
+        raise ValueError(f"stand_out_m = {stand_out_m}; valid: finite and above 0")
 
-    # The heap's order is by radius, then by age, which makes ties between equal cells repeatable.
-    cells = [(-float(np.linalg.norm(half)), index, index, np.zeros(3), half) for index, half in enumerate(half_sizes_m)]
-    heapq.heapify(cells)
-    age = boxes
-    while len(cells) < count and cells[0][0] < 0.0:
-        _, _, box, offset, half = heapq.heappop(cells)
-        axis = int(np.argmax(half))
-        smaller = half.copy()
-        smaller[axis] /= 2.0
-        for side in (-1.0, 1.0):
-            shifted = offset.copy()
-            shifted[axis] += side * smaller[axis]
-            heapq.heappush(cells, (-float(np.linalg.norm(smaller)), age, box, shifted, smaller))
-            age += 1
+    covers = [_cover_box(tuple(half_sizes.tolist()), float(stand_out_m)) for half_sizes in half_sizes_m]
+    box = np.repeat(np.arange(boxes), [len(radii) for _, radii, _ in covers])
+    offsets = np.concatenate([offsets for offsets, _, _ in covers])
+    return SphereCover(
+        centers_m=centers_m[box] + np.einsum("mij,mj->mi", rotations[box], offsets),
+        radii_m=np.concatenate([radii for _, radii, _ in covers]),
+        box=box,
+        stand_out_m=np.array([stand_out for _, _, stand_out in covers]),
+    )
 
-    cells.sort(key=lambda cell: (cell[2], *cell[3]))
-    box_of_cell = np.array([cell[2] for cell in cells], dtype=np.int64)
-    offsets = np.array([cell[3] for cell in cells])
-    placed = centers_m[box_of_cell] + np.einsum("mij,mj->mi", rotations[box_of_cell], offsets)
-    # Rounding must not leave a corner just outside.
-    radii = np.array([-cell[0] for cell in cells]) * (1.0 + 1e-12)
-    return SphereCover(centers_m=placed, radii_m=radii, box=box_of_cell)
+
+@lru_cache(maxsize=256)
+def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
+    """Centres (m, 3) in the box's own frame, radii (m,), and the stand-out of one box."""
+    axes = sorted(range(3), key=lambda axis: half_sizes_m[axis])
+    ascending = tuple(half_sizes_m[axis] for axis in axes)
+    plan = _fewest(ascending, stand_out_m)
+    if not plan:
+        enough = too_little = stand_out_m
+        while not plan:
+            too_little, enough = enough, 2.0 * enough
+            plan = _fewest(ascending, enough)
+        for _ in range(20):
+            middle = 0.5 * (too_little + enough)
+            closer = _fewest(ascending, middle)
+            enough, plan, too_little = (middle, closer, too_little) if closer else (enough, plan, middle)
+        stand_out_m = enough
+
+    centers = np.empty((sum(math.prod(lattice.counts) for lattice in plan), 3))
+    centers[:, axes] = [
+        center
+        for spans, counts in plan
+        for center in product(*(_spread(span, count) for span, count in zip(spans, counts, strict=True)))
+    ]
+    radii = (np.array(half_sizes_m) - np.abs(centers)).min(axis=1) + stand_out_m
+    return centers, radii, stand_out_m
+
+
+def _spread(span_m: float, count: int) -> list[float]:
+    """`count` places from minus to plus the span, each the exact negative of its mirror image."""
+    return [span_m * ((2 * place - count + 1) / (count - 1)) for place in range(count)] if count > 1 else [0.0]
+
+
+def _fewest(half_sizes_m: tuple[float, ...], stand_out_m: float) -> list[_Lattice]:
+    """The frames and the layer with the fewest spheres for ascending half sizes; empty where 2000 are too few."""
+    usable_m = stand_out_m * (1.0 - _MARGIN)
+    fewest, best = _MOST_SPHERES_OF_A_BOX + 1, list[_Lattice]()
+    for at_edges, deeper in product(_FRACTIONS, _FRACTIONS):
+        plan, count, done_m = list[_Lattice](), 0, 0.0
+        while count < fewest and _corner_depth(done_m, usable_m) < half_sizes_m[0]:
+            frame, done_m = _frame(half_sizes_m, done_m, deeper if plan else at_edges, usable_m)
+            plan += frame
+            count += sum(math.prod(lattice.counts) for lattice in frame)
+        if count < fewest and (not plan or done_m < half_sizes_m[1]):
+            plan.append(_layer(half_sizes_m, done_m, usable_m))
+            count += math.prod(plan[-1].counts)
+        if count < fewest:
+            fewest, best = count, plan
+    return best
+
+
+def _corner_depth(done_m: float, stand_out_m: float) -> float:
+    """How deep below three faces a sphere may be whose discs still reach the corners of what is not covered yet.
+
+    At the depth t its discs' radius is √(2 t stand_out + stand_out²). With a band of the width `done` covered along
+    every edge, the corner of a face's rest is √2 (t - done) from the disc's middle. With 0 it is the box's own corner.
+    """
+    return done_m + 0.5 * stand_out_m + 0.5 * math.sqrt(4.0 * done_m * stand_out_m + 3.0 * stand_out_m**2)
+
+
+def _frame(
+    half_sizes_m: tuple[float, ...], done_m: float, fraction: float, stand_out_m: float
+) -> tuple[list[_Lattice], float]:
+    """Spheres that widen the covered band along every edge of every face, and how wide it is with them.
+
+    Of the row that is as deep as can be, the discs only just touch the covered band. `fraction` is of that row's way.
+    """
+    corner = _corner_depth(done_m, stand_out_m)
+    # The corner's sphere covers a square of every face, from done to here.
+    corner_end = 2.0 * corner - done_m
+    way = stand_out_m + math.sqrt(2.0 * done_m * stand_out_m + 2.0 * stand_out_m**2)
+    # In the middle of the box a row is that of the opposite edge, too.
+    depth = min(done_m + fraction * way, half_sizes_m[0])
+    half_step = math.sqrt(2.0 * depth * stand_out_m + stand_out_m**2 - (depth - done_m) ** 2)
+    lattices = [_Lattice(tuple(half - corner for half in half_sizes_m), (2, 2, 2))]
+    for axis, half in enumerate(half_sizes_m):
+        if half > corner_end:
+            spans = [other - depth for other in half_sizes_m]
+            counts = [2 if span > 0.0 else 1 for span in spans]
+            counts[axis] = math.ceil((half - corner_end) / half_step)
+            spans[axis] = (half - corner_end) * (1.0 - 1.0 / counts[axis])
+            lattices.append(_Lattice(tuple(spans), tuple(counts)))
+    return lattices, 2.0 * depth - done_m
+
+
+def _layer(half_sizes_m: tuple[float, ...], done_m: float, stand_out_m: float) -> _Lattice:
+    """Spheres in the middle of the shortest axis that cover all that is more than `done` away from the edges.
+
+    They stand in a rectangular lattice whose cells both large faces' discs contain. Where the narrow faces have a
+    strip left, the outermost spheres are near enough to contain that, too.
+    """
+    thin, *sides = half_sizes_m
+    radius, strip = thin + stand_out_m, max(thin - done_m, 0.0)
+    disc = math.sqrt(2.0 * thin * stand_out_m + stand_out_m**2)
+    longest = math.sqrt(disc**2 - strip**2)
+    fewest = _Lattice((0.0, 0.0, 0.0), (1, 2**31, 2**31))
+    for fraction in _FRACTIONS:
+        first = (sides[0] - done_m) / max(math.ceil((sides[0] - done_m) / (fraction * longest)), 1)
+        first = max(first, strip)
+        cell = (first, max(math.sqrt(disc**2 - first**2), strip))
+        spans, counts = [0.0], [1]
+        for side, half, other in zip(sides, cell, reversed(cell), strict=True):
+            inset = done_m + half
+            if strip > 0.0:
+                inset = min(inset, math.sqrt(radius**2 - strip**2 - other**2))
+            spans.append(max(side - inset, 0.0))
+            counts.append(math.ceil(spans[-1] / half - 1e-9) + 1 if spans[-1] > 0.0 else 1)
+        if math.prod(counts) < math.prod(fewest.counts):
+            fewest = _Lattice(tuple(spans), tuple(counts))
+    return fewest

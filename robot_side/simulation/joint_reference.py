@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.arm.ability import JointLimits
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class MotionLimits:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} = {value}; valid: finite and above 0")
+
+    def of_joints(self, count: int) -> JointLimits:
+        """The same for each of `count` joints."""
+        return JointLimits(np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2))
 
 
 class JointReference:

@@ -5,7 +5,9 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
+from robot_side.ahead.tables import BLOCK
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.gripper.near_order import near_order
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.simulation.scene import Scene
 
@@ -13,8 +15,8 @@ from robot_side.simulation.scene import Scene
 class MujocoKinematics:
     """GripperKinematics: the gripper where the encoders say it is, in a copy of the state that nobody simulates."""
 
-    def __init__(self, scene: Scene, sphere_count: int = 16) -> None:
-        """Cover the gripper's geoms with `sphere_count` spheres, or one for each geom where there are more.
+    def __init__(self, scene: Scene, stand_out_m: float = 0.003) -> None:
+        """Cover the boxes around the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
 
         ConfigurationError when the robot has nothing at the tool that could touch anything.
         """
@@ -27,16 +29,23 @@ class MujocoKinematics:
         rotations = np.array([_rotation(model.geom_quat[geom]) for geom in geoms])
         # The gripper is covered in the frames of its links, in which its geoms do not move.
         centers = model.geom_pos[geoms] + np.einsum("kij,kj->ki", rotations, model.geom_aabb[geoms, :3])
-        cover = cover_boxes(centers, rotations, model.geom_aabb[geoms, 3:], sphere_count)
-        self._bodies: IntArray = model.geom_bodyid[geoms][cover.box].astype(np.int64)
-        self._local_centers_m = cover.centers_m[:, :, None]
-        self._radii_m = cover.radii_m
-        self._on_finger = scene.robot.geom_on_finger[cover.box]
+        cover = cover_boxes(centers, rotations, model.geom_aabb[geoms, 3:], stand_out_m)
+        bodies: IntArray = model.geom_bodyid[geoms][cover.box].astype(np.int64)
+        order = self._near_order(bodies, cover.centers_m)
+        self._bodies = bodies[order]
+        self._local_centers_m = cover.centers_m[order, :, None]
+        self._radii_m = cover.radii_m[order]
+        self._on_finger = scene.robot.geom_on_finger[cover.box[order]]
         # Every pose shares these two.
         self._radii_m.setflags(write=False)
         self._on_finger.setflags(write=False)
         self._jacobian: FloatArray = np.zeros((6, model.nv))
-        self._cross: FloatArray = np.zeros((len(cover.radii_m), 3, 3))
+
+    def _near_order(self, bodies: IntArray, local_centers_m: FloatArray) -> IntArray:
+        """Let spheres that are near each other follow each other: the search looks at several at once."""
+        mujoco.mj_kinematics(self._model, self._data)
+        rotations = self._data.xmat[bodies].reshape(-1, 3, 3)
+        return near_order(self._data.xpos[bodies] + np.einsum("mij,mj->mi", rotations, local_centers_m), BLOCK)
 
     def pose(self, state: ArmState) -> GripperPose:
         """The gripper at the encoder readings of `state` (eq. 4); the fingers' own motion is not in its Jacobians."""
@@ -50,18 +59,12 @@ class MujocoKinematics:
         tool = data.site_xpos[robot.site].copy()
         body_rotations = data.xmat[self._bodies].reshape(-1, 3, 3)
         centers = data.xpos[self._bodies] + (body_rotations @ self._local_centers_m)[:, :, 0]
-        # v_i = v + ω × r_i, written as a product with the matrix that takes ω to -r_i × ω.
-        x, y, z = (centers - tool).T
-        cross = self._cross
-        cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = z, -y, x
-        cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = -z, y, -x
         return GripperPose(
             tool_position_m=tool,
             tool_rotation=data.site_xmat[robot.site].reshape(3, 3).copy(),
             tool_jacobian=jacobian,
             sphere_centers_m=centers,
             sphere_radii_m=self._radii_m,
-            sphere_jacobians=jacobian[:3] + cross @ jacobian[3:],
             sphere_on_finger=self._on_finger,
         )
 

@@ -1,5 +1,6 @@
 """Which parts of a compiled model are the arm, its gripper and their actuators, found from the tool's site alone."""
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +40,8 @@ class RobotModel:
     """(g,) the actuators that move those joints"""
     gripper_controls: IntArray
     """(g,) into ctrl"""
+    fingerprint: str
+    """Twelve digits that tell an arm by its joints, links and limits, wherever it stands"""
     gripper_geoms: IntArray
     """(k,) the geoms that can touch something, beyond the last arm link, or on it where there are none beyond"""
     geom_on_finger: BoolArray
@@ -96,9 +99,26 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
         finger_velocities=model.jnt_dofadr[fingers].astype(np.int64),
         gripper_actuators=gripper_actuators,
         gripper_controls=model.actuator_ctrladr[gripper_actuators].astype(np.int64),
+        fingerprint=_fingerprint(model, joints, site),
         gripper_geoms=geoms,
         geom_on_finger=np.array([int(model.geom_bodyid[geom]) in moved for geom in geoms], dtype=bool),
     )
+
+
+def _fingerprint(model: Any, joints: IntArray, site: int) -> str:
+    bodies = model.jnt_bodyid[joints]
+    parts = (
+        model.jnt_type[joints],
+        model.jnt_axis[joints],
+        model.jnt_pos[joints],
+        model.jnt_range[joints],
+        model.body_pos[bodies[1:]],
+        model.body_quat[bodies[1:]],
+        model.site_pos[site],
+        model.site_quat[site],
+    )
+    rounded = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts]).round(6) + 0.0
+    return hashlib.sha256(rounded.tobytes()).hexdigest()[:12]
 
 
 def can_touch(model: Any, geom: int) -> bool:

@@ -1,10 +1,13 @@
-"""Grippers of a few spheres or of boxes, on a tool that flies freely, for the tests of what the gripper senses."""
+"""Grippers of a few spheres or of boxes, on a tool that flies freely, for the tests of what is ahead of a gripper."""
+
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
+from robot_side.gripper.near_order import near_order
 from robot_side.gripper.spheres import SphereCover, cover_boxes
 
 # The built-in arm's gripper, open by 85 mm, in the tool frame: its fingers close along x. The palm, then each
@@ -28,10 +31,13 @@ BOX_HALF_SIZES_M = np.array(
     ]
 )
 OPENING_M = 0.085
+FRONT_M = 0.018
+"""So far ahead of the tool point the foremost sphere of the gripper reaches: 15 mm, and 3 mm that it stands out."""
 
 
-def cover_gripper(spheres: int) -> SphereCover:
-    return cover_boxes(BOX_CENTERS_M, np.tile(np.eye(3), (len(BOX_CENTERS_M), 1, 1)), BOX_HALF_SIZES_M, spheres)
+@cache
+def cover_gripper(stand_out_m: float = 0.003) -> SphereCover:
+    return cover_boxes(BOX_CENTERS_M, np.tile(np.eye(3), (len(BOX_CENTERS_M), 1, 1)), BOX_HALF_SIZES_M, stand_out_m)
 
 
 def free_pose(
@@ -45,15 +51,12 @@ def free_pose(
     position = np.asarray(tool_position_m, dtype=np.float64)
     rotation = np.eye(3) if tool_rotation is None else tool_rotation
     radii = np.asarray(radii_m, dtype=np.float64)
-    lever = np.asarray(centers_in_tool_m, dtype=np.float64) @ rotation.T
-    turning = [np.cross(axis, lever) for axis in np.eye(3)]
     return GripperPose(
         tool_position_m=position,
         tool_rotation=rotation,
         tool_jacobian=np.eye(6),
-        sphere_centers_m=position + lever,
+        sphere_centers_m=position + np.asarray(centers_in_tool_m, dtype=np.float64).reshape(-1, 3) @ rotation.T,
         sphere_radii_m=radii,
-        sphere_jacobians=np.concatenate([np.tile(np.eye(3), (len(radii), 1, 1)), np.stack(turning, axis=2)], axis=2),
         sphere_on_finger=np.zeros(len(radii), dtype=np.bool_)
         if on_finger is None
         else np.asarray(on_finger, dtype=np.bool_),
@@ -61,8 +64,11 @@ def free_pose(
 
 
 def gripper_pose(
-    tool_position_m: npt.ArrayLike = (0.0, 0.0, 0.0), tool_rotation: FloatArray | None = None
+    tool_position_m: npt.ArrayLike = (0.0, 0.0, 0.0),
+    tool_rotation: FloatArray | None = None,
+    stand_out_m: float = 0.003,
 ) -> GripperPose:
-    """The built-in gripper in 16 spheres."""
-    cover = cover_gripper(16)
-    return free_pose(cover.centers_m, cover.radii_m, cover.box > 0, tool_position_m, tool_rotation)
+    """The built-in gripper in its 246 spheres, or in fewer that stand out farther."""
+    cover = cover_gripper(stand_out_m)
+    order = near_order(cover.centers_m, 6)
+    return free_pose(cover.centers_m[order], cover.radii_m[order], cover.box[order] > 0, tool_position_m, tool_rotation)

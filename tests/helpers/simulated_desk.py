@@ -8,12 +8,11 @@ from typing import Any
 import msgspec
 
 from common.protocol.messages import Header, Telemetry, Vector3
-from operator_side.dualsense.effects.official import TriggerEffect
+from operator_side.dualsense.effects.official import Off, TriggerEffect
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, Stick
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
-from operator_side.feel.level import stiffness_to_effect
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.person import PersonSettings, Phase, SimulatedOperator
 
@@ -127,9 +126,10 @@ class Desk:
         self.until("advance", screen or armed((0.0, 0.0, 0.3)), 1.0)
 
     def resist(self, r2: TriggerEffect, l2: TriggerEffect | None = None) -> None:
-        off = stiffness_to_effect(0.0)
-        report = build_output_report(OutputReport(l2=l2 or off, r2=r2))
-        self.device.write(report, self.now_s)
+        self.tell(OutputReport(l2=l2 or Off(), r2=r2))
+
+    def tell(self, output: OutputReport) -> None:
+        self.device.write(build_output_report(output), self.now_s)
 
     def _frames(self, screen: Telemetry | None) -> Iterator[Telemetry | None]:
         sequence = self.ticks

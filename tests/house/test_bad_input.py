@@ -67,6 +67,10 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (ROBOT, ["--asymmetry", "12"], "'12'", "50ms"),
         (OPERATOR, ["--asymmetry=-11s"], "-11s", "10s"),
         (DEMO, ["--duration", "soon"], "soon", "a number"),
+        (ROBOT, ["--law", "first"], "first", "swept"),
+        (DEMO, ["--law", "none"], "none", "swept"),
+        (OPERATOR, ["--compensation", "nobody"], "nobody", "robot"),
+        (DEMO, ["--compensation", "nobody"], "nobody", "robot"),
         (feelahead.main.command, ["dmeo"], "dmeo", "demo"),
     ],
 )

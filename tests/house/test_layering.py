@@ -38,16 +38,18 @@ ARROWS = """
         robot_side/overlap/lanes robot_side/overlap/precise robot_side/overlap/meshes
     robot_side/operators: common common/protocol
     robot_side/arm: common common/protocol robot_side/compiled
-    robot_side/enlargement: common robot_side/compiled
+    robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/objects: common robot_side/compiled robot_side/overlap/meshes
-    robot_side/pairs: common robot_side/compiled robot_side/objects robot_side/overlap robot_side/overlap/meshes
-    robot_side/gripper: common robot_side/arm robot_side/compiled robot_side/objects robot_side/pairs
-    robot_side/stiffness: common robot_side/arm robot_side/compiled robot_side/objects robot_side/pairs
-    robot_side/simulation: common robot_side/arm robot_side/enlargement robot_side/gripper robot_side/objects
-        robot_side/overlap/meshes
+    robot_side/ahead/kinds: common robot_side/compiled robot_side/objects robot_side/overlap/closed_forms
+    robot_side/ahead: common common/protocol robot_side/ahead/kinds robot_side/arm robot_side/compiled
+        robot_side/enlargement robot_side/objects robot_side/overlap/lanes robot_side/overlap/meshes
+        robot_side/overlap/precise
+    robot_side/gripper: common robot_side/ahead robot_side/arm robot_side/objects
+    robot_side/simulation: common robot_side/ahead robot_side/arm robot_side/enlargement robot_side/gripper
+        robot_side/objects robot_side/overlap/meshes
     robot_side: common common/command common/emulation common/protocol common/realtime common/sockets common/timing
-        robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper robot_side/objects
-        robot_side/operators robot_side/pairs robot_side/simulation robot_side/stiffness
+        robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper robot_side/objects
+        robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -55,7 +57,7 @@ ARROWS = """
     operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
     operator_side/hands: operator_side/dualsense/effects operator_side/dualsense/reports
-    operator_side/feel: common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
+    operator_side/feel: common common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
         operator_side/hands
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports

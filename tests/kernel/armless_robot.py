@@ -7,7 +7,8 @@ from types import TracebackType
 from common.clock import MonotonicClock, clock_domain
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import StiffnessUpdate
+from common.protocol.messages import Header, MotionState, StiffnessUpdate
+from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.sockets.robot import RobotSockets
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
@@ -22,6 +23,7 @@ class ArmlessRobot:
 
     def __init__(self) -> None:
         self.r2_stiffness = 0.0
+        """0 to 1, wherever R2 is."""
         self.moving = False
         """Whether the arm, if there were one, would be told to move now."""
         self.state = "disarmed"
@@ -72,6 +74,16 @@ class ArmlessRobot:
                 self._sockets.send(answer.peer, answer.payload)
             owner = self._session.owner(now_s)
             if owner is not None:
-                felt = StiffnessUpdate(owner.header, l2=0.0, r2=self.r2_stiffness, rumble=0.0, state=permission.state)
-                self._sockets.send(owner.peer, encode(felt))
+                self._sockets.send(owner.peer, encode(self._felt(owner.header, permission.state)))
             self._sockets.wait(_TICK_S)
+
+    def _felt(self, header: Header, state: MotionState) -> StiffnessUpdate:
+        return StiffnessUpdate(
+            header,
+            l2=uniform_field(0),
+            r2=uniform_field(round(STRENGTHS * self.r2_stiffness)),
+            speed_m_s=0.0,
+            horizon_m=FAR_M,
+            rumble=0.0,
+            state=state,
+        )

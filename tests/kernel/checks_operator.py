@@ -65,9 +65,17 @@ def arm_and_pull(plugged: Plugged, robot: ArmlessRobot) -> None:
         return robot.state == "armed"
 
     wait_until("the robot is armed", armed, _PATIENCE_S)
-    hold(plugged, _HOLD_TO_RUN, r2_n=NORMAL_FINGER_FORCE_N)
+
+    def moving() -> bool:
+        # A gap in the stiffness, as a slow machine has them, asks for released triggers before motion goes on.
+        hold(plugged, _HOLD_TO_RUN)
+        time.sleep(_PRESSED_S)
+        hold(plugged, _HOLD_TO_RUN, r2_n=NORMAL_FINGER_FORCE_N)
+        time.sleep(_PRESSED_S)
+        return robot.moving
+
     robot.r2_stiffness = 0.9
-    wait_until("the arm would move", lambda: robot.moving, instead=lambda: robot.state)
+    wait_until("the arm would move", moving, _PATIENCE_S, instead=lambda: robot.state)
     wait_until("the trigger is stiff", lambda: not plugged.ask(lambda controller: controller.released))
 
 

@@ -4,49 +4,14 @@ import pytest
 
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.messages import Hello, MotionCommand, MotionState, Telemetry
 from common.protocol.session import SessionState
-from operator_side.core import INTENT_EXPIRES_S, NOTICE_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
+from operator_side.core import INTENT_EXPIRES_S, STIFFNESS_EXPIRES_S, OperatorSide
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-
-
-class Bench:
-    """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
-
-    def __init__(self, *, haptics: bool = True, swap_sides: bool = False) -> None:
-        self.side = OperatorSide(2, "clock", haptics=haptics, swap_sides=swap_sides)
-        self.robot = LinkEnd("robot", 1, "clock")
-        self.device = SimulatedDualSense()
-        self.now_s = 1.0
-        self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
-        self.notice(SessionState.DISARMED)
-
-    def notice(self, session: SessionState, why: str = "", token: int = 7) -> None:
-        notice = LeaseNotice(self.robot.stamp(self.now_s), session=session, why=why, token=token, waiting=2, place=1)
-        self.side.receive(encode(notice), self.now_s)
-
-    def stiffness(self, r2: float, state: MotionState = "armed", l2: float = 0.0, rumble: float = 0.0) -> bytes:
-        return encode(StiffnessUpdate(self.robot.stamp(self.now_s), l2=l2, r2=r2, rumble=rumble, state=state))
-
-    def feel(self, r2: float, state: MotionState = "armed", rumble: float = 0.0) -> None:
-        self.side.receive(self.stiffness(r2, state, rumble=rumble), self.now_s)
-        self.write()
-
-    def write(self) -> None:
-        if (report := self.side.output_report(self.now_s)) is not None:
-            self.device.write(report, self.now_s)
-
-    def read(self) -> None:
-        report = self.device.read(self.now_s)
-        assert report is not None
-        self.side.read_report(report, self.now_s)
-
-    def commands(self) -> list[MotionCommand]:
-        messages = [decode(payload) for payload in self.side.motion(self.now_s)]
-        return [message for message in messages if isinstance(message, MotionCommand)]
+from operator_side.standing import NOTICE_EXPIRES_S
+from tests.operator_side.operator_bench import Bench
 
 
 @pytest.fixture
@@ -55,36 +20,25 @@ def bench() -> Bench:
 
 
 def test_stiffness_reaches_the_trigger_it_is_meant_for(bench: Bench) -> None:
-    bench.feel(0.8)
+    bench.feel(6)
     l2, r2 = bench.device.effects
     assert l2 == Off()
-    assert sum(r2.zone_strengths) == 68  # half-way from where danger begins, at level 56, to 80
-
-
-def test_predicted_contact_is_a_bump_in_one_zone(bench: Bench) -> None:
-    update = StiffnessUpdate(
-        bench.robot.stamp(bench.now_s), l2=0.0, r2=0.0, rumble=0.0, state="armed", l2_contact=None, r2_contact=0.5
-    )
-    bench.side.receive(encode(update), bench.now_s)
-    bench.write()
-    l2, r2 = bench.device.effects
-    assert l2 == Off()
-    assert r2.zone_strengths == (0, 0, 0, 2, 0, 0, 0, 0, 0, 0)
+    assert r2.zone_strengths == (6,) * 10
 
 
 def test_writes_are_bounded_the_newest_wins_and_a_release_does_not_wait(bench: Bench) -> None:
     for step in range(1000):
         bench.now_s += 0.001
-        bench.feel(0.2 + 0.7 * (step % 2))
+        bench.feel(7, "armed" if step % 2 else "disarmed")
     assert 50 < bench.device.write_count <= 100
-    bench.feel(0.9)
+    bench.feel(8)
     bench.now_s += 0.1
     bench.write()
-    assert sum(bench.device.effects[1].zone_strengths) == 74
+    assert bench.device.effects[1].zone_strengths == (8,) * 10
     for step in range(40):
-        bench.feel(0.2 + 0.7 * (step % 2))
+        bench.feel(1 + step % 8)
     assert not bench.device.released
-    bench.feel(0.0)
+    bench.feel(0, "disarmed")
     assert bench.device.released
 
 
@@ -96,20 +50,13 @@ def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench)
     bench.notice(SessionState.DISARMED)
     bench.read()
     assert bench.commands()[0].r2 == pytest.approx(0.5, abs=0.05)
-    bench.feel(0.05)
-    # A full pull ends in the fifth zone: that is where the first strengths go.
-    assert bench.device.effects[1].zone_strengths == (0, 0, 0, 1, 1, 0, 0, 0, 0, 0)
+    bench.feel(6)
+    # Before the fourth zone nothing is commanded.
+    assert bench.device.effects[1].zone_strengths == (0,) * 3 + (6,) * 7
 
 
 def test_with_swapped_sides_the_left_trigger_advances_and_feels_it() -> None:
     bench = Bench(swap_sides=True)
-    bench.feel(0.7)
-    l2, r2 = bench.device.effects
-    assert sum(l2.zone_strengths) > 0
-    assert r2 == Off()
-    status = bench.side.status(bench.now_s)
-    assert (status["L2"], status["R2"], status["feel"]) == (0.7, 0.0, "L2 danger, R2 clear")
-    bench.feel(0.0)
     bench.device.set_finger_force(10.0, 0.0)
     bench.device.read(bench.now_s)
     bench.now_s += 1.0
@@ -117,26 +64,38 @@ def test_with_swapped_sides_the_left_trigger_advances_and_feels_it() -> None:
     bench.read()
     [command] = bench.commands()
     assert (command.l2, command.r2) == (0.0, 1.0)
+    bench.feel(6)
+    l2, r2 = bench.device.effects
+    assert l2.zone_strengths == (6,) * 10
+    assert r2 == Off()
+    status = bench.side.status(bench.now_s)
+    assert (status["L2"], status["R2"], status["feel"]) == (0.75, 0.0, "L2 free to 0 %, then 6, R2 free")
 
 
-def test_people_are_told_the_band(bench: Bench) -> None:
-    bench.feel(0.7)
-    assert bench.side.status(bench.now_s)["feel"] == "L2 clear, R2 danger"
-    rendering = bench.side.summary()["rendering"]
-    assert rendering["r2"]["band_changes"] == 1
-    assert rendering["writes"] == 1
+def test_the_run_and_people_are_told_what_is_felt(bench: Bench) -> None:
+    bench.feel(6)
+    status = bench.side.status(bench.now_s)
+    assert (status["L2"], status["R2"], status["feel"]) == (0.0, 0.75, "L2 free, R2 free to 0 %, then 6")
+    summary = bench.side.summary()
+    assert summary["zones"] == {"l2": {"first_stiff": None, "max": 0}, "r2": {"first_stiff": 0, "max": 6}}
+    assert summary["rendering"] == {
+        "l2": {"beyond_horizon": 0},
+        "r2": {"beyond_horizon": 0},
+        "writes": 1,
+        "without_history": 1,
+        "blind": 0,
+    }
 
 
 def test_only_changes_are_written(bench: Bench) -> None:
-    bench.feel(0.8)
+    bench.feel(6)
     bench.now_s += 0.001
-    bench.feel(0.8)
-    bench.feel(0.801)
+    bench.feel(6)
     assert bench.device.write_count == 1
 
 
 def test_triggers_are_released_when_stiffness_stops_coming(bench: Bench) -> None:
-    bench.feel(1.0)
+    bench.feel(8)
     bench.now_s += STIFFNESS_EXPIRES_S
     bench.write()
     assert not bench.device.released
@@ -147,27 +106,27 @@ def test_triggers_are_released_when_stiffness_stops_coming(bench: Bench) -> None
 
 @pytest.mark.parametrize("state", ["disarmed", "stopped"])
 def test_nothing_is_felt_while_the_arm_cannot_move(bench: Bench, state: MotionState) -> None:
-    bench.feel(1.0)
-    bench.feel(1.0, state)
+    bench.feel(8)
+    bench.feel(8, state)
     assert bench.device.released
 
 
 def test_without_haptics_nothing_is_ever_written() -> None:
     bench = Bench(haptics=False)
-    bench.feel(1.0, rumble=1.0)
+    bench.feel(8, rumble=1.0)
     assert bench.device.write_count == 0
 
 
 def test_rumble_comes_and_goes(bench: Bench) -> None:
-    bench.feel(0.0, rumble=1.0)
+    bench.feel(0, rumble=1.0)
     assert bench.device.rumble.left == 1.0
-    bench.feel(0.0)
+    bench.feel(0)
     assert bench.device.rumble.left == 0.0
 
 
 def test_an_older_stiffness_is_never_felt(bench: Bench) -> None:
-    older = bench.stiffness(1.0)
-    bench.feel(0.2)
+    older = bench.stiffness(8)
+    bench.feel(2)
     felt = bench.device.effects
     bench.side.receive(older, bench.now_s)
     bench.write()
@@ -208,7 +167,7 @@ def test_hello_is_repeated_until_the_robot_answers(bench: Bench) -> None:
         bench.now_s += 0.004
         counted += hellos()
     assert 4 <= counted <= 6
-    bench.feel(0.0)
+    bench.feel(0)
     assert hellos() == 0
     bench.now_s += 2.0
     assert hellos() == 1
@@ -222,31 +181,31 @@ def test_what_the_hands_did_last_counts_no_more_without_a_controller(bench: Benc
 
 
 def test_a_controller_that_is_back_commands_nothing_before_the_arm_has_stopped(bench: Bench) -> None:
-    bench.feel(0.5)
+    bench.feel(2)
     bench.side.controller_lost(bench.now_s)
     for state, commands in (("armed", 0), ("armed", 0), ("disarmed", 1), ("armed", 1)):
         bench.now_s += 0.01
         bench.side.controller_found(bench.now_s)
-        bench.feel(0.5, state)  # type: ignore[arg-type]
+        bench.feel(2, state)  # type: ignore[arg-type]
         bench.notice(SessionState.DISARMED)
         bench.read()
         assert len(bench.commands()) == commands, state
 
 
 def test_its_emergency_stop_counts_at_once(bench: Bench) -> None:
-    bench.feel(0.5)
+    bench.feel(2)
     bench.side.controller_lost(bench.now_s)
     bench.side.controller_found(bench.now_s)
     bench.device.set_buttons(frozenset({Button.CIRCLE}))
     bench.now_s += 0.01
-    bench.feel(0.5)
+    bench.feel(2)
     bench.read()
     [command] = bench.commands()
     assert command.emergency_stop
 
 
 def test_a_controller_that_is_found_is_released_before_it_is_told_anew(bench: Bench) -> None:
-    bench.feel(0.8)
+    bench.feel(6)
     stiff = bench.device.effects
     bench.side.controller_lost(bench.now_s)
     bench.side.controller_found(bench.now_s)
@@ -260,7 +219,7 @@ def test_a_controller_that_is_found_is_released_before_it_is_told_anew(bench: Be
 def test_without_haptics_a_controller_that_is_found_is_left_alone() -> None:
     bench = Bench(haptics=False)
     bench.side.controller_found(bench.now_s)
-    bench.feel(1.0)
+    bench.feel(8)
     assert bench.device.write_count == 0
 
 
@@ -300,7 +259,7 @@ def test_the_screen_shows_the_newest_view_of_the_present_epoch(bench: Bench) -> 
 def test_garbage_is_counted_and_changes_nothing(
     bench: Bench, receive: Callable[[OperatorSide, bytes, float], None]
 ) -> None:
-    bench.feel(0.5)
+    bench.feel(2)
     receive(bench.side, b"\x93garbage", bench.now_s)
     assert bench.side.rejected == 1
     assert bench.side.output_report(bench.now_s) is None
@@ -309,16 +268,16 @@ def test_garbage_is_counted_and_changes_nothing(
 def test_a_message_of_the_wrong_kind_is_rejected(bench: Bench) -> None:
     command = MotionCommand(bench.robot.stamp(1.0), l2=0.0, r2=0.0)
     bench.side.receive(encode(command), bench.now_s)
-    bench.side.receive_view(bench.stiffness(1.0), bench.now_s)
+    bench.side.receive_view(bench.stiffness(8), bench.now_s)
     assert bench.side.rejected == 2
 
 
 def test_a_restarted_robot_is_followed(bench: Bench) -> None:
-    bench.feel(0.5)
+    bench.feel(2)
     bench.robot = LinkEnd("robot", 7, "clock")
     bench.side.receive(encode(bench.robot.hello(bench.now_s)), bench.now_s)
-    bench.feel(1.0)
-    assert sum(bench.device.effects[1].zone_strengths) == 80
+    bench.feel(8)
+    assert bench.device.effects[1].zone_strengths == (8,) * 10
 
 
 def test_an_observer_sends_nothing_but_hellos(bench: Bench) -> None:
@@ -328,7 +287,7 @@ def test_an_observer_sends_nothing_but_hellos(bench: Bench) -> None:
         bench.now_s += 0.004
         bench.read()
         bench.notice(SessionState.OBSERVING)
-        bench.feel(0.5)
+        bench.feel(2)
         sent += [decode(payload) for payload in bench.side.motion(bench.now_s)]
     assert all(isinstance(message, Hello) for message in sent)
     assert len(sent) == pytest.approx(5, abs=1)
@@ -361,7 +320,7 @@ def test_an_owner_without_a_controller_still_says_hello(bench: Bench) -> None:
     for _ in range(250):
         bench.now_s += 0.004
         bench.notice(SessionState.DISARMED)
-        bench.feel(0.0)
+        bench.feel(0)
         hellos += sum(isinstance(decode(payload), Hello) for payload in bench.side.motion(bench.now_s))
     assert hellos == pytest.approx(5, abs=1)
 
@@ -376,7 +335,7 @@ def test_an_owner_without_a_controller_still_says_hello(bench: Bench) -> None:
     ],
 )
 def test_the_status_shows_where_we_stand(bench: Bench, session: SessionState, shown: str) -> None:
-    bench.feel(0.0)
+    bench.feel(0)
     bench.notice(session, "8 others observe already")
     status = bench.side.status(bench.now_s)
     assert (status["link"], status["state"]) == (shown, "armed")
@@ -384,7 +343,7 @@ def test_the_status_shows_where_we_stand(bench: Bench, session: SessionState, sh
 
 def test_a_link_that_was_up_is_lost_and_not_awaited(bench: Bench) -> None:
     assert bench.side.status(bench.now_s)["link"] == "waiting for the robot side"
-    bench.feel(0.2)
+    bench.feel(2)
     assert bench.side.status(bench.now_s)["link"] == "up"
     bench.now_s += STIFFNESS_EXPIRES_S + 0.1
     assert bench.side.status(bench.now_s)["link"] == "lost: nothing heard from the robot"
@@ -392,12 +351,12 @@ def test_a_link_that_was_up_is_lost_and_not_awaited(bench: Bench) -> None:
 
 def test_why_it_stopped_is_shown_once_it_has_been_armed(bench: Bench) -> None:
     bench.notice(SessionState.DISARMED, "first come, and always disarmed")
-    bench.feel(0.0, "disarmed")
+    bench.feel(0, "disarmed")
     assert bench.side.status(bench.now_s)["stopped_because"] is None
-    bench.feel(0.0)
+    bench.feel(0)
     assert bench.side.status(bench.now_s)["stopped_because"] is None
     bench.notice(SessionState.STOPPED, "emergency stop")
-    bench.feel(0.0, "stopped")
+    bench.feel(0, "stopped")
     assert bench.side.status(bench.now_s)["stopped_because"] == "emergency stop"
 
 
@@ -422,12 +381,12 @@ def test_every_standing_is_in_the_summary(bench: Bench) -> None:
 
 
 def test_a_robot_side_of_another_version_is_told_apart(bench: Bench) -> None:
-    payload = bytes([0x92, PROTOCOL_VERSION + 1]) + bench.stiffness(0.5)[2:]
+    payload = bytes([0x92, PROTOCOL_VERSION + 1]) + bench.stiffness(4)[2:]
     bench.side.receive(payload, bench.now_s)
     shown = bench.side.status(bench.now_s)["link"]
     assert shown == f"refused: protocol version {PROTOCOL_VERSION + 1}; valid: {PROTOCOL_VERSION}"
     assert bench.side.rejected == 1
-    bench.feel(0.5)
+    bench.feel(2)
     assert bench.side.status(bench.now_s)["link"] == "up"
 
 

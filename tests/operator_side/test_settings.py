@@ -22,7 +22,6 @@ NAN, INFINITY = math.nan, math.inf
         (PersonSettings, "depth_error_sd_m", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "grasp_depth_m", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "lift_m", (-0.1, 10.0, NAN, INFINITY)),
-        (PersonSettings, "insistence_per_s", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "attempts", (0, -1)),
         (TriggerTravel, "dead_zone", (-0.1, 0.98, 1.5, NAN)),
         (TriggerTravel, "saturation", (0.05, 0.0, 1.1, NAN)),
@@ -51,7 +50,6 @@ def test_the_ends_of_the_ranges_are_valid() -> None:
         attempts=1,
         grasp_depth_m=0.0,
         lift_m=0.0,
-        insistence_per_s=0.0,
     )
     TriggerTravel(dead_zone=0.0, saturation=1.0)
     StickRest(dead_zone=0.0)
@@ -62,15 +60,26 @@ def test_a_real_controller_and_the_robot_on_this_machine_are_what_one_gets() -> 
     assert settings.device == "hid"
     assert settings.connect == "tcp://127.0.0.1:5555"
     assert settings.haptics
+    assert settings.compensation == "operator"
 
 
 def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     path = tmp_path / "operator.toml"
     path.write_text('device = "simulated"\nhaptics = false\n[person]\nattempts = 5\nlift_m = 0.2\n')
-    arguments = ["--config", str(path), "--haptics", "--person.attempts", "2", "--calibration.l2.dead-zone", "0.1"]
+    arguments = [
+        "--config",
+        str(path),
+        "--haptics",
+        "--compensation=robot",
+        "--person.attempts",
+        "2",
+        "--calibration.l2.dead-zone",
+        "0.1",
+    ]
     settings = parse_settings(OperatorSettings, "operator", arguments)
     assert settings.device == "simulated"
     assert settings.haptics
+    assert settings.compensation == "robot"
     assert (settings.person.attempts, settings.person.lift_m) == (2, 0.2)
     assert settings.calibration == TravelCalibration(l2=TriggerTravel(dead_zone=0.1))
 
@@ -99,12 +108,12 @@ def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["--person.insistence-per-s", "-1"], "insistence_per_s = -1"),
+        (["--person.grasp-depth-m", "-1"], "grasp_depth_m = -1"),
+        (["--compensation", "nobody"], "nobody"),
         (["--person.lift-m", "tall"], "--person.lift-m"),
         (["--calibration.left-stick.dead-zone", "1"], "dead_zone = 1"),
         (["--device", "mouse"], "mouse"),
-        (["--rendering.bands.near", "0.9"], "near = 0.9"),
-        (["--rendering.sustained.longest-s", "-1"], "longest_s = -1"),
+        (["--rendering.horizon-s", "3"], "horizon_s = 3"),
     ],
 )
 def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> None:

@@ -6,7 +6,10 @@ import pytest
 from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
 from feelahead.experiments.faults.session_bench import Bench
-from robot_side.settings import EnlargementOptions, RobotSettings
+from robot_side.ahead.law import Law, LawName, Sensed, Situation
+from robot_side.gripper.held_object import grip
+from robot_side.objects.perceived import Role
+from robot_side.settings import RobotSettings
 
 
 @pytest.fixture
@@ -110,13 +113,96 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
     assert bench.robot.summary()["loop_age_ms"]["mean"] > 0.0
 
 
-@pytest.mark.parametrize("direction", ["isotropic", "towards_object"])
-@pytest.mark.parametrize("mode", ["once", "per_configuration"])
-def test_every_way_of_enlarging_ticks(direction: str, mode: str) -> None:
-    settings = RobotSettings(enlargement=EnlargementOptions(mode=mode, direction=direction))  # type: ignore[arg-type]
-    bench = Bench(settings)
+@pytest.mark.parametrize("law", ["swept", "paper"])
+def test_every_law_ticks(law: LawName) -> None:
+    bench = Bench(RobotSettings(law=law))
     bench.tick(3)
-    assert bench.robot.summary()["enlargement_mm"]["min"] > 0.0
+    summary = bench.robot.summary()
+    assert summary["enlargement_mm"]["min"] > 0.0
+    assert summary["skipped"]["fields"] > 0
+
+
+class Listening:
+    """A law that remembers what it was told."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+        self.heard: list[Situation] = []
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        self.heard.append(situation)
+        return self._law.sense(situation, now_s)
+
+    def summary(self) -> dict[str, int]:
+        return self._law.summary()
+
+
+@pytest.fixture
+def listening(bench: Bench) -> Listening:
+    law = bench.robot._law = Listening(bench.robot._law)
+    assert isinstance(law, Listening)
+    return law
+
+
+def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) -> None:
+    operator = bench.join(2)
+    bench.drive(0.3, operator)
+    felt, situation = operator.felt[-1], listening.heard[-1]
+    assert felt.r2.full_speed_m_s == pytest.approx(0.25, rel=0.01)
+    assert 0.5 < felt.r2.acceleration_m_s2 < 20.0
+    assert felt.horizon_m == pytest.approx(
+        felt.r2.full_speed_m_s * (situation.loop_age_s + 0.3)
+        + felt.r2.full_speed_m_s**2 / (2.0 * felt.r2.acceleration_m_s2)
+        + 0.05,
+        rel=0.05,
+    )
+    # The table's target is some 20 cm ahead of the built-in arm's start, and nothing is behind it.
+    assert felt.r2.fast_m[7] < 1.0
+    assert felt.l2.fast_m[0] == felt.horizon_m
+    assert felt.rumble == 0.0
+
+
+def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench, listening: Listening) -> None:
+    operator = bench.operator(2)
+    bench.tick()
+    assert listening.heard[-1].loop_age_s == pytest.approx(1.0)
+    assert not listening.heard[-1].loop_age_known
+    bench.join(2)
+    bench.drive(0.1, bench.operators[b"operator"])
+    felt = bench.operators[b"operator"].felt
+    assert felt[0].r2.displacement_m == pytest.approx(felt[0].r2.full_speed_m_s, rel=0.05)
+    assert listening.heard[-1].loop_age_known
+    # From the worst case it falls slowly.
+    assert 0.1 < listening.heard[-1].loop_age_s < 0.9
+    assert abs(felt[-1].r2.displacement_m) < 0.01
+    assert operator.felt == []
+
+
+def test_the_law_is_told_where_the_stick_leads_and_who_predicts_only_while_the_command_holds(
+    bench: Bench, listening: Listening
+) -> None:
+    operator = bench.join(2)
+    bench.arm_it(operator)
+    bench.drive(0.1, operator, lateral=(0.3, -0.2), compensation="robot")
+    said = [(listening.heard[-1].lateral, listening.heard[-1].compensation)]
+    bench.silence(1.0)
+    said.append((listening.heard[-1].lateral, listening.heard[-1].compensation))
+    assert said == [((0.3, -0.2), "robot"), ((0.0, 0.0), "operator")]
+
+
+def test_the_law_knows_the_gap_between_the_fingers_and_what_they_hold(bench: Bench, listening: Listening) -> None:
+    bench.tick(3)
+    assert listening.heard[-1].gap_m == pytest.approx(0.085, abs=1e-3)
+    assert listening.heard[-1].held is None
+    spheres = len(listening.heard[-1].pose.sphere_radii_m)
+    # A box between the fingers, gripped.
+    objects = listening.heard[-1].objects
+    target = objects.roles.index(Role.TARGET)
+    bench.robot._held = grip(objects, target, listening.heard[-1].pose)
+    bench.robot._held_s = np.inf
+    bench.tick()
+    assert listening.heard[-1].held == target
+    assert len(listening.heard[-1].pose.sphere_radii_m) > spheres
 
 
 def test_an_echo_from_the_future_ages_nothing(bench: Bench) -> None:

@@ -4,31 +4,27 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.protocol.uniform_field import uniform_field
 from common.statistics import RunningStatistics
+from robot_side.ahead.law import Sensed
 from robot_side.figures import MOVING_M_S, RunFigures, tick_microseconds
 from robot_side.objects.perceived import Role
-from robot_side.sensing import Sensed
 from robot_side.simulation.ground_truth import Truth
-from robot_side.stiffness.map import Stiffness
 
 ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 
 
-def sensed(enlargement_m: list[float], overlap_m3: float = 0.0, l2: float = 0.0, r2: float = 0.0) -> Sensed:
-    stiffness = Stiffness(
-        l2=l2,
-        r2=r2,
+def sensed(enlargement_m: float, overlap_m3: float = 0.0, l2: int = 0, r2: int = 0) -> Sensed:
+    """l2, r2: strengths, 0 to 8."""
+    return Sensed(
+        l2=uniform_field(l2),
+        r2=uniform_field(r2),
+        speed_m_s=0.0,
+        horizon_m=0.2,
         rumble=0.0,
-        object_index=np.empty(0, dtype=np.int64),
-        contributions=np.empty((0, 3)),
-        detent_engaged=False,
-        target_capped=False,
-        rate_limited=False,
-        pairs_counted=0,
-        pairs_blended=0,
-        pairs_inside=0,
+        enlargement_m=enlargement_m,
+        overlap_m3=overlap_m3,
     )
-    return Sensed(np.array(enlargement_m), overlap_m3, stiffness)
 
 
 def truth(
@@ -53,21 +49,20 @@ def test_what_was_never_seen_is_none_and_only_counts_are_0() -> None:
 
 def test_figures_are_in_the_units_of_their_names() -> None:
     figures = RunFigures()
-    figures.tick(sensed([0.010, 0.030], 2e-6, l2=0.1, r2=0.9), 0.0)
-    figures.tick(sensed([0.050, 0.020], 4e-6, l2=0.3, r2=0.5), 0.0)
+    figures.tick(sensed(0.030, 2e-6, l2=1, r2=8), 0.0)
+    figures.tick(sensed(0.050, 4e-6, l2=3, r2=4), 0.0)
     summary = figures.summary()
     assert summary["ticks"] == 2
-    # Of each tick the largest sphere's enlargement.
     assert summary["enlargement_mm"] == pytest.approx({"min": 30.0, "mean": 40.0, "max": 50.0, "mean_moving": None})
     assert summary["overlap_mm3"] == pytest.approx({"max": 4000.0, "mean": 3000.0})
-    assert summary["stiffness"]["l2"] == pytest.approx({"mean": 0.2, "max": 0.3})
-    assert summary["stiffness"]["r2"] == pytest.approx({"mean": 0.7, "max": 0.9})
+    assert summary["stiffness"]["l2"] == pytest.approx({"mean": 0.25, "max": 0.375})
+    assert summary["stiffness"]["r2"] == pytest.approx({"mean": 0.75, "max": 1.0})
 
 
 def test_mean_moving_is_over_the_ticks_in_which_the_tool_moved() -> None:
     figures = RunFigures()
     for enlargement_m, speed_m_s in ((0.01, 0.0), (0.02, MOVING_M_S), (0.06, 0.011), (0.08, 0.25), (0.01, 0.009)):
-        figures.tick(sensed([enlargement_m]), speed_m_s)
+        figures.tick(sensed(enlargement_m), speed_m_s)
     enlargement = figures.summary()["enlargement_mm"]
     assert enlargement["mean_moving"] == pytest.approx(70.0)
     assert enlargement["mean"] == pytest.approx(36.0)
@@ -173,9 +168,9 @@ def test_tick_times_are_in_microseconds() -> None:
 
 def test_a_summary_is_json_and_stays_as_it_was_taken() -> None:
     figures = RunFigures()
-    figures.tick(sensed([0.01]), 0.1)
+    figures.tick(sensed(0.01), 0.1)
     first = figures.summary()
-    figures.tick(sensed([0.03]), 0.1)
+    figures.tick(sensed(0.03), 0.1)
     assert json.loads(json.dumps(first)) == first
     assert first["ticks"] == 1
     assert figures.summary()["enlargement_mm"]["max"] == pytest.approx(30.0)

@@ -8,8 +8,9 @@ import pytest
 from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from robot_side.assembly import build_robot_side
+from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
-from robot_side.settings import CameraSettings, EncoderSettings, EnlargementOptions, RobotSettings
+from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
 
 NAN, INFINITY = math.nan, math.inf
 
@@ -23,7 +24,7 @@ NAN, INFINITY = math.nan, math.inf
         (CameraSettings, "sd_m", (-1e-6, 1.1, NAN, INFINITY)),
         (CameraSettings, "frame_sd_m", (-1e-6, 1.1, NAN, INFINITY)),
         (RobotSettings, "assumed_delay_s", (0.0, -1.0, 60.1, NAN, INFINITY)),
-        (RobotSettings, "spheres", (0, -3, 1001)),
+        (RobotSettings, "cover_m", (0.0, 4e-4, 0.051, NAN, INFINITY)),
         (RobotSettings, "probability", (0.0, 1.0, -0.1, 1.5, NAN)),
         (RobotSettings, "duration", (0.0, -1.0, NAN, INFINITY)),
         (RobotSettings, "seed", (-1,)),
@@ -40,19 +41,20 @@ def test_every_value_out_of_range_is_named_with_what_is_valid(
 
 
 @pytest.mark.parametrize(
-    ("options", "named"),
-    [
-        ({"kinematic_mean_m": (0.0, NAN, 0.0)}, "kinematic_mean_m"),
-        ({"kinematic_mean_m": (INFINITY, 0.0, 0.0)}, "kinematic_mean_m"),
-        ({"measure": "largest"}, "measure = 'largest'"),
-        ({"mode": "twice"}, "mode = 'twice'"),
-        ({"direction": "forwards"}, "direction = 'forwards'"),
-    ],
+    "mean_m", [(0.0, NAN, 0.0), (INFINITY, 0.0, 0.0), (0.0, 0.0, -INFINITY)], ids=["nan", "infinite", "minus infinite"]
 )
-def test_bad_enlargement_options_are_found_before_anything_starts(options: dict[str, Any], named: str) -> None:
-    with pytest.raises(ConfigurationError, match=named) as caught:
-        RobotSettings(enlargement=EnlargementOptions(**options))
-    assert "finite" in str(caught.value) or "valid" in str(caught.value)
+def test_a_mean_that_is_not_finite_is_found_before_anything_starts(mean_m: tuple[float, float, float]) -> None:
+    with pytest.raises(ConfigurationError, match="kinematic_mean_m"):
+        RobotSettings(kinematic_mean_m=mean_m)
+    with pytest.raises(ValueError, match="mean_m"):
+        CameraSettings(mean_m=mean_m)
+
+
+def test_the_cameras_mean_is_of_every_axis_or_of_each() -> None:
+    assert CameraSettings(mean_m=-0.002).mean_vector_m == (-0.002, -0.002, -0.002)
+    assert CameraSettings(mean_m=(0.001, 0.0, -0.003)).mean_vector_m == (0.001, 0.0, -0.003)
+    with pytest.raises(ValueError, match=r"mean_m = 1\.1"):
+        CameraSettings(mean_m=(0.0, 1.1, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -61,8 +63,8 @@ def test_bad_enlargement_options_are_found_before_anything_starts(options: dict[
         (EncoderSettings, {"sigma_rad": 0.0, "resolution_rad": 0.0}),
         (EncoderSettings, {"sigma_rad": 1.0, "resolution_rad": 1.0}),
         (CameraSettings, {"mean_m": -1.0, "sd_m": 0.0, "frame_sd_m": 1.0}),
-        (RobotSettings, {"assumed_delay_s": 0.001, "spheres": 1, "probability": 1e-9}),
-        (RobotSettings, {"assumed_delay_s": 60.0, "spheres": 1000, "probability": 1.0 - 1e-9}),
+        (RobotSettings, {"assumed_delay_s": 0.001, "cover_m": 0.0005, "probability": 1e-9}),
+        (RobotSettings, {"assumed_delay_s": 60.0, "cover_m": 0.05, "probability": 1.0 - 1e-9}),
     ],
 )
 def test_the_ends_of_the_ranges_are_valid(kind: Callable[..., Any], values: dict[str, Any]) -> None:
@@ -85,23 +87,30 @@ def test_one_of_them_may_stand_in_the_file_and_the_other_on_the_command_line(tmp
 
 
 def test_the_enlargement_knows_both_parts_of_the_cameras_error() -> None:
-    settings = RobotSettings(
+    prediction = PredictionErrors(arm="0123456789ab")
+    known = RobotSettings(
         probability=0.9,
         camera=CameraSettings(mean_m=-0.002, sd_m=0.003, frame_sd_m=0.004),
-        enlargement=EnlargementOptions(
-            kinematic_mean_m=(0.001, 0.0, -0.001), measure="trace", mode="once", direction="towards_object"
-        ),
-    ).enlargement_settings()
-    assert settings.probability == 0.9
-    assert settings.camera_mean_m == -0.002
-    assert settings.camera_sd_m == pytest.approx(0.005)
-    assert settings.kinematic_mean_m == (0.001, 0.0, -0.001)
-    assert (settings.measure, settings.mode, settings.direction) == ("trace", "once", "towards_object")
+        kinematic_mean_m=(0.001, 0.0, -0.001),
+    ).uncertainty(prediction)
+    assert known.probability == 0.9
+    assert known.camera_mean_m == (-0.002, -0.002, -0.002)
+    assert known.camera_sd_m == pytest.approx(0.005)
+    assert known.kinematic_mean_m == (0.001, 0.0, -0.001)
+    assert known.prediction is prediction
+
+
+def test_the_law_is_the_swept_one_unless_the_papers_is_asked_for() -> None:
+    assert RobotSettings().law == "swept"
+    assert parse_settings(RobotSettings, "robot", ["--law", "paper"]).law == "paper"
 
 
 ROBOT_TOML = """
 probability = 0.95
-spheres = 24
+cover_m = 0.005
+law = "paper"
+kinematic_mean_m = [0.0, 0.001, 0.0]
+prediction_errors = "errors.toml"
 model = "arms/arm.xml"
 site = "tool"
 [roles]
@@ -109,25 +118,37 @@ post = "ignored"
 box = "target"
 [camera]
 sd_m = 0.001
-[enlargement]
-kinematic_mean_m = [0.0, 0.001, 0.0]
-direction = "towards_object"
+mean_m = [0.001, 0.0, 0.002]
 [safety]
 gap_s = 0.2
 """
 
 
+@pytest.mark.parametrize(
+    ("arguments", "mean_m"),
+    [
+        (["--camera.mean-m", "0.01"], 0.01),
+        (["--camera.mean-m=-0.01"], -0.01),
+        (["--camera.mean-m", "0.01", "0.0", "0.02"], (0.01, 0.0, 0.02)),
+    ],
+)
+def test_the_cameras_mean_is_one_number_or_three_on_the_command_line(
+    arguments: list[str], mean_m: float | tuple[float, float, float]
+) -> None:
+    assert parse_settings(RobotSettings, "robot", arguments).camera.mean_m == mean_m
+
+
 def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     path = tmp_path / "robot.toml"
     path.write_text(ROBOT_TOML)
-    settings = parse_settings(RobotSettings, "robot", ["--config", str(path), "--spheres", "8", "--camera.mean-m=0.01"])
+    settings = parse_settings(RobotSettings, "robot", ["--config", str(path), "--cover-m", "0.01", "--law", "swept"])
     assert settings.probability == 0.95
-    assert settings.spheres == 8
+    assert (settings.cover_m, settings.law) == (0.01, "swept")
+    assert settings.prediction_errors == Path("errors.toml")
     assert (settings.model, settings.site) == (Path("arms/arm.xml"), "tool")
     assert settings.roles == {"post": Role.IGNORED, "box": Role.TARGET}
-    assert settings.camera == CameraSettings(mean_m=0.01, sd_m=0.001)
-    assert settings.enlargement.kinematic_mean_m == (0.0, 0.001, 0.0)
-    assert settings.enlargement.direction == "towards_object"
+    assert settings.camera == CameraSettings(mean_m=(0.001, 0.0, 0.002), sd_m=0.001)
+    assert settings.kinematic_mean_m == (0.0, 0.001, 0.0)
     assert settings.safety.gap_s == 0.2
     assert settings.motion == RobotSettings().motion
 
@@ -136,13 +157,17 @@ def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     ("content", "named"),
     [
         ('[roles]\npost = "enemy"', "enemy"),
-        ("[enlargement]\nkinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
+        ("kinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
+        ("[camera]\nmean_m = [0.0, 0.001]", "mean_m"),
         ("[camera]\nsd_m = nan", "sd_m = nan"),
         ("[encoder]\nsigma_rad = 2.0", "sigma_rad = 2.0"),
         ("model = 3", "model"),
-        ("spheres = 0", "--spheres 0"),
-        ("spheres = 8.5", "spheres"),
-        ("[stiffness]\nreference = 'volume'", "volume"),
+        ("cover_m = 0", "cover_m = 0"),
+        ("cover_m = 'fine'", "cover_m"),
+        ("law = 'alignment'", "law"),
+        ("spheres = 16", "spheres"),
+        ("[stiffness]\nreference = 'volume'", "stiffness"),
+        ("[enlargement]\nmode = 'once'", "enlargement"),
         ("[motion]\nstick_speed_m_s = 9.0", "stick_speed_m_s = 9.0"),
         ("[safety]\ngap_s = 0", "gap_s = 0"),
     ],
@@ -164,7 +189,8 @@ def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, 
         (["--encoder.sigma-rad", "-1"], "sigma_rad = -1"),
         (["--camera.frame-sd-m", "2"], "frame_sd_m = 2"),
         (["--assumed-delay-s", "0"], "assumed_delay_s = 0"),
-        (["--enlargement.direction", "up"], "up"),
+        (["--law", "alignment"], "alignment"),
+        (["--cover-m", "1"], "cover_m = 1"),
         (["--motion.turn-speed-rad-s", "nan"], "turn_speed_rad_s = nan"),
         (["--safety.max-delay-s", "0"], "max_delay_s = 0"),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from common.arrays import FloatArray
-from feelahead.approaches.approach import REACTION_S
+from common.reaction import HORIZON_S, REACTION_S
 from feelahead.benchmarks.coverage.laws import Draw, FieldLaw
 from feelahead.benchmarks.coverage.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
@@ -19,8 +19,6 @@ from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 from robot_side.simulation.posed_scene import PosedScene
 
-HORIZON_S: Final = 0.30
-"""The reaction, the finger's own 0.04 s and the write's 0.01 s: for so long a zone's speed goes on."""
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
 """So much farther off than D_σ nothing calls for strength."""

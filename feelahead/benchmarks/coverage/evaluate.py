@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray
+from common.reaction import HORIZON_S
 from feelahead.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.approaches.recording import record_approach
 from feelahead.approaches.spoilt import Spoil
@@ -17,8 +18,6 @@ from feelahead.benchmarks.coverage.covered import false_alarms, lateness_s, stoo
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import Draw, FieldLaw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
-from robot_side.enlargement.distance import Enlargement, EnlargementSettings
-from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.posed_scene import PosedScene
@@ -65,7 +64,7 @@ class Row:
     """Of the time in which R2 was pulled."""
     judged_s: float
     margin_mm: float | None
-    """The fixed enlargement of the law `margin`: the first law's mean while moving. None where that law is left out."""
+    """The distance of the law `margin`: how far the law swept feels on average. None where that law is left out."""
 
 
 @dataclass
@@ -143,7 +142,7 @@ def _evaluate_cell(cell: Cell, staged: Sequence[_Staged], plan: Plan, spoil: Spo
     rows = []
     for probability in plan.probabilities:
         replays = [one.replay for one in staged]
-        margin_m = mean_enlargement_m(replays, cell, probability) if "margin" in plan.laws else None
+        margin_m = mean_way_m(replays) if "margin" in plan.laws else None
         for name in plan.laws:
             counts, law = _Counts(), make_law(name, probability, margin_m, spoil)
             _count_covered(counts, law, cell, staged, probability)
@@ -188,19 +187,16 @@ def _count_alarms(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[_
             counts.judged_s += alarms.judged_s
 
 
-def mean_enlargement_m(replays: Sequence[Replay], cell: Cell, probability: float) -> float:
-    """The first law's enlargement, on average over the gripper's spheres and all rows in which the tool moves."""
-    settings = EnlargementSettings(probability=probability, camera_sd_m=1e-3 * cell.camera_mm)
-    enlargement, found = Enlargement(settings), []
+def mean_way_m(replays: Sequence[Replay]) -> float:
+    """How far ahead the law swept feels on average while the tool moves: v (t_d + h) + v²/2a."""
+    found = []
     for replay in replays:
         record = replay.record
         for row in range(0, len(record.pose_time_s), 5):
-            if abs(replay.approach_speed_m_s[row]) > _MOVING_M_S:
-                jacobians = replay.estimated[row].sphere_jacobians
-                velocities = jacobians @ record.joint_velocities_rad_s[row]
-                covariances = position_covariance(jacobians, replay.encoder_sigma_rad)
-                age_s = float(record.loop_age_s[row])
-                found.append(float(enlargement.distances(covariances, velocities, age_s).mean()))
+            speed = abs(replay.approach_speed_m_s[row])
+            if speed > _MOVING_M_S:
+                braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(float(record.pose_time_s[row])))
+                found.append(speed * (float(record.loop_age_s[row]) + HORIZON_S) + braking_m)
     return float(np.mean(found)) if found else 0.0
 
 

@@ -1,26 +1,31 @@
 """What each law puts on the triggers' zones at given moments of a recorded approach."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import Header, StiffnessUpdate
-from feelahead.approaches.laws import Law, stiffness_settings
+from feelahead.approaches.laws import Law, compensation_of, law_of_robot
+from feelahead.approaches.margin_law import MarginLaw
 from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from feelahead.benchmarks.coverage.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
-from operator_side.hands.travel_calibration import TravelCalibration
-from robot_side.enlargement.distance import Enlargement, EnlargementSettings
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from robot_side.ahead.law import Law as RobotLaw
+from robot_side.ahead.law import Sensed, Situation
+from robot_side.ahead.paper_law import PaperLaw
+from robot_side.ahead.swept_law import SweptLaw
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.sensing import AheadSensing
-from robot_side.stiffness.map import StiffnessMap
+from robot_side.simulation.joint_reference import MotionLimits
 
-_REMEMBERED_ROWS = 8
-"""80 ms before the first moment asked for: longer than the first law's rate limits last. Its bands remember more: one
-band, where the stiffness has just fallen."""
+_TRAVEL: Final = TriggerTravel()
 
 
 @dataclass(frozen=True)
@@ -55,60 +60,92 @@ class Constant:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The shipped pipeline, tick by tick, with the messages' own delays, under one law that it can follow."""
+    """The shipped pipeline: the field by the pose before the message left, the zones by when they are felt.
+
+    Between the moments asked for nothing is rendered, so that a strength falls as from one moment to the next.
+    """
 
     law: Law
     probability: float
     margin_m: float | None = None
-    """A fixed enlargement in place of eq. 8-10: the law `margin`."""
+    """The distance of the law `margin`."""
     spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
         """As any law's."""
         record = draw.replay.record
-        felt_s = times_s - (SPOILING_DELAY_S if self.spoil == "delayed" else 0.0)
-        sent_s = record.seen_sent_s[[record.tick_row(time_s) for time_s in felt_s]]
-        rows = np.array([-1 if np.isnan(sent) else record.pose_row(sent) for sent in sent_s])
+        law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
         strengths = np.zeros((len(times_s), 2, ZONE_COUNT), dtype=np.int64)
-        known = rows >= 0
-        if known.any():
-            first, last = max(0, int(rows[known].min()) - _REMEMBERED_ROWS), int(rows[known].max())
-            by_row = self._rows(draw, first, last)
-            strengths[known] = by_row[rows[known] - first]
+        for number, time_s in enumerate(times_s):
+            felt_s = float(time_s) - (SPOILING_DELAY_S if self.spoil == "delayed" else 0.0)
+            tick = record.tick_row(felt_s)
+            sent_s = record.seen_sent_s[tick]
+            if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
+                continue
+            row = record.pose_row(float(sent_s))
+            sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
+            pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
+            message = _message(sensed, row)
+            shown = rendering.render(
+                message, (pulled[0], pulled[1]), self._under_way(draw.replay, sensed, row, felt_s), felt_s
+            )
+            for trigger, effect in enumerate((shown.l2, shown.r2)):
+                strengths[number, trigger] = 0 if effect is None else effect.zone_strengths
         return strengths[:, ::-1] if self.spoil == "swapped" else strengths
 
-    def _rows(self, draw: Draw, first: int, last: int) -> IntArray:
-        """Strengths (rows, 2, 10) that follow from the poses' rows `first` to `last`."""
-        replay, record = draw.replay, draw.replay.record
-        settings = EnlargementSettings(
-            probability=self.probability, camera_sd_m=draw.camera_sd_m, fixed_m=self.margin_m
+    def _law(self, draw: Draw) -> RobotLaw:
+        replay = draw.replay
+        uncertainty = Uncertainty(
+            self.probability, camera_sd_m=draw.camera_sd_m, prediction=load_prediction_errors(BUILT_IN)
         )
-        stiffness_map = StiffnessMap(stiffness_settings(self.law))
-        sensing = AheadSensing(Enlargement(settings), stiffness_map, replay.encoder_sigma_rad)
-        rendering = TriggerRendering(RenderingSettings(), TravelCalibration())
-        strengths = np.empty((last + 1 - first, 2, ZONE_COUNT), dtype=np.int64)
-        for row in range(first, last + 1):
-            now_s = float(record.pose_time_s[row])
-            sensed = sensing.sense(
-                replay.estimated[row],
-                record.joint_velocities_rad_s[row],
-                draw.objects,
-                float(record.loop_age_s[row]),
-                None,
-                None,
-                now_s,
-            )
-            header = Header(epoch=1, sequence=row, sent_s=now_s)
-            stiffness = sensed.stiffness
-            message = StiffnessUpdate(header, l2=stiffness.l2, r2=stiffness.r2, rumble=0.0, state="armed")
-            shown = rendering.render(message, now_s)
-            for trigger, effect in enumerate((shown.l2, shown.r2)):
-                strengths[row - first, trigger] = 0 if effect is None else effect.zone_strengths
-        return strengths
+        arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
+        law: RobotLaw = PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
+        return MarginLaw(law, self.margin_m or 0.0) if self.law == "margin" else law
+
+    def _situation(self, draw: Draw, row: int) -> Situation:
+        replay, record = draw.replay, draw.replay.record
+        return Situation(
+            pose=replay.estimated[row],
+            joint_velocities_rad_s=record.joint_velocities_rad_s[row],
+            objects=draw.objects,
+            loop_age_s=float(record.loop_age_s[row]),
+            loop_age_known=True,
+            compensation=compensation_of(self.law),
+            gap_m=None,
+            held=None,
+            lateral=(0.0, 0.0),
+        )
+
+    def _under_way(self, replay: Replay, sensed: Sensed, row: int, now_s: float) -> Displacement | None:
+        """δ and w by the commands under way since the pose in `row`; None where the robot side's are felt."""
+        if compensation_of(self.law) == "robot":
+            return None
+        record, then_s = replay.record, float(replay.record.pose_time_s[row])
+        tick = record.tick_row(then_s)
+        echo_sent_s = float(record.applied_sent_s[tick])
+        if np.isnan(echo_sent_s):
+            return None
+        held_s = then_s - float(record.applied_at_s[tick])
+        able = sensed.r2
+        return replay.commands.displacement(
+            now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s, able.acceleration_m_s2
+        )
+
+
+def _message(sensed: Sensed, row: int) -> StiffnessUpdate:
+    return StiffnessUpdate(
+        Header(epoch=1, sequence=row, sent_s=0.0),
+        l2=sensed.l2,
+        r2=sensed.r2,
+        speed_m_s=sensed.speed_m_s,
+        horizon_m=sensed.horizon_m,
+        rumble=sensed.rumble,
+        state="armed",
+    )
 
 
 def make_law(law: Law, probability: float, margin_m: float | None = None, spoil: Spoil = "nothing") -> FieldLaw:
-    """`law` at P. margin_m: the fixed enlargement of `margin`, which the other laws do not look at."""
+    """`law` at P. margin_m: the distance of `margin`, which the other laws do not look at."""
     if law in ("none", "full"):
         return Constant(MAX_STRENGTH if law == "full" else 0)
     return Pipeline(law, probability, margin_m if law == "margin" else None, spoil)

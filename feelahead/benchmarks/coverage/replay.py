@@ -1,7 +1,6 @@
 """A recorded approach as both sides saw it: true motion, estimated poses, and when a release would have stopped it."""
 
 import math
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from common.arrays import FloatArray
 from feelahead.approaches.recording import RecordedApproach
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
+from operator_side.feel.commands_under_way import CommandsUnderWay
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
@@ -20,8 +20,9 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene
 
-_SPHERES = 16
 _SLOW_M_S = 0.01
+_WHOLE_S = 1000.0
+"""Longer than any record."""
 _ASKED_M_S = 0.05
 _STALLED_ROWS = 25
 """An arm at half of what it is told for a quarter of a second is not just getting there."""
@@ -38,8 +39,9 @@ class Replay:
         """`scene`: any with the arm that was recorded, for its kinematics."""
         self.record = record
         self.encoder = encoder
-        self._kinematics = MujocoKinematics(scene, _SPHERES)
+        self._kinematics = MujocoKinematics(scene)
         self._seed = seed
+        self.motion = ToolMotionSettings()
         true = [self._pose(row, record.joint_positions_rad[row]) for row in range(len(record.pose_time_s))]
         axis = true[record.pose_row(record.began_s)].tool_rotation[:, 2]
         start_m = true[record.pose_row(record.began_s)].tool_position_m
@@ -58,6 +60,19 @@ class Replay:
         self._axes = [pose.tool_rotation[:, 2] for pose in true]
         self.end_s = self._end_s()
         """When the record ends, or the arm no longer does what it is told: at the edge of its reach."""
+
+    @property
+    def joints(self) -> int:
+        """How many joints the arm has."""
+        return len(self.record.joint_positions_rad[0])
+
+    @cached_property
+    def commands(self) -> CommandsUnderWay:
+        """All commands of the record, as their sender remembers them."""
+        commands = CommandsUnderWay(window_s=_WHOLE_S)
+        for time_s, travel in zip(self.record.command_time_s, self.record.command, strict=True):
+            commands.sent(float(time_s), float(travel))
+        return commands
 
     @cached_property
     def encoder_sigma_rad(self) -> FloatArray:
@@ -81,8 +96,7 @@ class Replay:
             gripper_opening_m=0.0,
             gripper_holding=False,
         )
-        pose = self._kinematics.pose(state)
-        return replace(pose, sphere_jacobians=pose.sphere_jacobians.copy())
+        return self._kinematics.pose(state)
 
     def joints_at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
         """True joint positions and velocities (n,) at `time_s`, between the rows of the poses."""
@@ -129,7 +143,7 @@ class Replay:
         ticks = [record.tick_row(time_s) for time_s in record.pose_time_s]
         sent_s = np.nan_to_num(record.applied_sent_s[ticks], nan=-np.inf)
         rows = np.searchsorted(record.command_time_s, sent_s + 1e-9) - 1
-        asked = ToolMotionSettings().trigger_speed_m_s * np.where(rows >= 0, record.command[rows], 0.0)
+        asked = self.motion.trigger_speed_m_s * np.where(rows >= 0, record.command[rows], 0.0)
         behind = (asked > _ASKED_M_S) & (self.approach_speed_m_s < 0.5 * asked)
         lasting = 0
         for row, stalled in enumerate(behind):

@@ -11,8 +11,8 @@ from feelahead.approaches.laws import Law
 from feelahead.approaches.pulls import PullKind, make_pull
 from feelahead.approaches.recording import record_approach
 from feelahead.approaches.spoilt import Spoil
-from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion
-from feelahead.benchmarks.coverage.evaluate import mean_enlargement_m
+from feelahead.benchmarks.coverage.cells import LINKS
+from feelahead.benchmarks.coverage.evaluate import mean_way_m
 from feelahead.benchmarks.coverage.replay import Replay
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.scene import load_scene
@@ -70,7 +70,7 @@ def _kind(seed: int) -> PullKind:
 
 @cache
 def _margin_m(seed: int) -> float:
-    """The first law's mean enlargement in this very pull."""
+    """How far ahead the law swept feels on average in this very pull."""
     scene = load_scene(frozen_scene("empty"), SITE)
     replay = Replay(record_approach(_kind(seed), LINKS[_LINK], seed), scene, EncoderSettings(), seed)
-    return mean_enlargement_m([replay], Cell(Motion(_kind(seed), _LINK), "empty"), _PROBABILITY)
+    return mean_way_m([replay])

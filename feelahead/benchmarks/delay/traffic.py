@@ -10,11 +10,13 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, MotionCommand, StiffnessUpdate
+from common.protocol.uniform_field import FAR_M, uniform_field
 from feelahead.benchmarks.delay.peers import Stamps
 
 ROBOT_PERIOD_S = 1 / 1000
 OPERATOR_PERIOD_S = 1 / 250
 _HELLO_S = 0.25
+_FREE = uniform_field(0)
 
 Shape = Literal["normal", "exponential"]
 
@@ -136,7 +138,9 @@ class Traffic:
     def _say_robot(self, now_s: float) -> Hello | StiffnessUpdate:
         if self.robot.peer_epoch is None or now_s < _HELLO_S:
             return self.robot.hello(now_s)
-        return StiffnessUpdate(self.robot.stamp(now_s), l2=0.0, r2=0.0, rumble=0.0, state="disarmed")
+        return StiffnessUpdate(
+            self.robot.stamp(now_s), _FREE, _FREE, speed_m_s=0.0, horizon_m=FAR_M, rumble=0.0, state="disarmed"
+        )
 
     def _say_operator(self, now_s: float) -> Hello | MotionCommand:
         if self.operator.peer_epoch is None:

@@ -2,9 +2,10 @@
 
     feelahead bench effects
 
-The robot side's end sends a stiffness every millisecond, and changes it now and then; the operator side runs as
-always, but for its controller, whose handle notes when each report is written instead of handing it to the system.
-What the system and the cable add comes on top: on USB a report waits for its turn of some milliseconds.
+The robot side's end sends a field every millisecond, and now and then lets R2 stiffen, or disarms, so that it is
+released: what has to be felt at once (strength that only falls takes a tenth of a second by design). The operator side
+runs as always, but for its controller, whose handle notes when each report is written instead of handing it to the
+system. What the system and the cable add comes on top: on USB a report waits for its turn of some milliseconds.
 """
 
 import multiprocessing
@@ -34,7 +35,7 @@ from operator_side.main import command as operator_command
 PROGRAM = "feelahead bench effects"
 GOAL_P99_MS: Final = 2.0
 _REPORT_PERIOD_S: Final = 0.004
-_LEVELS: Final = (0.2, 0.8)
+_STRENGTH: Final = 7
 _SHORTEST_HOLD_S, _LONGEST_HOLD_S = 0.03, 0.06
 """A stiffness holds for so long: at random, so that no beat with the loop's own periods is mistaken for speed."""
 _REST_S: Final = 3.0
@@ -48,7 +49,7 @@ class EffectLatencySettings:
     """How long it takes from a change of stiffness until the controller is told."""
 
     changes: Annotated[int, tyro.conf.arg(metavar="N")] = 500
-    """So many changes of stiffness."""
+    """So many times R2 is released, or stiffens."""
     quick: bool = False
     """Fifty of them."""
     transport: Annotated[str, tyro.conf.arg(metavar="usb|bluetooth")] = "usb"
@@ -167,7 +168,7 @@ def measure(settings: EffectLatencySettings) -> Outcome:
             bar = progress.add_task("changes", total=count)
             changed_s = []
             for number in range(count):
-                source.r2 = _LEVELS[(number + 1) % 2]
+                source.state = "disarmed" if number % 2 == 0 else "armed"
                 changed_s.append(source.change())
                 source.run(float(generator.uniform(_SHORTEST_HOLD_S, _LONGEST_HOLD_S)))
                 progress.advance(bar)
@@ -218,7 +219,7 @@ def bench_effects(arguments: Sequence[str]) -> int:
 
 def _wait_for(source: StiffnessSource) -> None:
     """Until the operator side is there and its controller, too, which its commands show."""
-    source.r2 = _LEVELS[0]
+    source.r2 = _STRENGTH
     for _ in range(round(_PATIENCE_S / 0.1)):
         source.run(0.1)
         if source.commands > 0:

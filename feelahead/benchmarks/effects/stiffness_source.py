@@ -1,4 +1,4 @@
-"""The robot side's end of the link without a robot: it grants the lease and says what stiffness it is told to."""
+"""The robot side's end of the link without a robot: it grants the lease, and its fields are as stiff as it is told."""
 
 from types import TracebackType
 
@@ -8,6 +8,7 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
 from common.protocol.session import SessionState
+from common.protocol.uniform_field import FAR_M, uniform_field
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.sockets.robot import RobotSockets
 
@@ -20,8 +21,10 @@ class StiffnessSource:
     """One operator side's counterpart on loopback, in real time."""
 
     def __init__(self) -> None:
-        self.l2 = 0.0
-        self.r2 = 0.0
+        self.l2 = 0
+        """The strength in every zone of L2, 0 to 8."""
+        self.r2 = 0
+        """And of R2."""
         self.state: MotionState = "armed"
         self.commands = 0
         """Motion commands that came."""
@@ -102,5 +105,13 @@ class StiffnessSource:
             notice = LeaseNotice(self._link.stamp(now_s), session=session, why="", token=1, waiting=0)
             self._sockets.send(self._peer, encode(notice))
         self.sent_s = self._clock.now()
-        stiffness = StiffnessUpdate(self._link.stamp(self.sent_s), l2=self.l2, r2=self.r2, rumble=0.0, state=self.state)
+        stiffness = StiffnessUpdate(
+            self._link.stamp(self.sent_s),
+            l2=uniform_field(self.l2),
+            r2=uniform_field(self.r2),
+            speed_m_s=0.0,
+            horizon_m=FAR_M,
+            rumble=0.0,
+            state=self.state,
+        )
         self._sockets.send(self._peer, encode(stiffness))

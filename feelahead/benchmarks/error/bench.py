@@ -136,6 +136,8 @@ def _write(settings: ErrorBenchSettings, found: Found, frozen: str) -> None:
         figures = [*propagation_figures(found.outcomes, found.microseconds), *prediction_figures(found.judged)]
         write_figures(settings.csv, figures)
     if settings.table is not None:
-        settings.table.write_text(error_table(found.judged, frozen, full_speed_m_s()), encoding="utf-8")
+        settings.table.write_text(
+            error_table(found.judged, load_scene().robot.fingerprint, frozen, full_speed_m_s()), encoding="utf-8"
+        )
     if settings.picture is not None:
         draw(found.outcomes, found.microseconds, found.judged, frozen, settings.picture)

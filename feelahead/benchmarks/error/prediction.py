@@ -9,9 +9,9 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray
 from feelahead.approaches.pulls import PullKind
 from feelahead.approaches.recording import RecordedApproach
-from feelahead.benchmarks.error.gripper import ability
 from feelahead.benchmarks.error.tool_path import PoseAt, ToolPath
 from operator_side.feel.commands_under_way import CommandsUnderWay
+from robot_side.arm.ability import along_approach
 from robot_side.simulation.joint_reference import MotionLimits
 
 Compensation = Literal["operator", "robot", "momentary"]
@@ -132,7 +132,8 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
     way_m = path.ways_m(at.reported_s, at.arrives_s)
     speed_m_s = path.speeds_m_s(at.reported_s)
     full_m_s, here_m_s2 = path.full_speeds_m_s(at.reported_s), path.accelerations_m_s2(at.reported_s)
-    home = ability(pose_at(record.joint_positions_rad[0]), limits, full_speed_m_s)
+    pose = pose_at(record.joint_positions_rad[0])
+    home = along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s)
     fixed_m_s2 = (home.acceleration_m_s2, 2.0, 3.0, 5.0, np.inf)
     candidates = [
         (full_m_s, here_m_s2),

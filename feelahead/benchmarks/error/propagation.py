@@ -13,7 +13,7 @@ from common.arrays import FloatArray
 from feelahead.benchmarks.error.chain import Chain
 from feelahead.benchmarks.error.gripper import PosedGripper
 from robot_side.arm.port import GripperPose
-from robot_side.enlargement.kinematic_error import directional_variance, position_covariance, scalar_variance
+from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 
 NOISE_RAD = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Standard deviations of every joint's error."""
@@ -146,14 +146,14 @@ def sampled_configurations(gripper: PosedGripper, seed: int) -> FloatArray:
 def _share_along(gripper: PosedGripper, configuration: FloatArray) -> float:
     pose = gripper.at(configuration)
     estimate = linear(pose.tool_jacobian[:3], 1.0, pose.tool_rotation[:, 2])
-    return estimate.sd_m**2 / float(scalar_variance(estimate.covariance_m2))
+    return estimate.sd_m**2 / largest_eigenvalue(estimate.covariance_m2)
 
 
 def largest_variance(gripper: PosedGripper, seed: int) -> float:
     """m²/rad²: the largest eigenvalue of J Jᵀ of any sphere in any sampled configuration."""
     unit = np.ones(len(gripper.home_rad))
     return max(
-        float(scalar_variance(position_covariance(gripper.at(configuration).sphere_jacobians, unit)).max())
+        largest_eigenvalue(position_covariance(gripper.at(configuration).sphere_jacobians, unit))
         for configuration in sampled_configurations(gripper, seed)
     )
 
@@ -165,6 +165,11 @@ def points(pose: GripperPose) -> dict[str, tuple[FloatArray, FloatArray]]:
         "tool": (pose.tool_position_m, pose.tool_jacobian[:3]),
         "far sphere": (pose.sphere_centers_m[farthest], pose.sphere_jacobians[farthest]),
     }
+
+
+def largest_eigenvalue(covariances: FloatArray) -> float:
+    """The variance in the worst direction, of all covariances (..., 3, 3)."""
+    return float(np.linalg.eigvalsh(covariances).max())
 
 
 def measure_propagation(

@@ -81,8 +81,11 @@ def by_compensation(kind: Compensation) -> Choose:
     return lambda one: one.errors_m[kind]
 
 
-def error_table(judged: Sequence[Judged], frozen: str, full_speed_m_s: float) -> str:
-    """μ_δ and σ_δ of eq. 10 over loop age and kind of compensation, as TOML; bins without a moment are left out."""
+def error_table(judged: Sequence[Judged], arm: str, frozen: str, full_speed_m_s: float) -> str:
+    """μ_δ and σ_δ of eq. 10 over loop age and kind of compensation, as TOML; bins without a moment are left out.
+
+    arm: the fingerprint of the one that they were measured on.
+    """
     pulls, links = (", ".join(f'"{name}"' for name in dict.fromkeys(names)) for names in _names(judged))
     lines = [
         "# How wrong the predicted displacement is: truth less prediction along the direction in which R2 advances, so",
@@ -90,6 +93,7 @@ def error_table(judged: Sequence[Judged], frozen: str, full_speed_m_s: float) ->
         "# [[operator]]: by the commands under way, as their sender knows them. [[robot]]: v t_d, t_d the robot's high",
         "# quantile of the loop age (eq. 8). [[momentary]]: v times the present loop age. Moments at the edge of the",
         "# arm's reach, where it cannot do what it is told, are not in it.",
+        f'arm = "{arm}"',
         f'frozen = "{frozen}"',
         f"full_speed_m_s = {full_speed_m_s:g}",
         f"pulls = [{pulls}]",

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from feelahead.approaches.recording import RecordedApproach
-from feelahead.benchmarks.error.gripper import ability
+from robot_side.arm.ability import along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.simulation.joint_reference import MotionLimits
 
@@ -22,7 +22,7 @@ class ToolPath:
     def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> None:
         """Follow `record` by the true joints; `limits` and v_max say what is within reach."""
         poses = [pose_at(joints) for joints in record.joint_positions_rad]
-        able = [ability(pose, limits, full_speed_m_s) for pose in poses]
+        able = [along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s) for pose in poses]
         self.time_s = record.pose_time_s
         self._positions_m = np.array([pose.tool_position_m for pose in poses])
         self._axes = np.array([pose.tool_rotation[:, 2] for pose in poses])

@@ -13,6 +13,7 @@ from rich.console import Console
 from common.command.command_line import parse_settings
 from feelahead.approaches.approach import Approach, run_approach
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.laws import compensation_of, without_compensation
 from feelahead.approaches.outcome import Outcome
 from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
@@ -72,7 +73,12 @@ def _summary(ended: Sequence[Ended], frozen: str) -> dict[str, Any]:
 
 
 def _figures(approach: Approach, outcome: Outcome) -> dict[str, Any]:
-    settings = asdict(approach) | {"model": str(approach.model), "haptics": approach.law != "none"}
+    settings = asdict(approach) | {
+        "model": str(approach.model),
+        "haptics": approach.law != "none",
+        "law": without_compensation(approach.law),
+        "compensation": compensation_of(approach.law),
+    }
     figures = {key: value for key, value in vars(outcome).items() if key != "trace"}
     trace = {key: value.tolist() for key, value in vars(outcome.trace).items()}
     if math.isnan(outcome.least_gap_mm):

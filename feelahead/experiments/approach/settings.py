@@ -11,9 +11,10 @@ import tyro
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from common.files.output_file import require_output_file
+from common.protocol.messages import Compensation
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import AHEAD, GRIPPED, SCENES, SITE, frozen_scene
-from feelahead.approaches.laws import Compensation
+from feelahead.approaches.laws import Law, with_compensation
 from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.spoilt import Spoil
 
@@ -53,11 +54,12 @@ class ApproachSettings:
     """Emulated links, both ways, in netem's words: "delay 200ms 10ms distribution normal"."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
-    law: tuple[Literal["first", "paper", "none", "full"], ...] = ("first",)
-    """What is felt: the first law, the paper's plain one, nothing, or always the strongest effect. Several are set side
-    by side."""
-    compensation: Compensation = "robot"
-    """Who reckons with the delay. These laws have eq. 8 at the robot side; no other yet."""
+    law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
+    """What is felt: what is ahead along the trigger, the paper's plain law, nothing, or always the strongest effect.
+    Several are set side by side."""
+    compensation: tuple[Compensation, ...] = ("operator",)
+    """Who reckons with the delay: the operator side by the commands under way, or the robot side by v t_d (eq. 8). The
+    paper's law has eq. 8."""
     haptics: bool = True
     """Without: the same as --law none."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
@@ -90,7 +92,7 @@ class ApproachSettings:
             for value in values:
                 if not (math.isfinite(value) and low <= value <= high):
                     raise ValueError(f"--{name} {value}: valid: {low:g} to {high:g}")
-        for name in ("force", "strongest_effect", "link", "law"):
+        for name in ("force", "strongest_effect", "link", "law", "compensation"):
             if not getattr(self, name):
                 raise ValueError(f"--{name.replace('_', '-')}: valid: one value or more")
         if not 0.0 < self.probability < 1.0:
@@ -98,11 +100,6 @@ class ApproachSettings:
         for name, lowest in (("seed", 0), ("seeds", 1), ("workers", 1)):
             if getattr(self, name) < lowest:
                 raise ValueError(f"--{name} {getattr(self, name)}: valid: {lowest} or more")
-        if self.compensation != "robot":
-            raise ValueError(
-                f"--compensation {self.compensation}: law {', '.join(self.law)} reckons with the delay at the robot"
-                " side (eq. 8); valid: robot"
-            )
         for spec in self.link:
             require_young_loop(spec, self.link_model)
         self._require_files()
@@ -118,13 +115,19 @@ class ApproachSettings:
         """The scenes to try; ConfigurationError where the frozen ones are not there."""
         return self.model or tuple(frozen_scene(name) for name in AHEAD)
 
+    def laws(self) -> tuple[Law, ...]:
+        """What is set side by side, each once."""
+        if not self.haptics:
+            return ("none",)
+        return tuple(dict.fromkeys(with_compensation(law, side) for law in self.law for side in self.compensation))
+
     def approaches(self) -> Iterator[Approach]:
         """Every combination, the seeds innermost."""
         for model in self.models():
             for link in self.link:
                 for force_n in self.force:
                     for strongest_n in self.strongest_effect:
-                        for law in self.law if self.haptics else ("none",):
+                        for law in self.laws():
                             for seed in range(self.seed, self.seed + self.seeds):
                                 yield Approach(
                                     model=model,
@@ -134,7 +137,6 @@ class ApproachSettings:
                                     link=link,
                                     link_model=self.link_model,
                                     law=law,
-                                    compensation=self.compensation,
                                     probability=self.probability,
                                     duration_s=self.duration,
                                     seed=seed,

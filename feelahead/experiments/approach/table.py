@@ -36,7 +36,7 @@ def _gap(gap_mm: float) -> str:
 
 def comparison(ended: Sequence[Ended]) -> Table:
     """A row for each scene, link and force, a column for each law; each cell over the seeds."""
-    laws = list(dict.fromkeys((one.law, one.compensation) for one, _ in ended))
+    laws = list(dict.fromkeys(one.law for one, _ in ended))
     several_effects = len({one.strongest_n for one, _ in ended}) > 1
     names = scene_names([one.model for one, _ in ended])
     table = Table(
@@ -45,7 +45,7 @@ def comparison(ended: Sequence[Ended]) -> Table:
     )
     for heading in ("scene", "link", "N", *(("effect, N",) if several_effects else ())):
         table.add_column(heading, overflow="fold")
-    for law, _ in laws:
+    for law in laws:
         table.add_column(law)
     cells: dict[tuple[Path, str, float, float], dict[str, list[Outcome]]] = {}
     for one, outcome in ended:
@@ -53,7 +53,7 @@ def comparison(ended: Sequence[Ended]) -> Table:
         cells.setdefault(key, {}).setdefault(one.law, []).append(outcome)
     for (scene, link, force_n, strongest_n), by_law in cells.items():
         effect = (f"{strongest_n:g}",) if several_effects else ()
-        row = (names[scene], link, f"{force_n:g}", *effect, *(cell(by_law.get(law, [])) for law, _ in laws))
+        row = (names[scene], link, f"{force_n:g}", *effect, *(cell(by_law.get(law, [])) for law in laws))
         table.add_row(*(Text(text) for text in row))
     return table
 

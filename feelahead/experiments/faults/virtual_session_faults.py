@@ -221,13 +221,14 @@ def _spoilt_parts() -> Iterator[tuple[tuple[int, ...], Any]]:
         ([(4,), (5,)], [[0.0], [0.0] * 3, "no", 0.5]),
         ([(7,), (8,), (9,), (10,), (11,)], [1, 0.0, "true", None]),
         ([(12,)], [-1, 0.5, 1 << 63, "1"]),
+        ([(13,)], ["nobody", "", 1, None, []]),
         ([(1, 2)], [*infinite, "0", None]),
         ([(1, 1)], [-1, 0.5, None, 1 << 63]),
         ([(1, 4)], [*infinite, -1.0]),
     ]
     for places, values in bad:
         yield from itertools.product(places, values)
-    for length in (1, 2, 3, 14, 40):
+    for length in (1, 2, 3, 15, 40):
         yield (), length
 
 

@@ -18,7 +18,6 @@ from operator_side.dualsense.reports.feature_report import (
 from operator_side.dualsense.reports.input_report import is_input_report
 from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
 from operator_side.dualsense.reports.output_report import (
-    RELEASED,
     OutputReport,
     build_output_report,
     parse_output_report,
@@ -194,13 +193,13 @@ class HidDualSense:
         self._released = self._told.releases
 
     def close(self) -> None:
-        """Take effects and rumble off if any were written and the controller still answers; let it go."""
+        """Take effects, rumble and a warning light off if any were written and the controller answers; let it go."""
         if self._closed:
             return
         self._closed = True
         try:
             if self._written:
-                self._send(RELEASED)
+                self._send(self._told.farewell)
                 self._released = True
         except DeviceError:
             pass  # it is gone: nothing more can be told to it

@@ -25,7 +25,7 @@ class Device(Protocol):
         ...
 
     def close(self) -> None:
-        """Take the trigger effects and the rumble off if any were written, and let the controller go.
+        """Take trigger effects, rumble and a warning light off if any were written, and let the controller go.
 
         Safe to call again; everything else raises DeviceError afterwards.
         """

@@ -1,8 +1,8 @@
 """Output reports, values to bytes and back: USB's 0x02, Bluetooth's 0x31.
 
 A report has a flag for each part of the controller that it sets; what has no flag stays as it is. Only the flags
-of what is asked for are ever set here, so that the lights and the mute key stay the system driver's, and the sound
-whosever it is. Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
+of what is asked for are ever set here, so that the lights and the mute key stay the system driver's but for a warning,
+and the sound whosever it is. Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -18,6 +18,10 @@ from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, chec
 from operator_side.dualsense.reports.transport import OUTPUT_FRAMING, Transport, described
 
 Color = tuple[int, int, int]
+
+WARNING_LIGHT: Final[Color] = (255, 0, 0)
+USUAL_LIGHT: Final[Color] = (0, 0, 128)
+"""What Linux hid-playstation sets it to: what it shows once we have changed it and do so no more."""
 
 _COMMON_LENGTH: Final = 47
 _USB_MAX_LENGTH: Final = 64  # some programs pad it to the length of an input report
@@ -94,6 +98,11 @@ class OutputReport:
         """The parts of this one that `before` does not set alike; the others are None."""
         same = {part.name: None for part in fields(self) if getattr(self, part.name) == getattr(before, part.name)}
         return replace(self, **same)
+
+    @property
+    def farewell(self) -> "OutputReport":
+        """What undoes all that this one sets: RELEASED, and the usual light if it sets one."""
+        return RELEASED if self.lightbar is None else replace(RELEASED, lightbar=USUAL_LIGHT)
 
     @property
     def releases(self) -> bool:

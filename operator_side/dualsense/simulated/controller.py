@@ -224,8 +224,8 @@ class SimulatedDualSense(SimulatedHands):
         return self._features[report_id]
 
     def close(self) -> None:
-        """Take effects and rumble off; `read` and `write` raise DeviceError from then on."""
-        self._apply(RELEASED)
+        """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
+        self._apply(self._told.farewell)
         self._closed = True
 
     def _require_open(self) -> None:

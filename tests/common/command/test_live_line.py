@@ -77,6 +77,7 @@ def test_a_narrow_one_drops_the_least_important_facts(width: int, expected: str)
         ({"link": "lost: nothing heard from the robot", "state": None}, "LINK LOST  nothing heard from the robot  "),
         ({"link": "refused: 8 others observe already"}, "REFUSED  8 others observe already  "),
         ({"controller": "lost", "state": "disarmed"}, "CONTROLLER LOST  "),
+        ({"release_first": True}, "RELEASE BOTH TRIGGERS  "),
         ({"state": "disarmed", "person": None}, "disarmed  "),
         ({"state": "disarmed", "person": None, "owner": "ready"}, "ready to arm  "),
         ({"state": "disarmed", "controller": "absent"}, "no controller  "),

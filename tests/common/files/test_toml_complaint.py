@@ -22,8 +22,8 @@ from robot_side.settings import RobotSettings
         ("camera = 3", "camera = 3; valid: a table with frame_sd_m, mean_m, sd_m"),
         ('[camera]\nsd_m = "wide"', 'camera.sd_m = "wide"; valid: a number'),
         (
-            "[enlargement]\nkinematic_mean_m = [1, 2]",
-            "enlargement.kinematic_mean_m = [1, 2]; valid: [a number, a number, a number]",
+            "kinematic_mean_m = [1, 2]",
+            "kinematic_mean_m = [1, 2]; valid: [a number, a number, a number]",
         ),
         ("seed = " + "[" * 3 + '"' + "a" * 500 + '"' + "]" * 3, "aaa...; valid: a whole number"),
         ('[roles]\ntin = "box"', 'valid: a table of NAME = "obstacle" or "target" or "support" or "ignored"'),

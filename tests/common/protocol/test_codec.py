@@ -2,14 +2,25 @@ import math
 from typing import Any
 
 import msgpack
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
-from common.protocol.messages import AnyMessage, Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.messages import (
+    AnyMessage,
+    Header,
+    Hello,
+    LeaseNotice,
+    MotionCommand,
+    StiffnessUpdate,
+    Telemetry,
+    TriggerField,
+)
 from common.protocol.session import SessionState
+from tests.helpers.felt import felt, field, ways
 
 unit = st.floats(0.0, 1.0)
 signed_unit = st.floats(-1.0, 1.0)
@@ -29,6 +40,16 @@ headers = st.builds(
     echo_sent_s=finite,
     echo_held_s=unit,
 )
+eight_ways = st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+fields = st.builds(
+    TriggerField,
+    fast_m=eight_ways,
+    slow_m=eight_ways,
+    full_speed_m_s=st.floats(1e-6, 100.0),
+    acceleration_m_s2=st.floats(1e-6, 1e6),
+    displacement_m=st.floats(-100.0, 100.0),
+    stiffness=unit,
+)
 messages: st.SearchStrategy[AnyMessage] = st.one_of(
     st.builds(Hello, headers, side=st.sampled_from(["operator", "robot"]), clock_domain=st.text(max_size=50)),
     st.builds(
@@ -40,6 +61,7 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         turning=st.tuples(signed_unit, signed_unit),
         gripper=signed_unit,
         run=st.booleans(),
+        compensation=st.sampled_from(["operator", "robot"]),
     ),
     st.builds(
         LeaseNotice,
@@ -50,7 +72,16 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         waiting=st.integers(0, 1000),
         place=st.integers(0, 1000),
     ),
-    st.builds(StiffnessUpdate, headers, l2=unit, r2=unit, rumble=unit, state=st.sampled_from(["armed", "stopped"])),
+    st.builds(
+        StiffnessUpdate,
+        headers,
+        l2=fields,
+        r2=fields,
+        speed_m_s=signed_unit,
+        horizon_m=unit,
+        rumble=unit,
+        state=st.sampled_from(["armed", "stopped"]),
+    ),
 )
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 
@@ -159,12 +190,32 @@ def test_an_oversize_payload_is_not_looked_into() -> None:
 
 def test_messages_refuse_bad_values_when_made() -> None:
     with pytest.raises(ValueError, match="rumble"):
-        StiffnessUpdate(HEADER, l2=0.0, r2=0.0, rumble=2.0, state="armed")
-    for travel in (-0.1, 1.1, math.nan):
-        with pytest.raises(ValueError, match="r2_contact"):
-            StiffnessUpdate(HEADER, l2=0.0, r2=0.0, rumble=0.0, state="armed", r2_contact=travel)
+        felt(HEADER, rumble=2.0)
+    for name in ("speed_m_s", "horizon_m"):
+        with pytest.raises(ValueError, match=f"{name} = nan"):
+            msgspec.structs.replace(felt(HEADER), **{name: math.nan})
+    with pytest.raises(ValueError, match=r"horizon_m = -0\.1"):
+        msgspec.structs.replace(felt(HEADER), horizon_m=-0.1)
     with pytest.raises(ValueError, match="both or neither"):
         Header(epoch=1, sequence=1, sent_s=0.0, echo_sent_s=1.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"fast_m": ways(0.2, 0.1)}, "fast_m = .* none shorter than the one before"),
+        ({"slow_m": ways(0.0, math.nan)}, "slow_m = nan"),
+        ({"slow_m": ways(0.0, math.inf)}, "slow_m = inf"),
+        ({"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
+        ({"acceleration_m_s2": 0.0}, "acceleration_m_s2 = 0"),
+        ({"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
+        ({"displacement_m": math.nan}, "displacement_m = nan"),
+        ({"stiffness": 1.1}, "stiffness = 1.1"),
+    ],
+)
+def test_a_field_refuses_what_nobody_could_render(changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        msgspec.structs.replace(field(ways(0.1)), **changes)
 
 
 def test_telemetry_comes_back() -> None:

@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
 from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
-from common.protocol.messages import AnyMessage, Header, Hello, MotionCommand, StiffnessUpdate
+from common.protocol.messages import AnyMessage, Header, Hello, MotionCommand
 from feelahead.experiments.hostile.hostile_inputs import payload
+from tests.helpers.felt import felt
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0, echo_sent_s=2.5, echo_held_s=0.25)
 VALID: tuple[AnyMessage, ...] = (
     Hello(HEADER, side="operator", clock_domain="boot"),
     MotionCommand(HEADER, l2=0.5, r2=0.25, lateral=(0.1, -0.1), run=True),
-    StiffnessUpdate(HEADER, l2=0.0, r2=1.0, rumble=0.5, state="armed"),
-    StiffnessUpdate(HEADER, l2=0.0, r2=1.0, rumble=0.5, state="armed", l2_contact=None, r2_contact=0.25),
+    felt(HEADER, l2=0, r2=5, rumble=0.5),
 )
 
 

@@ -8,6 +8,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.timing.clock_offset import MAX_SKEW
 from feelahead.benchmarks.delay.traffic import Estimate, Scenario, Traffic, Way
+from tests.helpers.felt import felt
 
 CLOCK = "one clock"
 
@@ -21,7 +22,7 @@ def motion(header: Header) -> MotionCommand:
 
 
 def stiffness(header: Header) -> StiffnessUpdate:
-    return StiffnessUpdate(header, l2=0.0, r2=0.0, rumble=0.0, state="armed")
+    return felt(header)
 
 
 def test_nothing_is_fresh_before_the_peer_said_hello() -> None:

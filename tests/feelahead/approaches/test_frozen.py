@@ -8,7 +8,9 @@ import pytest
 
 from common.errors import ConfigurationError
 from feelahead.approaches import frozen
-from feelahead.approaches.frozen import AHEAD, GRIPPED, PASSED, SCENES, frozen_hash, frozen_scene, frozen_values
+from feelahead.approaches.frozen import AHEAD, GRIPPED, PASSED, SCENES, SITE, frozen_hash, frozen_scene, frozen_values
+from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.simulation.scene import load_scene
 from tests.helpers.repository import DATA
 
 HASH = "9802787272d9"
@@ -53,6 +55,11 @@ def test_every_scene_is_either_hit_or_passed() -> None:
     assert sorted((*AHEAD, *PASSED)) == sorted(path.stem for path in DATA.glob("*.xml") if path.stem != "arm")
     assert set(GRIPPED) <= set(AHEAD)
     assert all(frozen_scene(name).is_file() for name in (*AHEAD, *PASSED))
+
+
+def test_every_scene_has_the_arm_whose_predictions_were_measured() -> None:
+    arms = {load_scene(frozen_scene(name), SITE).robot.fingerprint for name in (*AHEAD, *PASSED)}
+    assert arms == {load_scene().robot.fingerprint} == {load_prediction_errors(BUILT_IN).arm}
 
 
 def test_an_unknown_scene_is_named_with_the_known_ones() -> None:

@@ -64,7 +64,9 @@ def test_it_prints_its_tables_and_writes_its_files(
     assert tuple(lines[0]) == Figure._fields
     assert {line["method"] for line in lines} >= {*METHODS, "Monte Carlo", "operator", "robot", "momentary"}
     assert all(np.isfinite(float(line["value"])) for line in lines)
-    assert tomllib.loads(table.read_text(encoding="utf-8"))["operator"][1]["n"] == 40
+    written = tomllib.loads(table.read_text(encoding="utf-8"))
+    assert written["operator"][1]["n"] == 40
+    assert written["arm"] == load_scene().robot.fingerprint
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

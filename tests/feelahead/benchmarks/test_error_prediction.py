@@ -3,6 +3,7 @@
 import math
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from feelahead.benchmarks.error.spread import (
 from feelahead.benchmarks.error.tables import cell, prediction_tables
 from feelahead.benchmarks.error.tool_path import ToolPath
 from robot_side.arm.port import GripperPose
+from robot_side.enlargement.prediction_errors import load_prediction_errors
 from robot_side.simulation.joint_reference import MotionLimits
 
 FULL_M_S = 0.25
@@ -41,7 +43,6 @@ def pose_at(joints: FloatArray) -> GripperPose:
         tool_jacobian=jacobian,
         sphere_centers_m=np.zeros((0, 3)),
         sphere_radii_m=np.zeros(0),
-        sphere_jacobians=np.zeros((0, 3, 1)),
         sphere_on_finger=np.zeros(0, dtype=bool),
     )
 
@@ -230,7 +231,8 @@ def test_every_moment_counts_to_the_loop_age_of_its_link() -> None:
 
 def test_the_table_is_toml_with_units_and_a_row_for_each_loop_age_and_compensation() -> None:
     judged = [made_up([100.0, 1.0, 3.0]), made_up([200.0, 5.0], age_s=0.8, link="delay 400ms")]
-    table = tomllib.loads(error_table(judged, "abc123", FULL_M_S))
+    table = tomllib.loads(error_table(judged, "f1a9", "abc123", FULL_M_S))
+    assert table["arm"] == "f1a9"
     assert table["frozen"] == "abc123"
     assert table["full_speed_m_s"] == FULL_M_S
     assert table["pulls"] == ["bell"]
@@ -242,6 +244,18 @@ def test_the_table_is_toml_with_units_and_a_row_for_each_loop_age_and_compensati
     assert table["operator"][0] == {"loop_age_ms": 400.0, "mu_mm": 2.0, "sigma_mm": 1.0, "p99_mm": 2.98, "n": 2}
     assert table["robot"][1]["mu_mm"] == 50.0
     assert len(list(age_bins())) == len(LOOP_AGE_EDGES_S) - 1
+
+
+def test_the_robot_side_takes_from_the_table_what_is_in_it(tmp_path: Path) -> None:
+    judged = [made_up([100.0, 1.0, 3.0]), made_up([200.0, 5.0], age_s=0.8, link="delay 400ms")]
+    path = tmp_path / "table.toml"
+    path.write_text(error_table(judged, "f1a9", "abc123", FULL_M_S), encoding="utf-8")
+    found = load_prediction_errors(path)
+    assert found.arm == "f1a9"
+    assert found.at("operator", 0.4, FULL_M_S) == pytest.approx((0.002, 0.001))
+    assert found.at("robot", 0.8, FULL_M_S) == pytest.approx((0.05, 0.0))
+    # Between two loop ages, what lies between.
+    assert found.at("operator", 0.6, FULL_M_S) == pytest.approx((0.0035, 0.0005))
 
 
 def test_tables_and_figures_have_every_kind() -> None:

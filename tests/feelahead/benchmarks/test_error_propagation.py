@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from feelahead.benchmarks.error.chain import Chain
-from feelahead.benchmarks.error.gripper import PosedGripper, ability
+from feelahead.benchmarks.error.gripper import PosedGripper
 from feelahead.benchmarks.error.propagation import (
     BATCHES,
     METHODS,
@@ -37,6 +37,7 @@ from feelahead.benchmarks.error.running_time import (
     seconds_of,
 )
 from feelahead.benchmarks.error.tables import SINGULAR, failures, propagation_tables
+from robot_side.arm.ability import along_approach
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.scene import load_scene
 
@@ -152,15 +153,16 @@ def test_the_singular_place_errs_least_along_the_approach() -> None:
 
 
 def test_the_arm_is_able_at_home_and_not_with_its_elbow_straight() -> None:
-    limits = MotionLimits()
-    able = ability(gripper().at(gripper().home_rad), limits, 0.25)
+    limits = MotionLimits().of_joints(len(gripper().home_rad))
+    able = along_approach(gripper().at(gripper().home_rad), limits, 0.25)
     assert able.within_reach
     assert able.full_speed_m_s == pytest.approx(0.25)
     assert able.acceleration_m_s2 == pytest.approx(3.03, abs=0.01)
     straight = gripper().home_rad.copy()
     straight[1:3] = -0.2, 0.0
-    assert not ability(gripper().at(straight), limits, 0.25).within_reach
-    slower = ability(gripper().at(gripper().home_rad), MotionLimits(velocity_rad_s=0.33), 0.25)
+    assert not along_approach(gripper().at(straight), limits, 0.25).within_reach
+    slow = MotionLimits(velocity_rad_s=0.33).of_joints(len(gripper().home_rad))
+    slower = along_approach(gripper().at(gripper().home_rad), slow, 0.25)
     assert not slower.within_reach
     assert slower.full_speed_m_s == pytest.approx(0.33 / 8.0 * able.acceleration_m_s2)
     assert slower.acceleration_m_s2 == pytest.approx(able.acceleration_m_s2)

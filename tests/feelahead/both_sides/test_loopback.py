@@ -1,74 +1,130 @@
-"""Both sides in virtual time, from a scripted person's fingers to a lifted target and back as stiffness."""
+"""Both sides in virtual time, from a scripted person's fingers to a lifted target and back as what they feel."""
 
 import functools
 import itertools
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
 
+from common.protocol.messages import Compensation
+from feelahead.approaches.approach import Approach, PullRun
+from feelahead.approaches.pulls import Hands
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import SimulatedOperator
+from operator_side.simulated_person.person import Phase, SimulatedOperator
 from robot_side.settings import RobotSettings
+from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
 
+LOOK_S = 0.05
+Strengths = tuple[int, ...]
 
-def loopback(link: str, *, haptics: bool = True, seed: int = 0) -> Loopback:
-    return Loopback(
-        LoopbackSettings(RobotSettings(link=link, seed=seed), OperatorSettings(link=link, haptics=haptics, seed=seed))
-    )
+
+def loopback(link: str, *, haptics: bool = True, seed: int = 0, compensation: Compensation = "operator") -> Loopback:
+    operator = OperatorSettings(link=link, haptics=haptics, seed=seed, compensation=compensation)
+    return Loopback(LoopbackSettings(RobotSettings(link=link, seed=seed), operator))
 
 
 episodes = pytest.mark.xdist_group("episodes")
 """Runs by one worker, so that each episode is played once."""
 
 
+@dataclass(frozen=True)
+class Moment:
+    """What the person does and feels."""
+
+    phase: Phase
+    l2: Strengths
+    r2: Strengths
+    held: bool
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A run of the person from the start, looked at every 50 ms."""
+
+    moments: tuple[Moment, ...]
+    summary: dict[str, Any]
+
+    def during(self, phase: Phase) -> list[Moment]:
+        return [moment for moment in self.moments if moment.phase == phase]
+
+
+def episode(delay_ms: int, *, haptics: bool = True, compensation: Compensation = "operator") -> Episode:
+    return played(delay_ms, haptics, compensation)
+
+
 @functools.cache
-def episode(delay_ms: int, *, haptics: bool) -> dict[str, Any]:
-    run = loopback(f"delay {delay_ms}ms 10ms distribution normal" if delay_ms else "", haptics=haptics)
+def played(delay_ms: int, haptics: bool, compensation: Compensation) -> Episode:
+    link = f"delay {delay_ms}ms 10ms distribution normal" if delay_ms else ""
+    run, moments = loopback(link, haptics=haptics, compensation=compensation), []
     # By then the target is lifted, or without haptics, where only the way there counts, approached.
-    run.run_until((11.0 if delay_ms else 8.5) if haptics else 4.5)
-    return run.summary()
+    end_s = (11.0 if delay_ms else 8.5) if haptics else 4.5
+    while run.clock.now() < end_s:
+        run.run_until(run.clock.now() + LOOK_S)
+        assert isinstance(run.person, SimulatedOperator)
+        l2, r2 = (effect.zone_strengths for effect in run.device.effects)
+        moments.append(Moment(run.person.phase, tuple(l2), tuple(r2), run.robot.held is not None))
+    return Episode(tuple(moments), run.summary())
 
 
 @episodes
-@pytest.mark.parametrize("delay_ms", [0, 200])
-def test_the_target_is_reached_grasped_and_lifted(delay_ms: int) -> None:
-    summary = episode(delay_ms, haptics=True)
+@pytest.mark.parametrize(("delay_ms", "compensation"), [(0, "operator"), (200, "operator"), (0, "robot")])
+def test_the_target_is_reached_grasped_and_lifted(delay_ms: int, compensation: Compensation) -> None:
+    summary = episode(delay_ms, compensation=compensation).summary
     assert summary["task"]["time_to_grasp_s"] is not None
     assert summary["task"]["lifted_mm"] > 50.0
     assert summary["task"]["contacts_by_object"]["target"] >= 1
+    assert summary["task"]["obstacle_contacts"] == 0
     assert summary["stops"] == []
     assert summary["errors"] == []
     assert summary["messages"]["rejected"] == 0
 
 
 @episodes
-def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone() -> None:
-    stiffness = episode(200, haptics=True)["stiffness"]
-    assert stiffness["r2"]["max"] > 0.3
-    assert stiffness["l2"]["max"] < 0.3
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone(delay_ms: int) -> None:
+    advancing = episode(delay_ms).during("advance")
+    assert max(max(moment.l2) for moment in advancing) == 0
+    assert max(max(moment.r2) for moment in advancing) == 8
+    # A released trigger is free until the target is near.
+    assert advancing[0].r2 == (0,) * 10
+    zones = episode(delay_ms).summary["zones"]
+    assert (zones["r2"]["first_stiff"], zones["r2"]["max"]) == (0, 8)
 
 
-def test_a_bump_where_contact_begins_comes_to_meet_the_finger() -> None:
-    run = loopback("")
-    contacts: list[float] = []
-    bumps = set()
-    person = run.person
-    assert isinstance(person, SimulatedOperator)
-    while person.phase != "close" and run.clock.now() < 9.0:
-        run.run_until(run.clock.now() + 0.05)
-        felt = run.operator.stiffness
-        assert felt is None or felt.l2_contact is None
-        if felt is not None and felt.r2_contact is not None:
-            contacts.append(felt.r2_contact)
-            r2 = run.device.effects[1].zone_strengths
-            bumps.add(max(range(10), key=lambda zone: r2[zone]))
-    assert contacts[0] > 0.5
-    assert contacts[-1] < 0.05
-    assert all(later <= earlier + 0.02 for earlier, later in itertools.pairwise(contacts))
-    assert len(bumps) >= 4
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_the_free_travel_shrinks_as_the_target_comes_nearer(delay_ms: int) -> None:
+    free = [moment.r2.count(0) for moment in episode(delay_ms).during("advance")]
+    assert free[0] == 10
+    assert free[-1] <= 1
+    assert all(later <= earlier + 1 for earlier, later in itertools.pairwise(free))
+    # Not at once: the finger is led back zone by zone.
+    assert len(set(free)) >= 6
+
+
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_what_is_to_be_touched_never_stops_the_finger_that_touches_it(delay_ms: int) -> None:
+    # The slowest zone is at most half as stiff as can be, from the advance until the target is held.
+    before = [moment for moment in episode(delay_ms).moments if not moment.held]
+    assert max(moment.r2[0] for moment in before) <= 4
+    assert max(moment.r2[9] for moment in before) == 8
+
+
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
+    lifting = episode(delay_ms).during("lift")
+    assert all(moment.held for moment in lifting)
+    assert max(max(moment.l2) for moment in lifting) == 0
+    # The table lies ahead of a gripper that points down, within what a full pull would need to stop.
+    assert lifting[0].r2[:5] == (0,) * 5
+    assert lifting[0].r2[-1] == 8
 
 
 @episodes
@@ -76,18 +132,18 @@ def test_a_person_whose_left_hand_advances_gets_there_as_well() -> None:
     operator = OperatorSettings(swap_sides=True)
     run = Loopback(LoopbackSettings(RobotSettings(), operator))
     run.run_until(6.5)
-    assert run.summary()["task"]["time_to_grasp_s"] == episode(0, haptics=True)["task"]["time_to_grasp_s"]
+    assert run.summary()["task"]["time_to_grasp_s"] == episode(0).summary["task"]["time_to_grasp_s"]
 
 
 def test_more_delay_means_more_enlargement() -> None:
-    moving = [episode(delay_ms, haptics=False)["enlargement_mm"]["mean_moving"] for delay_ms in (0, 50, 200)]
+    moving = [episode(delay_ms, haptics=False).summary["enlargement_mm"]["mean_moving"] for delay_ms in (0, 50, 200)]
     assert moving[0] < moving[1] < moving[2]
 
 
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> None:
-    summary = episode(delay_ms, haptics=True)
+    summary = episode(delay_ms).summary
     spread_ms = 10.0 if delay_ms else 0.0
     for direction in ("to_robot", "to_operator"):
         assert summary["delay_ms"][direction]["mean"] == pytest.approx(delay_ms, abs=0.6)
@@ -99,7 +155,7 @@ def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> 
 
 @episodes
 def test_nothing_is_lost_on_a_link_without_loss() -> None:
-    messages = episode(0, haptics=True)["messages"]
+    messages = episode(0).summary["messages"]
     assert messages["stiffness_sent"] == messages["stiffness_received"]
     assert messages["motion_sent"] == messages["motion_received"]
     assert messages["stale"] == 0
@@ -142,3 +198,44 @@ def test_triggers_are_released_when_the_robot_side_goes_silent() -> None:
         if output is not None:
             both.device.write(output, now_s + milliseconds / 1000)
     assert both.device.released
+
+
+def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
+    # 200 ms after the last field; the commands arrive all the while, so that safety has no cause to stop the arm.
+    both = loopback("to_operator: outage 400ms at 3.9s")
+    both.run_until(4.08)
+    assert not both.device.released
+    assert both.device.output.lightbar is None
+    both.run_until(4.12)
+    assert both.device.released
+    assert both.device.output.lightbar == WARNING_LIGHT
+    both.run_until(4.4)
+    assert both.device.output.lightbar == USUAL_LIGHT
+    both.run_until(8.5)
+    summary = both.summary()
+    assert summary["rendering"]["blind"] == 1
+    assert summary["stops"] == []
+    assert summary["task"]["lifted_mm"] > 50.0
+
+
+def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() -> None:
+    def pull(since_s: float) -> Hands:
+        return Hands(r2_n=0.0 if 1.6 < since_s < 1.8 else 2.0)
+
+    run = PullRun(Approach(DATA / "wall.xml", 0.0, link="to_operator: outage 400ms at 2s"), pull)
+    began_s = run.arm()
+    assert began_s == pytest.approx(1.23, abs=0.05)
+    for _ in run.go_on(began_s + 2.1):
+        pass
+    trace, both = run.samples.trace(), run.loopback
+    assert run.disarmed_because is None
+
+    def speeds_mm_s(from_s: float, to_s: float) -> list[float]:
+        rows = (trace.time_s >= from_s - began_s) & (trace.time_s < to_s - began_s)
+        return [float(speed) for speed in 1e3 * trace.speed_m_s[rows]]
+
+    assert min(speeds_mm_s(2.1, 2.19)) > 100.0
+    # The field is missed after 200 ms, and back 400 ms after it was lost; the hand lets go only later.
+    assert max(map(abs, speeds_mm_s(2.3, began_s + 1.8))) < 1.0
+    assert max(speeds_mm_s(began_s + 1.8, began_s + 2.1)) > 100.0
+    assert both.summary()["rendering"]["blind"] == 1

@@ -45,9 +45,10 @@ def operator(listening: dict[str, Any], *arguments: str) -> SideProcess:
     return SideProcess("operator_side.main", "operator", [*endpoints, "--device=simulated", *arguments])
 
 
-def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path) -> None:
+@pytest.mark.parametrize("more", [(), ("--compensation", "robot"), ("--law", "paper")], ids=["usual", "robot", "paper"])
+def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: tuple[str, ...]) -> None:
     path = tmp_path / "out.json"
-    with demo("--duration", "4", "--link", "delay 20ms", "--summary", str(path)) as process:
+    with demo("--duration", "4", "--link", "delay 20ms", "--summary", str(path), *more) as process:
         _, complaint = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 0, complaint
     summary = json.loads(path.read_text())
@@ -59,7 +60,7 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path) -> None
         assert summary["delay_ms"][direction]["p50"] >= 20.0
     for key in (
         *("duration_s", "ticks", "tick_us", "skipped", "messages", "delay_ms", "applied_age_ms", "enlargement_mm"),
-        *("overlap_mm3", "stiffness", "min_distance_mm", "contacts", "stops", "errors"),
+        *("overlap_mm3", "stiffness", "zones", "min_distance_mm", "contacts", "stops", "errors"),
     ):
         assert key in summary
 

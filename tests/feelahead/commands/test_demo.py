@@ -13,6 +13,8 @@ from common.command.live_view import Value
 from common.errors import ConfigurationError
 from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
 from tests.helpers.repository import ROOT
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
@@ -31,7 +33,8 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     config.write_text("seed = 3\nprobability = 0.5\n")
     robot, operator = passed_on("--robot-config", str(config))
     assert robot == ["--summary=summary.json", "--bind=tcp://127.0.0.1:0", f"--config={config}"]
-    assert not [flag for flag in operator if flag.startswith(("--seed", "--link", "--haptics", "--no-haptics"))]
+    unsaid = ("--seed", "--link", "--haptics", "--no-haptics", "--law", "--compensation")
+    assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
 def test_what_was_said_is_passed_on_even_where_it_is_the_default() -> None:
@@ -43,10 +46,23 @@ def test_what_was_said_is_passed_on_even_where_it_is_the_default() -> None:
 
 def test_the_demos_own_file_counts_as_said(tmp_path: Path) -> None:
     config = tmp_path / "demo.toml"
-    config.write_text('link = "delay 5ms"\nhaptics = false\n')
+    config.write_text('link = "delay 5ms"\nhaptics = false\nlaw = "paper"\ncompensation = "robot"\n')
     robot, operator = passed_on("--config", str(config))
-    assert "--link=delay 5ms" in robot
-    assert "--no-haptics" in operator
+    assert {"--link=delay 5ms", "--law=paper"} <= set(robot)
+    assert {"--no-haptics", "--compensation=robot"} <= set(operator)
+
+
+@pytest.mark.parametrize("law", ["swept", "paper"])
+@pytest.mark.parametrize("compensation", ["operator", "robot"])
+def test_the_robot_side_is_told_the_law_and_the_operator_side_who_reckons(law: str, compensation: str) -> None:
+    robot, operator = passed_on("--law", law, "--compensation", compensation)
+    assert [flag for flag in robot if flag.startswith(("--law", "--compensation"))] == [f"--law={law}"]
+    assert [flag for flag in operator if flag.startswith(("--law", "--compensation"))] == [
+        f"--compensation={compensation}"
+    ]
+    # Each side takes what it is told.
+    assert parse_settings(RobotSettings, "robot", robot).law == law
+    assert parse_settings(OperatorSettings, "operator", operator).compensation == compensation
 
 
 @pytest.mark.parametrize("mode", ["line", "json", "none"])

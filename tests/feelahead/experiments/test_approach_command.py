@@ -14,7 +14,9 @@ import pytest
 from common.errors import ConfigurationError
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import AHEAD, frozen_hash
+from feelahead.approaches.laws import LAWS, Law
 from feelahead.approaches.outcome import End, Outcome, Trace
+from feelahead.approaches.pictures import LAW_COLOURS
 from feelahead.experiments.approach import command as module
 from feelahead.experiments.approach.command import try_approach
 from feelahead.experiments.approach.table import cell, comparison, sentence
@@ -76,7 +78,7 @@ def tried(*arguments: str) -> int:
 def test_one_run_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert tried("--model", WALL, "--link", "delay 200ms") == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "3 N in wall, law first: touches wall at 150 mm/s after 0.02 s; least gap -0.1 mm, reversals 1" in said
+    assert "3 N in wall, law swept: touches wall at 150 mm/s after 0.02 s; least gap -0.1 mm, reversals 1" in said
     assert frozen_hash() in said
 
 
@@ -93,7 +95,6 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
             link="delay 5ms",
             link_model="stream",
             law="paper",
-            compensation="robot",
             probability=0.9,
             duration_s=4.0,
             seed=7,
@@ -106,8 +107,28 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
 def test_without_haptics_is_law_none_whatever_the_laws(runs: MadeUp) -> None:
     assert tried("--model", WALL, "--no-haptics") == 0
     assert tried("--model", WALL, "--law", "none") == 0
-    assert tried("--model", WALL, "--no-haptics", "--law", "first", "paper") == 0
+    assert tried("--model", WALL, "--no-haptics", "--law", "swept", "paper", "--compensation", "operator", "robot") == 0
     assert [one.law for one in runs.asked] == ["none"] * 3
+
+
+@pytest.mark.parametrize(
+    ("flags", "laws"),
+    [
+        ("", ["swept"]),
+        ("--compensation robot", ["swept_robot"]),
+        ("--compensation operator robot", ["swept", "swept_robot"]),
+        # The paper's law has eq. 8 whoever is asked, and without a field nobody reckons.
+        ("--law paper --compensation operator robot", ["paper"]),
+        ("--law none full --compensation robot", ["none", "full"]),
+        ("--law swept paper none full", ["swept", "paper", "none", "full"]),
+        ("--law none swept paper --compensation robot operator", ["none", "swept_robot", "swept", "paper"]),
+    ],
+)
+def test_who_reckons_with_the_delay_doubles_the_law_that_leaves_the_choice(
+    runs: MadeUp, flags: str, laws: list[Law]
+) -> None:
+    assert tried("--model", WALL, *flags.split()) == 0
+    assert [one.law for one in runs.asked] == laws
 
 
 def test_without_a_model_it_is_every_frozen_scene_that_is_ahead(runs: MadeUp) -> None:
@@ -117,7 +138,7 @@ def test_without_a_model_it_is_every_frozen_scene_that_is_ahead(runs: MadeUp) ->
 
 
 def test_values_are_combined_and_seeds_counted(runs: MadeUp) -> None:
-    many = "--force 2 3 --law first none --strongest-effect 1.5 2 --seeds 3 --seed 4"
+    many = "--force 2 3 --law swept none --strongest-effect 1.5 2 --seeds 3 --seed 4"
     assert tried("--model", WALL, str(DATA / "plate.xml"), "--link", "", "delay 5ms", *many.split()) == 0
     assert len(runs.asked) == len(set(runs.asked)) == 2**5 * 3
     assert {one.seed for one in runs.asked} == {4, 5, 6}
@@ -125,10 +146,11 @@ def test_values_are_combined_and_seeds_counted(runs: MadeUp) -> None:
 
 def test_settings_may_come_from_a_file(runs: MadeUp, tmp_path: Path) -> None:
     path = tmp_path / "try.toml"
-    path.write_text(f'model = ["{WALL}"]\nforce = [2.0, 3.0]\nlink = ["delay 5ms"]\nhaptics = false\n')
+    path.write_text(f'model = ["{WALL}"]\nforce = [2.0, 3.0]\nlink = ["delay 5ms"]\ncompensation = ["robot"]\n')
     assert tried("--config", str(path), "--force", "3.7") == 0
-    [one] = runs.asked
-    assert (one.model, one.force_n, one.link, one.law) == (Path(WALL), 3.7, "delay 5ms", "none")
+    assert tried("--config", str(path), "--force", "3.7", "--no-haptics") == 0
+    for one, law in zip(runs.asked, ("swept_robot", "none"), strict=True):
+        assert (one.model, one.force_n, one.link, one.law) == (Path(WALL), 3.7, "delay 5ms", law)
 
 
 # What comes out
@@ -147,7 +169,7 @@ def test_one_run_is_its_own_summary(runs: MadeUp, tmp_path: Path) -> None:
         "link_model": "datagram",
         "law": "none",
         "haptics": False,
-        "compensation": "robot",
+        "compensation": "operator",
         "probability": 0.99,
         "duration_s": 8.0,
         "seed": 0,
@@ -169,6 +191,26 @@ def test_one_run_is_its_own_summary(runs: MadeUp, tmp_path: Path) -> None:
     assert summary["trace"].keys() == {"time_s", "speed_m_s", "gap_m", "travel", "strengths"}
     assert "runs" not in summary
     assert len(runs.asked) == 1
+
+
+@pytest.mark.usefixtures("runs")
+@pytest.mark.parametrize(
+    ("flags", "law", "compensation", "haptics"),
+    [
+        ("", "swept", "operator", True),
+        ("--compensation robot", "swept", "robot", True),
+        ("--law paper", "paper", "robot", True),
+        ("--law full", "full", "operator", True),
+        ("--law none", "none", "operator", False),
+    ],
+)
+def test_the_summary_says_it_in_the_flags_words(
+    tmp_path: Path, flags: str, law: str, compensation: str, *, haptics: bool
+) -> None:
+    path = tmp_path / "summary.json"
+    assert tried("--model", WALL, *flags.split(), "--summary", str(path)) == 0
+    summary = json.loads(path.read_text())
+    assert [summary[key] for key in ("law", "compensation", "haptics")] == [law, compensation, haptics]
 
 
 @pytest.mark.parametrize("many", [("--force", "2", "3"), ("--link", "", "delay 5ms"), ("--seeds", "2")])
@@ -224,6 +266,18 @@ def test_a_picture_is_drawn(tmp_path: Path, forces: tuple[str, ...], ending: str
     assert len(path.read_bytes()) > 5000
 
 
+@pytest.mark.usefixtures("runs")
+def test_every_law_has_a_line_of_its_own(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    path = tmp_path / "picture.svg"
+    flags = "--law swept paper none full --compensation operator robot --link"
+    assert tried("--model", WALL, *flags.split(), "", "delay 50ms", "--picture", str(path)) == 0
+    drawn = path.read_text()
+    for law in ("swept", "swept_robot", "paper", "none", "full"):
+        assert LAW_COLOURS[law] in drawn
+    assert len({LAW_COLOURS[law] for law in LAWS}) == len(LAWS)
+
+
 def test_a_picture_of_undecided_runs_is_drawn_as_well(runs: MadeUp, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     runs.ends = {2.0: outcome("undecided"), 3.0: outcome("undecided")}
@@ -252,15 +306,16 @@ def test_a_cell_counts_what_ended_how() -> None:
 
 
 def test_the_table_has_a_row_for_each_scene_link_and_force_and_a_column_for_each_law() -> None:
+    laws: tuple[Law, ...] = ("swept", "swept_robot", "none")
     ended = [
         (Approach(Path(f"{scene}.xml"), force_n, law=law), outcome(figure=100.0 * force_n))
         for scene in ("wall", "plate")
         for force_n in (2.0, 3.0)
-        for law in ("first", "none")
+        for law in laws
     ]
     table = comparison(ended)
     assert table.row_count == 4
-    assert [column.header for column in table.columns] == ["scene", "link", "N", "first", "none"]
+    assert [column.header for column in table.columns] == ["scene", "link", "N", *laws]
     assert [str(text) for text in table.columns[-1].cells] == [
         f"1/1 at {speed} mm/s, R 1" for speed in (200, 300, 200, 300)
     ]
@@ -318,9 +373,11 @@ def no_runs(monkeypatch: pytest.MonkeyPatch) -> Iterator[MadeUp]:
         (["--link", "to_robot: delay 1500ms; to_operator: delay 600ms"], "2.1 s", "below 2 s"),
         (["--link"], "--link", "one value or more"),
         (["--link-model", "tcp"], "tcp", "datagram"),
-        (["--law", "third"], "third", "first"),
+        (["--law", "first"], "first", "swept"),
+        (["--law", "margin"], "margin", "swept"),
+        (["--law", "swept_robot"], "swept_robot", "swept"),
         (["--law"], "--law", "one value or more"),
-        (["--compensation", "operator"], "operator", "robot"),
+        (["--compensation"], "--compensation", "one value or more"),
         (["--compensation", "nobody"], "nobody", "robot"),
         (["--probability", "1"], "1.0", "above 0 and below 1"),
         (["--probability", "0"], "0.0", "above 0 and below 1"),

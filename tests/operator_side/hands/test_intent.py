@@ -32,6 +32,15 @@ def test_released_means_within_the_dead_zone(l2: float, r2: float, released: boo
     assert operator_intent(ControllerState(l2=l2, r2=r2)).triggers_released is released
 
 
+def test_resting_hands_move_and_arm_nothing_and_hold_what_else_they_hold() -> None:
+    pressed = frozenset({Button.L1, Button.OPTIONS, Button.CROSS, Button.TRIANGLE, Button.CREATE})
+    state = ControllerState(l2=0.5, r2=1.0, left_stick=(1.0, 0.0), right_stick=(0.0, -1.0), pressed=pressed)
+    resting = operator_intent(state).resting()
+    held = operator_intent(ControllerState(pressed=frozenset({Button.L1, Button.TRIANGLE, Button.CREATE})))
+    assert resting == held
+    assert pressing(Button.CIRCLE).resting().emergency_stop
+
+
 def test_left_stick_moves_across_and_right_stick_turns() -> None:
     intent = operator_intent(ControllerState(left_stick=(1.0, 0.0), right_stick=(0.0, -1.0)))
     assert intent.lateral == (1.0, 0.0)

@@ -6,13 +6,14 @@ import msgspec
 import pytest
 
 from common.protocol.messages import Vector3
+from operator_side.dualsense.effects.official import Feedback
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport
 from operator_side.dualsense.simulated.trigger_model import (
     NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.feel.level import stiffness_to_effect
 from operator_side.simulated_person.person import FULL_TRIGGER_M_S, PersonSettings
 from tests.helpers.simulated_desk import (
     CALIBRATION,
@@ -162,7 +163,7 @@ def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> No
 @pytest.mark.parametrize(("depth_m", "trigger"), [(0.05, "r2_n"), (0.2, "r2_n"), (-0.03, "l2_n"), (-0.3, "l2_n")])
 @pytest.mark.parametrize("delay_s", [0.0, 0.2, 1.0])
 def test_they_pull_as_far_as_distance_and_delay_ask_for(depth_m: float, trigger: str, delay_s: float) -> None:
-    desk = Desk(PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M, insistence_per_s=0.0))
+    desk = Desk(PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M))
     desk.arm()
     pulled = desk.watch(armed((0.0, 0.0, depth_m - GRASP_M)), 1.0, delay_s)[-1]
     meant = min(1.0, crossover(0.25 + delay_s) * abs(depth_m) / FULL_TRIGGER_M_S)
@@ -290,91 +291,37 @@ def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
 # Feeling
 
 
-STIFF = stiffness_to_effect(1.0)
+STIFF = Feedback(0, 8)
 TOWARDS = armed((0.0, 0.0, 0.06))
 MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
 
 
 def test_a_trigger_that_stiffens_yields_less_to_the_same_finger_at_once() -> None:
-    desk = Desk(PersonSettings(depth_error_sd_m=0.0, insistence_per_s=0.0))
+    desk = Desk()
     desk.arm()
     desk.watch(TOWARDS, 2.0)
     force_n, free = desk.hands[-1].r2_n, desk.device.travel[1]
+    assert force_n == pytest.approx(habitual_force_n(MEANT), abs=0.02)
     desk.resist(STIFF)
     desk.watch(TOWARDS, 0.2)
-    assert desk.hands[-1].r2_n == force_n
     assert desk.device.travel[1] < 0.5 * free
+    # However long it resists, they push no harder.
+    assert {hands.r2_n for hands in desk.watch(TOWARDS, 4.0)} == {force_n}
 
 
-def test_they_push_harder_and_harder_while_a_trigger_yields_less_than_they_meant() -> None:
+def test_a_zone_that_stiffens_stops_the_finger_where_it_begins() -> None:
     desk = Desk()
     desk.arm()
-    desk.watch(TOWARDS, 2.0)
-    habitual_n = desk.hands[-1].r2_n
-    assert habitual_n == pytest.approx(habitual_force_n(MEANT), abs=0.02)
-    desk.resist(STIFF)
-    pushed = desk.watch(TOWARDS, 3.0)
-    # Half a normal finger's force a second, from when the finger has been pushed back on.
-    early, late = pushed[50].r2_n, pushed[100].r2_n
-    assert late - early == pytest.approx(0.5 * NORMAL_FINGER_FORCE_N * 50 * TICK_S)
-    assert [hands.r2_n for hands in pushed] == sorted(hands.r2_n for hands in pushed)
-    assert pushed[-1].r2_n == NORMAL_FINGER_FORCE_N
-    # So they overcome even the strongest effect a little: a stiff trigger is advice.
-    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) > 0.2
+    desk.resist(Feedback(3, 8))
+    desk.watch(armed((0.0, 0.0, 0.3)), 2.0)
+    assert desk.device.travel[1] == pytest.approx(0.3, abs=1e-3)
 
 
-def test_they_push_as_hard_as_it_takes_to_get_about_where_they_meant() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.resist(STIFF)
-    desk.watch(armed((0.0, 0.0, 0.03)), 4.0)
-    meant = crossover(0.25) * (0.03 + GRASP_M) / FULL_TRIGGER_M_S
-    assert CALIBRATION.r2.travel(desk.device.travel[1] / SENSED_TRAVEL) == pytest.approx(0.8 * meant, abs=0.01)
-    assert habitual_force_n(meant) + 1.0 < desk.hands[-1].r2_n < NORMAL_FINGER_FORCE_N
-
-
-def test_they_stop_pushing_harder_once_the_trigger_yields_again() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.watch(TOWARDS, 2.0)
-    habitual_n = desk.hands[-1].r2_n
-    desk.resist(STIFF)
-    desk.watch(TOWARDS, 1.0)
-    assert desk.hands[-1].r2_n > habitual_n + 0.5
-    desk.resist(stiffness_to_effect(0.0))
-    desk.watch(TOWARDS, 2.0)
-    assert desk.hands[-1].r2_n == pytest.approx(habitual_n, abs=0.02)
-
-
-def test_a_finger_that_rested_begins_with_its_habit() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.resist(STIFF)
-    desk.watch(TOWARDS, 3.0)
-    assert desk.hands[-1].r2_n == NORMAL_FINGER_FORCE_N
-    desk.watch(armed(None), 1.0)
-    assert desk.hands[-1].r2_n == 0.0
-    again = next(hands.r2_n for hands in desk.watch(TOWARDS, 0.5) if hands.r2_n > 0.0)
-    assert again == pytest.approx(habitual_force_n(MEANT), abs=0.02)
-
-
-def test_the_other_finger_does_not_push_harder_for_what_the_first_one_felt() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.resist(STIFF)
-    desk.watch(TOWARDS, 3.0)
-    assert desk.hands[-1].r2_n == NORMAL_FINGER_FORCE_N
-    turned = next(hands.l2_n for hands in desk.watch(armed((0.0, 0.0, -0.06)), 0.5) if hands.l2_n > 0.0)
-    meant = crossover(0.25) * (0.06 - GRASP_M) / FULL_TRIGGER_M_S
-    assert turned == pytest.approx(habitual_force_n(meant), abs=0.02)
-
-
-@pytest.mark.parametrize("insistence_per_s", [0.0, 0.5, 9.9])
-def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands(insistence_per_s: float) -> None:
-    desk = Desk(PersonSettings(insistence_per_s=insistence_per_s, attempts=2), seed=3)
+def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands() -> None:
+    desk = Desk(PersonSettings(attempts=2), seed=3)
     desk.arm()
     for number in range(60):
-        desk.resist(stiffness_to_effect(number % 7 / 6), stiffness_to_effect(number % 5 / 4))
+        desk.resist(Feedback(0, number % 9), Feedback(0, number % 5))
         place = (0.01 * math.sin(number), 0.01 * math.cos(1.3 * number), 0.4 * math.sin(0.7 * number))
         desk.watch(armed(place, holding=number % 11 > 8), 0.3)
     forces = [(hands.l2_n, hands.r2_n) for hands in desk.hands]
@@ -382,6 +329,20 @@ def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands(insis
     assert all(min(pair) == 0.0 for pair in forces)
     assert max(l2_n for l2_n, _ in forces) > 1.0
     assert max(r2_n for _, r2_n in forces) > 1.0
+
+
+def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(TOWARDS, 1.0)
+    desk.tell(OutputReport(lightbar=WARNING_LIGHT))
+    for hands in desk.watch(TOWARDS, 1.0):
+        assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
+        assert hands.buttons == {Button.L1}
+    desk.tell(OutputReport(lightbar=USUAL_LIGHT))
+    pulled = [hands.r2_n > 0.0 for hands in desk.watch(TOWARDS, 1.0)]
+    assert pulled.index(True) * TICK_S == pytest.approx(0.5, abs=2 * TICK_S)
+    assert all(pulled[pulled.index(True) :])
 
 
 # Chance
@@ -404,7 +365,7 @@ def test_the_same_seed_gives_the_same_hands() -> None:
 def test_misjudged_distances_spread_as_they_are_said_to() -> None:
     errors_m = []
     for seed in range(60):
-        desk = Desk(PersonSettings(depth_error_sd_m=0.01, grasp_depth_m=GRASP_M, insistence_per_s=0.0), seed)
+        desk = Desk(PersonSettings(depth_error_sd_m=0.01, grasp_depth_m=GRASP_M), seed)
         desk.arm()
         force_n = desk.watch(armed((0.0, 0.0, 0.1)), 0.3)[-1].r2_n
         free = ((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N) / SENSED_TRAVEL

@@ -1,14 +1,14 @@
 """The pipeline's kernels: all ready before the first tick."""
 
-import numpy as np
+from typing import get_args
+
 import pytest
 
+from robot_side.ahead.law import LawName
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.warm_up import warm_up
-from robot_side.pairs.candidates import candidate_pairs
-from robot_side.settings import EnlargementOptions, RobotSettings
-from tests.helpers.perceived_scenes import random_scene
+from robot_side.settings import RobotSettings
 
 
 def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
@@ -16,47 +16,29 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     assert all(kernel.ready for kernel in imported_kernels())
     modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
     assert {
-        "robot_side.stiffness.alignment",
-        "robot_side.gripper.between_fingers",
-        "robot_side.stiffness.predicted_contact",
-        "robot_side.enlargement.distance",
-        "robot_side.enlargement.kinematic_error",
-        "robot_side.pairs.nearest_kernels",
-        "robot_side.stiffness.object_shares",
-        "robot_side.overlap.kernels",
-        "robot_side.pairs.candidates",
-        "robot_side.stiffness.reference_volume",
+        "robot_side.ahead.ask",
+        "robot_side.ahead.distances",
+        "robot_side.ahead.feel",
+        "robot_side.ahead.find",
+        "robot_side.ahead.meet",
+        "robot_side.ahead.total_overlap",
         "robot_side.arm.resolved_rate",
-        "robot_side.stiffness.map",
-        "robot_side.pairs.touching",
+        "robot_side.enlargement.kinematic_error",
         "robot_side.objects.validity",
+        "robot_side.overlap.lanes.box_batch",
+        "robot_side.overlap.lanes.tetrahedron_batch",
+        "robot_side.overlap.precise.kernels",
     } <= modules
 
 
-@pytest.mark.parametrize("direction", ["isotropic", "towards_object"])
-def test_nothing_is_compiled_within_a_tick(direction: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("law", get_args(LawName))
+def test_nothing_is_compiled_within_a_tick(law: LawName, monkeypatch: pytest.MonkeyPatch) -> None:
     warm_up()
 
     def late(kernel: Compiled) -> None:
         raise AssertionError(f"{kernel.name} was not ready")
 
-    options = EnlargementOptions(direction=direction)  # type: ignore[arg-type]
-    robot = build_robot_side(RobotSettings(enlargement=options), 1, "clock")
+    robot = build_robot_side(RobotSettings(law=law), 1, "clock")
     monkeypatch.setattr(Compiled, "prepare", late)
     for tick in range(20):
         robot.tick(0.001 * tick)
-
-
-def test_more_pairs_than_there_is_room_for_at_first_are_found_all_the_same() -> None:
-    rng = np.random.default_rng(2)
-    objects = random_scene(rng, 20, 0.2)
-    centers, radii = rng.uniform(-0.2, 0.2, (30, 3)), np.full(30, 0.3)
-    pairs = candidate_pairs(centers, radii, objects)
-    assert len(pairs) > 1000
-    one_by_one = [candidate_pairs(centers[row : row + 1], radii[row : row + 1], objects) for row in range(30)]
-    assert len(pairs) == sum(len(found) for found in one_by_one)
-    for row, found in enumerate(one_by_one):
-        for part in ("spheres", "boxes", "tetrahedra", "half_spaces"):
-            of_sphere = pairs.sphere_index[getattr(pairs, part)] == row
-            expected = found.primitive_index[getattr(found, part)]
-            np.testing.assert_array_equal(pairs.primitive_index[getattr(pairs, part)][of_sphere], expected)

@@ -10,14 +10,9 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.enlargement.delay_displacement import delay_displacement
-from robot_side.enlargement.distance import (
-    Enlargement,
-    EnlargementSettings,
-    combined_mean,
-    combined_variance,
-    enlargement_distance,
-)
-from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.enlargement.distance import Uncertainty, enlargement_distance, plain_enlargements_m
+from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
+from robot_side.enlargement.prediction_errors import PredictionErrors
 
 probabilities = st.floats(1e-6, 1.0 - 1e-6)
 lengths = st.floats(0.0, 1.0)
@@ -59,7 +54,7 @@ def test_probability_outside_the_open_interval_is_an_error_that_says_so(p: float
     with pytest.raises(ValueError, match=r"probability = .* outside \(0, 1\)"):
         enlargement_distance(p, 0.0, 1e-6, 0.0)
     with pytest.raises(ConfigurationError, match=r"probability"):
-        EnlargementSettings(probability=p)
+        Uncertainty(probability=p)
 
 
 @pytest.mark.parametrize("bad", [-1e-9, math.nan, math.inf, -math.inf])
@@ -82,9 +77,7 @@ def test_delay_displacement_is_speed_times_age() -> None:
         delay_displacement(np.array([[math.nan, 0.0, 0.0]]), 0.1)
 
 
-def test_means_and_variances_combine_as_eq_10_says() -> None:
-    assert combined_mean(-0.002, -0.001) == pytest.approx(0.002 + math.sqrt(3.0) * 0.001)
-    np.testing.assert_allclose(combined_variance(np.array([1e-6, 4e-6]), 2e-3), [5e-6, 8e-6])
+# What is known to err
 
 
 def _covariances(seed: int, count: int = 4) -> FloatArray:
@@ -93,109 +86,94 @@ def _covariances(seed: int, count: int = 4) -> FloatArray:
 
 
 _ERRORS: dict[str, Any] = {
-    "camera_mean_m": 0.001,
+    "camera_mean_m": (0.001, 0.002, -0.002),
     "camera_sd_m": 0.002,
     "kinematic_mean_m": (0.001, -0.002, 0.0005),
 }
 
 
-def test_isotropic_distances_are_eq_10_for_each_sphere() -> None:
-    chosen = EnlargementSettings(probability=0.95, **_ERRORS)
-    covariances = _covariances(0)
-    velocities = np.random.default_rng(1).normal(size=(4, 3)) * 0.1
-    distances = Enlargement(chosen).distances(covariances, velocities, 0.15)
-    mean = float(np.linalg.norm(chosen.kinematic_mean_m)) + math.sqrt(3.0) * 0.001
-    for i in range(4):
-        variance = float(np.linalg.norm(covariances[i], 2)) + 0.002**2
-        expected = enlargement_distance(0.95, mean, variance, 0.15 * float(np.linalg.norm(velocities[i])))
-        assert distances[i] == pytest.approx(expected, rel=1e-12)
+def test_the_mean_along_a_direction_is_how_much_nearer_things_are_than_they_seem() -> None:
+    """û·(μ_ee - μ_c): an arm farther ahead is nearer, and so is a thing that the camera sees too far away."""
+    uncertainty = Uncertainty(**_ERRORS)
+    direction = np.array([0.6, 0.0, -0.8])
+    assert uncertainty.mean_along_m(direction) == pytest.approx(0.6 * (0.001 - 0.001) - 0.8 * (0.0005 + 0.002))
+    assert uncertainty.mean_along_m(-direction) == pytest.approx(-uncertainty.mean_along_m(direction))
+    assert Uncertainty().mean_along_m(direction) == 0.0
 
 
-def test_once_keeps_the_largest_statistical_part_of_the_sampled_configurations() -> None:
-    sampled = np.stack([_covariances(seed) for seed in range(10)])
-    still = np.zeros((4, 3))
-    present = Enlargement(EnlargementSettings(**_ERRORS))
-    largest = max(present.distances(covariances, still, 0.1).max() for covariances in sampled)
-    once = Enlargement(EnlargementSettings(mode="once", **_ERRORS), sampled)
-    np.testing.assert_allclose(once.distances(sampled[3], still, 0.1), np.full(4, largest))
-    moving = np.full((4, 3), 0.1)
-    np.testing.assert_allclose(once.distances(sampled[3], moving, 0.1), largest + delay_displacement(moving, 0.1))
-    with pytest.raises(ValueError, match="sampled_covariances"):
-        Enlargement(EnlargementSettings(mode="once"))
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(p=probabilities)
+def test_the_quantile_is_that_of_the_standard_library(p: float) -> None:
+    assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
-@given(seed=st.integers(0, 2**32 - 1), p=st.floats(0.5, 0.999), once=st.booleans())
-def test_towards_an_object_never_needs_more_than_isotropic(seed: int, p: float, once: bool) -> None:
-    rng = np.random.default_rng(seed)
-    covariances = _covariances(seed)
-    chosen = EnlargementSettings(
-        probability=p,
-        camera_mean_m=float(rng.normal() * 1e-3),
-        camera_sd_m=1e-3,
-        kinematic_mean_m=(0.001, -0.002, 0.0005),
-        mode="once" if once else "per_configuration",
-        direction="towards_object",
-    )
-    enlargement = Enlargement(chosen, covariances)
-    velocities = rng.normal(size=(4, 3)) * 0.2
-    directions = rng.normal(size=(4, 5, 3))
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    towards = enlargement.distances_towards(covariances, velocities, 0.1, directions)
-    isotropic = enlargement.distances(covariances, velocities, 0.1)
-    assert towards.shape == (4, 5)
-    assert (towards >= 0.0).all()
-    assert (towards <= isotropic[:, None] * (1.0 + 1e-12)).all()
-    pairs = enlargement.distances_towards(covariances, velocities, 0.1, directions[:, 2])
-    np.testing.assert_allclose(pairs, towards[:, 2], rtol=1e-12)
-
-
-def test_distance_towards_an_object_covers_the_drawn_errors_with_probability_p() -> None:
-    """True position and perceived object drawn many times: the gap closes by more than D in 1 - P of them."""
-    rng = np.random.default_rng(5)
-    covariances = _covariances(7, count=1)
-    chosen = EnlargementSettings(probability=0.9, direction="towards_object", **_ERRORS)
-    direction = np.array([[0.6, 0.0, 0.8]])
-    distance = Enlargement(chosen).distances_towards(covariances, np.zeros((1, 3)), 0.1, direction)[0]
-    draws = 200_000
-    gripper_error = rng.multivariate_normal(chosen.kinematic_mean_m, covariances[0], draws)
-    object_error = rng.normal(0.001, 0.002, (draws, 3))
-    closing = (gripper_error + object_error) @ direction[0]
-    assert (closing <= distance).mean() == pytest.approx(0.9, abs=0.003)
-
-
-def test_retreat_needs_no_delay_displacement_towards_the_object() -> None:
-    enlargement = Enlargement(EnlargementSettings(direction="towards_object"))
-    none = np.zeros((1, 3, 3))
-    towards = np.array([[1.0, 0.0, 0.0]])
-    assert enlargement.distances_towards(none, np.array([[0.3, 0.4, 0.0]]), 0.1, towards)[0] == 0.03
-    assert enlargement.distances_towards(none, np.array([[-0.3, 0.4, 0.0]]), 0.1, towards)[0] == 0.0
+def test_what_the_prediction_misses_is_that_of_its_table() -> None:
+    table = PredictionErrors({"operator": ((0.1, 0.001, 0.002),), "robot": ((0.1, 0.01, 0.02),)})
+    uncertainty = Uncertainty(prediction=table)
+    assert uncertainty.predicted_m("operator", 0.1, 0.25) == (0.001, 0.002)
+    assert uncertainty.predicted_m("robot", 0.1, 0.25) == (0.01, 0.02)
 
 
 @pytest.mark.parametrize(
     "bad",
     [
+        {"probability": 0.0},
+        {"probability": 1.0},
+        {"probability": math.nan},
         {"camera_sd_m": -1.0},
-        {"camera_mean_m": math.nan},
+        {"camera_sd_m": math.nan},
+        {"camera_mean_m": (math.nan, 0.0, 0.0)},
         {"kinematic_mean_m": (0.0, math.inf, 0.0)},
-        {"measure": "max"},
-        {"mode": "twice"},
-        {"direction": "up"},
     ],
 )
 def test_bad_settings_are_named(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(bad))):
-        EnlargementSettings(**bad)
+        Uncertainty(**bad)
+
+
+# The paper's plain enlargement
+
+
+def test_the_plain_enlargement_is_eq_10_for_each_sphere_with_the_trace_and_all_of_the_speed() -> None:
+    uncertainty = Uncertainty(probability=0.95, **_ERRORS)
+    covariances = _covariances(0)
+    velocities = np.random.default_rng(1).normal(size=(4, 3)) * 0.1
+    found = plain_enlargements_m(uncertainty, covariances, velocities, 0.15)
+    mean = float(np.linalg.norm(_ERRORS["kinematic_mean_m"]) + np.linalg.norm(_ERRORS["camera_mean_m"]))
+    for i in range(4):
+        variance = float(np.trace(covariances[i])) + 0.002**2
+        expected = enlargement_distance(0.95, mean, variance, 0.15 * float(np.linalg.norm(velocities[i])))
+        assert found[i] == pytest.approx(expected, rel=1e-12)
+
+
+def test_equal_means_along_all_axes_are_root_three_of_one() -> None:
+    uncertainty = Uncertainty(0.5, (-0.001,) * 3, 0.001, (0.0, -0.002, 0.0))
+    none = np.zeros((1, 3, 3)), np.zeros((1, 3)), 0.1
+    assert plain_enlargements_m(uncertainty, *none)[0] == pytest.approx(0.002 + math.sqrt(3.0) * 0.001)
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), p=st.floats(0.5, 0.999))
+def test_along_any_one_direction_less_is_needed_than_plainly(seed: int, p: float) -> None:
+    rng = np.random.default_rng(seed)
+    covariances = _covariances(seed)
+    errors = _ERRORS | {"camera_mean_m": tuple(rng.normal(size=3) * 1e-3)}
+    uncertainty = Uncertainty(p, **errors)
+    plain = plain_enlargements_m(uncertainty, covariances, np.zeros((4, 3)), 0.1)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    variance = directional_variance(covariances, np.tile(direction, (4, 1))) + uncertainty.camera_sd_m**2
+    along = uncertainty.mean_along_m(direction) + uncertainty.quantile * np.sqrt(variance)
+    assert (along <= plain + 1e-15).all()
 
 
 def test_a_velocity_or_covariance_that_is_not_finite_is_no_distance() -> None:
-    enlargement = Enlargement(EnlargementSettings())
-    covariances, still = _covariances(3), np.zeros((4, 3))
+    uncertainty, covariances, still = Uncertainty(), _covariances(3), np.zeros((4, 3))
     for bad in (math.nan, math.inf):
         with pytest.raises(ValueError, match="velocities_m_s"):
-            enlargement.distances(covariances, np.full((4, 3), bad), 0.1)
-        with pytest.raises(ValueError, match="covariances"):
-            enlargement.distances(np.full((4, 3, 3), bad), still, 0.1)
+            plain_enlargements_m(uncertainty, covariances, np.full((4, 3), bad), 0.1)
+        with pytest.raises(ValueError, match="variance_m2"):
+            plain_enlargements_m(uncertainty, np.full((4, 3, 3), bad), still, 0.1)
     for age in (-0.1, math.nan, math.inf):
         with pytest.raises(ValueError, match="loop_age_s"):
-            enlargement.distances(covariances, still, age)
+            plain_enlargements_m(uncertainty, covariances, still, age)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from robot_side.ahead.distances import distance_to_object
 from robot_side.gripper.perceived_distances import PerceivedDistances, perceived_distances
 from robot_side.objects.perceived import Role
-from robot_side.pairs.nearest_object import distance_to_object
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_scene
 

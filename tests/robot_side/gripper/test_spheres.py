@@ -2,69 +2,201 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from common.arrays import FloatArray
-from robot_side.gripper.spheres import cover_boxes
+from common.arrays import BoolArray, FloatArray
+from robot_side.gripper.spheres import SphereCover, cover_boxes
+
+PALM_M, FINGER_M, FINGERTIP_M = (0.032, 0.05, 0.04), (0.011, 0.007, 0.02), (0.011, 0.006, 0.02)
+TOLERANCE_M = 1e-9
+SIDES = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+
+# From cubes to plates and rods, evenly over the orders of magnitude.
+half_size = st.floats(math.log(0.001), math.log(0.2)).map(math.exp)
+boxes = st.tuples(half_size, half_size, half_size)
+stand_outs = st.floats(0.001, 0.01)
+
+
+def cover_one(half_sizes_m: tuple[float, ...], stand_out_m: float) -> SphereCover:
+    return cover_boxes(np.zeros((1, 3)), np.eye(3)[None], np.array([half_sizes_m]), stand_out_m)
 
 
 def random_boxes(count: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     random = np.random.default_rng(seed)
     rotations = np.array([np.linalg.qr(random.standard_normal((3, 3)))[0] for _ in range(count)])
-    # Cubes, plates and rods.
-    half_sizes = 10.0 ** random.uniform(-3.0, -1.0, (count, 3))
+    half_sizes = 10.0 ** random.uniform(-3.0, -1.3, (count, 3))
     return random.uniform(-0.2, 0.2, (count, 3)), rotations, half_sizes
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(boxes=st.integers(1, 6), count=st.integers(1, 40), seed=st.integers(0, 10_000))
-def test_every_point_of_a_box_is_in_one_of_its_spheres(boxes: int, count: int, seed: int) -> None:
-    centers, rotations, half_sizes = random_boxes(boxes, seed)
-    cover = cover_boxes(centers, rotations, half_sizes, count)
-    assert len(cover.radii_m) == max(count, boxes)
-    random = np.random.default_rng(seed)
-    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    for box in range(boxes):
-        unit = np.vstack([corners, random.uniform(-1.0, 1.0, (200, 3)), np.sign(random.uniform(-1, 1, (50, 3)))])
-        points = centers[box] + (unit * half_sizes[box]) @ rotations[box].T
+def grid_on_surface(half_sizes_m: FloatArray, steps: int) -> FloatArray:
+    """Points of every face, the edges and corners among them."""
+    along = np.linspace(-1.0, 1.0, steps)
+    u, v = (values.ravel() for values in np.meshgrid(along, along))
+    faces = [np.insert(np.column_stack([u, v]), axis, side, axis=1) for axis in range(3) for side in (-1.0, 1.0)]
+    return np.vstack(faces) * half_sizes_m
+
+
+def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
+    """Middles of the surface's cells that no one sphere contains, however small they are cut.
+
+    A proof and not a sample: cells tile the faces with their edges and corners, and a cell counts as covered only if
+    its farthest point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance.
+    One eighth of the box is enough, since the spheres are mirror-symmetric: the nearest images are those in it.
+    """
+    spheres = np.unique(np.column_stack([np.abs(cover.centers_m), cover.radii_m + TOLERANCE_M]), axis=0)
+    left = []
+    for axis in range(3):
+        in_face = np.arange(3) != axis
+        middles, halves = np.where(in_face, 0.5, 1.0)[None] * half_sizes_m, 0.5 * half_sizes_m * in_face
+        smallest_yet = False
+        while len(middles) and not smallest_yet:
+            smallest_yet = bool(halves.max() < 0.25 * TOLERANCE_M)
+            # Neighbours stay neighbours, so that few spheres are near a piece of the list.
+            pieces = np.array_split(middles, 1 + len(middles) // 64)
+            middles = np.concatenate([piece[~_contained(piece, halves, spheres)] for piece in pieces])
+            # Long cells are cut across until they are as good as square.
+            cut = halves > 0.5 * halves.max()
+            halves = np.where(cut, 0.5 * halves, halves)
+            middles = (middles[:, None] + np.unique(SIDES * cut, axis=0) * halves).reshape(-1, 3)
+        left.append(middles)
+    return np.concatenate(left)
+
+
+def _contained(middles: FloatArray, halves: FloatArray, spheres: FloatArray) -> BoolArray:
+    """Whether one of the spheres contains the cell, of each of the cells."""
+    low, high = middles.min(axis=0) - halves, middles.max(axis=0) + halves
+    centers, squared_radii = spheres[:, :3], spheres[:, 3] ** 2
+    near = ((np.clip(centers, low, high) - centers) ** 2).sum(axis=1) <= squared_radii
+    farthest = np.abs(middles[:, None] - centers[near]) + halves
+    contained: BoolArray = ((farthest**2).sum(axis=2) <= squared_radii[near]).any(axis=1)
+    return contained
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(half_sizes_m=boxes, stand_out_m=stand_outs)
+@example(half_sizes_m=PALM_M, stand_out_m=0.003)
+@example(half_sizes_m=FINGER_M, stand_out_m=0.003)
+@example(half_sizes_m=FINGERTIP_M, stand_out_m=0.003)
+@example(half_sizes_m=(0.05, 0.05, 0.05), stand_out_m=0.003)
+@example(half_sizes_m=(0.001, 0.03, 0.05), stand_out_m=0.003)
+@example(half_sizes_m=(0.001, 0.05, 0.001), stand_out_m=0.01)
+@example(half_sizes_m=(0.0, 0.03, 0.05), stand_out_m=0.003)
+@example(half_sizes_m=(0.0, 0.05, 0.0), stand_out_m=0.003)
+@example(half_sizes_m=(0.0, 0.0, 0.0), stand_out_m=0.003)
+@example(half_sizes_m=(10.0, 0.1, 5.0), stand_out_m=0.003)
+def test_no_point_of_the_surface_is_outside_and_no_sphere_stands_out_too_far(
+    half_sizes_m: tuple[float, ...], stand_out_m: float
+) -> None:
+    half_sizes = np.array(half_sizes_m)
+    cover = cover_one(half_sizes_m, stand_out_m)
+    assert len(cover.radii_m) <= 2000
+
+    # Of a centre in the box, the farthest outside point is straight above the nearest face.
+    depths = (half_sizes - np.abs(cover.centers_m)).min(axis=1)
+    assert (depths >= -1e-15).all()
+    assert (cover.radii_m - depths).max() <= cover.stand_out_m[0] * (1.0 + 1e-12)
+    assert (cover.stand_out_m[0] == stand_out_m) or (len(cover.radii_m) > 1000)
+
+    spheres = np.column_stack([cover.centers_m, cover.radii_m])
+    in_order = spheres[np.lexsort(spheres.T)]
+    for axis in range(3):
+        mirrored = spheres.copy()
+        mirrored[:, axis] *= -1.0
+        np.testing.assert_array_equal(mirrored[np.lexsort(mirrored.T)], in_order)
+
+    assert len(uncovered_cells(half_sizes, cover)) == 0
+
+
+@pytest.mark.parametrize("half_sizes_m", [PALM_M, FINGER_M, FINGERTIP_M, (0.002, 0.03, 0.02)])
+def test_no_point_of_a_sphere_is_farther_outside_than_the_stand_out(half_sizes_m: tuple[float, ...]) -> None:
+    cover = cover_one(half_sizes_m, 0.003)
+    directions = np.vstack([np.eye(3), -np.eye(3), np.random.default_rng(3).standard_normal((500, 3))])
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    points = cover.centers_m[:, None] + cover.radii_m[:, None, None] * directions
+    outside = np.linalg.norm(np.maximum(np.abs(points) - half_sizes_m, 0.0), axis=2)
+    assert outside.max() == pytest.approx(0.003, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_grid_points_of_placed_boxes_are_in_their_spheres(seed: int) -> None:
+    centers, rotations, half_sizes = random_boxes(3, seed)
+    stand_out = 0.002 + 0.001 * seed
+    cover = cover_boxes(centers, rotations, half_sizes, stand_out)
+    assert (np.diff(cover.box) >= 0).all()
+    np.testing.assert_array_equal(cover.stand_out_m, np.full(3, stand_out))
+    for box in range(3):
+        points = centers[box] + grid_on_surface(half_sizes[box], 25) @ rotations[box].T
         of_box = cover.box == box
-        apart = np.linalg.norm(points[:, None] - cover.centers_m[of_box][None], axis=2)
-        assert (apart <= cover.radii_m[of_box] * (1.0 + 1e-9)).any(axis=1).all()
+        apart = np.linalg.norm(points[:, None] - cover.centers_m[of_box], axis=2)
+        assert (apart <= cover.radii_m[of_box] + TOLERANCE_M).any(axis=1).all()
 
 
-def test_one_sphere_circumscribes_a_box() -> None:
-    cover = cover_boxes(np.array([[1.0, 2.0, 3.0]]), np.eye(3)[None], np.array([[0.1, 0.2, 0.2]]), 1)
-    np.testing.assert_allclose(cover.centers_m, [[1.0, 2.0, 3.0]])
-    np.testing.assert_allclose(cover.radii_m, [0.3])
+def test_the_built_in_gripper_needs_few_spheres() -> None:
+    half_sizes = np.array([PALM_M, FINGER_M, FINGER_M, FINGERTIP_M, FINGERTIP_M])
+    cover = cover_boxes(np.zeros((5, 3)), np.tile(np.eye(3), (5, 1, 1)), half_sizes)
+    np.testing.assert_array_less(np.bincount(cover.box), np.array([158, 26, 26, 18, 18]) + 1)
+    # A sphere covers at most 2√2 stand-outs of an edge, so that these boxes' edges alone take about 188.
+    assert len(cover.radii_m) <= 246
 
 
-def test_a_rod_is_cut_along_its_length() -> None:
-    cover = cover_boxes(np.zeros((1, 3)), np.eye(3)[None], np.array([[0.01, 0.08, 0.01]]), 4)
-    np.testing.assert_allclose(np.sort(cover.centers_m[:, 1]), [-0.06, -0.02, 0.02, 0.06])
-    np.testing.assert_allclose(cover.radii_m, np.full(4, math.sqrt(0.01**2 + 0.02**2 + 0.01**2)))
+def test_spheres_that_stand_out_farther_are_fewer() -> None:
+    counts = [len(cover_one(PALM_M, stand_out).radii_m) for stand_out in (0.002, 0.003, 0.005, 0.01, 0.05)]
+    assert counts == sorted(set(counts), reverse=True)
+    assert counts[-1] == 1
 
 
-def test_more_spheres_never_reach_farther() -> None:
-    centers, rotations, half_sizes = random_boxes(3, 5)
-    largest = [cover_boxes(centers, rotations, half_sizes, count).radii_m.max() for count in (3, 6, 12, 24, 48)]
-    assert largest == sorted(largest, reverse=True)
-    assert largest[-1] < 0.6 * largest[0]
+def test_a_plate_a_line_and_a_point_have_one_layer_one_row_and_one_sphere() -> None:
+    plate = cover_one((0.02, 0.0, 0.03), 0.003)
+    np.testing.assert_array_equal(plate.centers_m[:, 1], 0.0)
+    np.testing.assert_array_equal(plate.radii_m, np.full(len(plate.radii_m), 0.003))
+    line = cover_one((0.0, 0.02, 0.0), 0.003)
+    np.testing.assert_array_equal(line.centers_m[:, [0, 2]], 0.0)
+    # Each covers 6 mm of the 40.
+    assert len(line.radii_m) == 7
+    np.testing.assert_allclose(np.diff(line.centers_m[:, 1]), 2 * line.centers_m[-1, 1] / 6)
+    point = cover_one((0.0, 0.0, 0.0), 0.003)
+    np.testing.assert_array_equal(point.centers_m, [[0.0, 0.0, 0.0]])
+    np.testing.assert_array_equal(point.radii_m, [0.003])
 
 
-def test_a_box_without_extent_keeps_its_one_sphere() -> None:
-    cover = cover_boxes(np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)), 8)
-    np.testing.assert_array_equal(cover.radii_m, [0.0])
+def test_a_box_much_thinner_than_the_stand_out_has_one_row() -> None:
+    cover = cover_one((0.0005, 0.001, 0.05), 0.01)
+    np.testing.assert_array_equal(cover.centers_m[:, :2], 0.0)
+    np.testing.assert_allclose(cover.radii_m, 0.0105)
+    assert len(cover.radii_m) == 5
+
+
+def test_a_very_large_box_gets_the_stand_out_that_2000_spheres_take_and_the_others_what_was_asked_for() -> None:
+    half_sizes = np.array([(0.05, 5.0, 5.0), PALM_M])
+    cover = cover_boxes(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), half_sizes)
+    wall = int((cover.box == 0).sum())
+    assert 1900 <= wall <= 2000
+    assert cover.stand_out_m[1] == 0.003
+    assert cover.stand_out_m[0] > 0.003
+    # A little less is too little: it is not raised farther than needed.
+    less = cover_one((0.05, 5.0, 5.0), float(cover.stand_out_m[0]) * 0.999)
+    assert less.stand_out_m[0] == pytest.approx(cover.stand_out_m[0], rel=1e-5)
+
+
+def test_equal_boxes_have_equal_spheres_in_equal_order() -> None:
+    centers, rotations, half_sizes = random_boxes(2, 4)
+    first, second = (cover_boxes(centers, rotations, half_sizes.copy()) for _ in range(2))
+    np.testing.assert_array_equal(first.centers_m, second.centers_m)
+    np.testing.assert_array_equal(first.radii_m, second.radii_m)
 
 
 def test_bad_boxes_are_named() -> None:
     centers, rotations, half_sizes = random_boxes(2, 1)
-    with pytest.raises(ValueError, match="count = 0"):
-        cover_boxes(centers, rotations, half_sizes, 0)
-    with pytest.raises(ValueError, match="half_sizes_m"):
+    for stand_out in (0.0, -0.001, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"stand_out_m = {stand_out}"):
+            cover_boxes(centers, rotations, half_sizes, stand_out)
+    with pytest.raises(ValueError, match="is negative"):
         cover_boxes(centers, rotations, -half_sizes)
     with pytest.raises(ValueError, match="half_sizes_m has the shape"):
         cover_boxes(centers, rotations, half_sizes[:1])
+    with pytest.raises(ValueError, match="rotations has the shape"):
+        cover_boxes(centers, rotations[0], half_sizes)
     with pytest.raises(ValueError, match="centers_m holds NaN"):
         cover_boxes(np.full((2, 3), np.nan), rotations, half_sizes)
     with pytest.raises(ValueError, match="centers_m"):

@@ -6,13 +6,24 @@ import pytest
 from robot_side.simulation.camera_error import CameraError
 
 
-def test_the_lasting_error_has_the_mean_and_deviation_asked_for() -> None:
+def test_the_lasting_error_has_the_mean_and_deviation_asked_for_with_the_papers_sign() -> None:
+    """perceived = true - e_c, and what is added to the true positions is -e_c."""
     names = tuple(f"object{index}" for index in range(4000))
-    errors = CameraError(names, mean_m=0.004, standard_deviation_m=0.002, seed=1).next_frame()
-    assert errors.shape == (4000, 3)
+    offsets = CameraError(names, mean_m=0.004, standard_deviation_m=0.002, seed=1).next_frame()
+    assert offsets.shape == (4000, 3)
     # 4 standard deviations of the two estimates from 12 000 draws.
-    assert errors.mean() == pytest.approx(0.004, abs=4.0 * 0.002 / math.sqrt(12_000))
-    assert errors.std() == pytest.approx(0.002, rel=4.0 / math.sqrt(24_000))
+    assert offsets.mean() == pytest.approx(-0.004, abs=4.0 * 0.002 / math.sqrt(12_000))
+    assert offsets.std() == pytest.approx(0.002, rel=4.0 / math.sqrt(24_000))
+
+
+def test_the_mean_may_differ_from_axis_to_axis() -> None:
+    error = CameraError(("a", "b"), mean_m=(0.001, -0.002, 0.003))
+    np.testing.assert_array_equal(error.next_frame(), [[-0.001, 0.002, -0.003]] * 2)
+    np.testing.assert_array_equal(error.mean_m, [0.001, -0.002, 0.003])
+    np.testing.assert_array_equal(CameraError(("a",), mean_m=0.004).mean_m, [0.004] * 3)
+    # What is drawn is the same, whatever the mean.
+    drawn, shifted = (CameraError(("a",), mean, 0.003, 0.001, seed=5).next_frame() for mean in (0.0, (0.1, 0.0, -0.1)))
+    np.testing.assert_allclose(shifted - drawn, [[-0.1, 0.0, 0.1]], atol=1e-15)
 
 
 def test_an_objects_error_does_not_depend_on_the_others() -> None:
@@ -45,6 +56,8 @@ def test_no_objects_have_no_errors() -> None:
 def test_bad_specifications_are_named() -> None:
     with pytest.raises(ValueError, match="mean_m"):
         CameraError((), mean_m=math.nan)
+    with pytest.raises(ValueError, match="mean_m"):
+        CameraError((), mean_m=(0.0, math.inf, 0.0))
     with pytest.raises(ValueError, match="frame_standard_deviation_m"):
         CameraError((), frame_standard_deviation_m=-0.1)
     with pytest.raises(ValueError, match="standard_deviation_m"):

@@ -6,6 +6,7 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.simulation import kinematics
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
@@ -73,27 +74,72 @@ def test_jacobians_are_the_derivatives_of_the_spheres() -> None:
         np.testing.assert_allclose(pose.tool_jacobian[:3, joint], tool, atol=1e-8)
 
 
-def corners_of(scene: Scene, geom: int) -> FloatArray:
+def points_of(scene: Scene, geom: int, random: np.random.Generator) -> FloatArray:
+    """Points (n, 3) of the box around a geom in the world: its corners, and others on its surface."""
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    local = scene.model.geom_aabb[geom, :3] + signs * scene.model.geom_aabb[geom, 3:]
+    on_surface = random.uniform(-1.0, 1.0, (2000, 3))
+    axis = random.integers(3, size=2000)
+    on_surface[np.arange(2000), axis] = np.sign(on_surface[np.arange(2000), axis])
+    local = scene.model.geom_aabb[geom, :3] + np.vstack([signs, on_surface]) * scene.model.geom_aabb[geom, 3:]
     placed: FloatArray = scene.data.geom_xpos[geom] + local @ scene.data.geom_xmat[geom].reshape(3, 3).T
     return placed
 
 
 @pytest.mark.parametrize("closing_s", [0.0, 0.3, 0.8])
-def test_the_spheres_cover_the_gripper_wherever_its_fingers_are(closing_s: float) -> None:
+def test_nothing_of_the_gripper_is_outside_its_spheres_wherever_its_fingers_are(closing_s: float) -> None:
     driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    driver.move(np.array([0.05, 0.1, -0.05, 0.2, 0.1, 0.3]), 0.2)
     state = driver.grip(1.0, closing_s) if closing_s else driver.wait(PERIOD_S)
-    mujoco.mj_forward(driver.scene.model, driver.scene.data)
+    scene = driver.scene
+    mujoco.mj_forward(scene.model, scene.data)
+    pose, random = driver.pose(state), np.random.default_rng(1)
+    assert len(pose.sphere_radii_m) == 246
+    for geom, on_finger in zip(scene.robot.gripper_geoms, scene.robot.geom_on_finger, strict=True):
+        points = points_of(scene, int(geom), random)
+        own = pose.sphere_on_finger == on_finger
+        apart = np.linalg.norm(points[:, None] - pose.sphere_centers_m[own][None], axis=2)
+        assert (apart <= pose.sphere_radii_m[own] + 1e-8).any(axis=1).all()
+
+
+def test_no_sphere_stands_out_of_the_gripper_by_more_than_3_mm() -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.wait(PERIOD_S)
+    scene = driver.scene
+    mujoco.mj_forward(scene.model, scene.data)
     pose = driver.pose(state)
-    assert len(pose.sphere_radii_m) == 16
-    assert pose.sphere_radii_m.max() < 0.04
-    for geom, on_finger in zip(driver.scene.robot.gripper_geoms, driver.scene.robot.geom_on_finger, strict=True):
-        chosen = pose.sphere_on_finger == on_finger
-        apart = np.linalg.norm(
-            corners_of(driver.scene, int(geom))[:, None] - pose.sphere_centers_m[chosen][None], axis=2
-        )
-        assert (apart <= pose.sphere_radii_m[chosen] + 1e-9).any(axis=1).all()
+    depths = np.full(len(pose.sphere_radii_m), -np.inf)
+    for geom in scene.robot.gripper_geoms:
+        in_geom = pose.sphere_centers_m - scene.data.geom_xpos[geom]
+        local = in_geom @ scene.data.geom_xmat[geom].reshape(3, 3) - scene.model.geom_aabb[geom, :3]
+        depths = np.maximum(depths, (scene.model.geom_aabb[geom, 3:] - np.abs(local)).min(axis=1))
+    assert (pose.sphere_radii_m - depths).max() <= 0.003 + 1e-8
+
+
+def test_a_coarser_cover_has_fewer_spheres() -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.wait(PERIOD_S)
+    counts = [
+        len(MujocoKinematics(driver.scene, stand_out_m).pose(state).sphere_radii_m)
+        for stand_out_m in (0.002, 0.003, 0.005, 0.01)
+    ]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[1] == 246
+    assert counts[3] < 50
+
+
+def test_the_order_by_nearness_only_permutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.wait(PERIOD_S)
+    ordered = MujocoKinematics(driver.scene).pose(state)
+    monkeypatch.setattr(kinematics, "near_order", lambda centers_m, _: np.arange(len(centers_m)))
+    as_covered = MujocoKinematics(driver.scene).pose(state)
+    rows = [
+        np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m, pose.sphere_on_finger])
+        for pose in (ordered, as_covered)
+    ]
+    assert (rows[0] != rows[1]).any()
+    here, there = (values[np.lexsort(values.T)] for values in rows)
+    np.testing.assert_array_equal(here, there)
 
 
 def test_nothing_at_the_tool_is_told(tmp_path: Path) -> None:

@@ -42,8 +42,8 @@ def test_the_bare_robot_stands_at_the_built_in_table(alone: ToolDriver) -> None:
     assert len(MujocoCamera(alone.scene).perceive(0.0).box_object) == 6
     state = alone.arm.state(alone.now_s)
     pose = alone.pose(state)
-    assert len(pose.sphere_radii_m) == 16
-    assert pose.sphere_on_finger.sum() >= 8
+    assert 100 < len(pose.sphere_radii_m) < 2000
+    assert pose.sphere_on_finger.sum() >= 50
     # No sphere is far from the tool.
     assert np.linalg.norm(pose.sphere_centers_m - pose.tool_position_m, axis=1).max() < 0.2
 

@@ -10,26 +10,22 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from robot_side.ahead.distances import distance_to_object
+from robot_side.ahead.find import OBSTACLE, PASSED_OVER
+from robot_side.ahead.scene_table import scene_table
+from robot_side.ahead.tables import Tables
+from robot_side.ahead.total_overlap import total_overlap_m3
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.kernel import Compiled
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.overlap import Mesh, sphere_sphere, warm_up
-from robot_side.overlap.meshes import mesh_library
-from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
-from robot_side.pairs import nearest_on_meshes
-from robot_side.pairs.candidates import candidate_pairs
-from robot_side.pairs.overlaps import by_object, evaluate, nearest_surfaces
+from robot_side.overlap import sphere_sphere, warm_up
 from robot_side.settings import RobotSettings
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import Scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.gripper_poses import gripper_pose
 from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
-from tests.helpers.perceived_scenes import Scene as Objects
-from tests.helpers.perceived_scenes import random_rotation
 from tests.helpers.repository import ROOT
 from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
-from tests.robot_side.test_sensing import Senses
 
 TURNED = 'pos="0.9 0.3 0.2" euler="20 30 40"'
 ROUND = {
@@ -56,13 +52,11 @@ def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArr
 
 def overlap_of(objects: PerceivedObjects, name: str, centers_m: FloatArray, radius_m: float) -> FloatArray:
     """(n,) of spheres with one object, in m³, by the way that a tick takes."""
-    radii = np.full(len(centers_m), radius_m)
-    pairs = candidate_pairs(centers_m, radii, objects)
-    overlaps = by_object(evaluate(centers_m, radii[pairs.sphere_index], objects, pairs))
-    volumes = np.zeros(len(centers_m))
-    of_object = overlaps.object_index == objects.names.index(name)
-    volumes[overlaps.sphere_index[of_object]] = overlaps.volume_m3[of_object]
-    return volumes
+    scene, tables = scene_table(objects), Tables()
+    standing = np.full(len(objects.names), PASSED_OVER, dtype=np.int64)
+    standing[objects.names.index(name)] = OBSTACLE
+    spheres = np.insert(centers_m, 3, radius_m, axis=1)
+    return np.array([total_overlap_m3(sphere[None], scene, standing, tables) for sphere in spheres])
 
 
 def cap(radius_m: float, depth_m: float) -> float:
@@ -124,9 +118,8 @@ def test_it_is_never_perceived_smaller_than_it_is(shape: str, tmp_path: Path) ->
         surface = unit * (0.04 if shape == "ball" else np.array([0.03, 0.04, 0.06]))
     points = placed(scene, surface)
     objects = MujocoCamera(scene).perceive(0.0)
-    pairs = candidate_pairs(points, np.full(500, 1e-4), objects)
-    assert len(pairs) == 500
-    assert (nearest_surfaces(points, objects, pairs).signed_distance_m <= 1e-15).all()
+    assert objects.names == ("round",)
+    assert max(distance_to_object(objects, 0, point) for point in points) <= 1e-15
 
 
 def test_things_of_the_same_shape_share_one_mesh(tmp_path: Path) -> None:
@@ -169,12 +162,8 @@ def test_a_cup_is_seen_with_its_mouth(tmp_path: Path) -> None:
     expected = [0.0, sphere / 2.0, sphere / 2.0, sphere, sphere - cap(radius, 0.2 * CELL_M), sphere / 2.0]
     # MuJoCo keeps vertices in single precision.
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * sphere)
-    nearest = nearest_surfaces(
-        placed(scene, centers[:1], "cup"),
-        objects,
-        candidate_pairs(placed(scene, centers[:1], "cup"), np.array([radius]), objects),
-    )
-    assert nearest.signed_distance_m[0] == pytest.approx(0.5 * CELL_M, rel=1e-6)
+    in_mouth = placed(scene, centers[:1], "cup")[0]
+    assert distance_to_object(objects, objects.names.index("cup"), in_mouth) == pytest.approx(0.5 * CELL_M, rel=1e-6)
 
 
 def test_a_box_as_a_mesh_is_the_box(tmp_path: Path) -> None:
@@ -261,59 +250,7 @@ def test_a_frame_moves_and_leaves_out_meshes_as_other_primitives(tmp_path: Path)
     np.testing.assert_array_equal(after.mesh_rotations, before.mesh_rotations[:1])
 
 
-# What is felt, said and skipped
-
-
-def test_stiffness_rises_towards_a_capsule_and_only_ahead() -> None:
-    capsule = Mesh(*capsule_mesh(0.03, 0.1, 12)[:2])
-    pose = gripper_pose([0.3, 0.1, 0.2], random_rotation(np.random.default_rng(4)))
-    approach, across = pose.tool_rotation[:, 2], pose.tool_rotation[:, 0]
-    front = float((pose.sphere_centers_m @ approach + pose.sphere_radii_m).max() - pose.tool_position_m @ approach)
-    # Its axis lies across the gap between the fingers, which therefore both meet it.
-    rotation = np.column_stack([pose.tool_rotation[:, 1], approach, across])
-    felt = []
-    for gap in (0.05, 0.01, 0.006, 0.002, -0.002):
-        objects = Objects().add().mesh(capsule, pose.tool_position_m + (front + 0.03 + gap) * approach, rotation)
-        sensed = Senses().sense(pose, objects.objects())
-        assert sensed.stiffness.l2 == 0.0
-        felt.append(sensed.stiffness.r2)
-    assert felt[0] == 0.0
-    assert felt[1:] == sorted(set(felt[1:]))
-    assert felt[1] > 0.0
-    behind = Objects().add().mesh(capsule, pose.tool_position_m - 0.175 * approach, rotation)
-    sensed = Senses().sense(pose, behind.objects())
-    assert sensed.stiffness.r2 == 0.0
-    assert sensed.stiffness.l2 > 0.0
-
-
-def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows: list[int] = []
-    nearest, overlap = mesh_library.nearest_mesh_pairs, mesh_library.mesh_pairs
-
-    def counted_nearest(points: FloatArray, *placed_meshes: object) -> tuple[FloatArray, FloatArray]:
-        rows.append(len(points))
-        return nearest(points, *placed_meshes)  # type: ignore[arg-type]
-
-    def counted_overlap(centers: FloatArray, *others: object) -> tuple[FloatArray, FloatArray, FloatArray]:
-        rows.append(len(centers))
-        return overlap(centers, *others)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(nearest_on_meshes, "nearest_mesh_pairs", counted_nearest)
-    monkeypatch.setattr(mesh_library, "mesh_pairs", counted_overlap)
-    capsule = Mesh(*capsule_mesh(0.03, 0.1, 4)[:2])
-    scene = Objects()
-    places = np.random.default_rng(2).uniform(-2.0, 2.0, (997, 3))
-    places[:, 2] += 4.0
-    for place in [*places, [0.0, 0.0, 0.06], [0.1, 0.0, 0.06], [-0.1, 0.0, 0.06]]:
-        scene.add().mesh(capsule, place)
-    objects = scene.objects()
-    senses = Senses()
-    assert senses.sense(gripper_pose(), objects).overlap_m3 > 0.0
-    assert 0 < sum(rows) < 16 * 3 * 3
-    assert senses.ahead.skipped.pairs_culled >= 16 * 997
-    rows.clear()
-    senses.sense(gripper_pose([50.0, 0.0, 0.0]), objects)
-    assert rows == []
+# What is said and skipped
 
 
 @pytest.mark.processes
@@ -348,12 +285,17 @@ def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch
     assert robot.figures.summary()["overlap_mm3"]["max"] > 0.0
 
 
+def notes_on_shapes(model: Path) -> list[str]:
+    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    return [note for note in notes if "perceived larger" in note]
+
+
 def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path) -> None:
     vertices, triangles = cup()
     world = '<geom name="post" type="cylinder" size="0.1 0.1" pos="1 1 0"/>'
     world += '<geom name="bowl" type="mesh" mesh="bowl" pos="1 0 0.3"/>'
     model = planar_arm(tmp_path, world=world, extra_top=mesh_asset("bowl", vertices, triangles[1:]))
-    *_, note = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    [note] = notes_on_shapes(model)
     assert "\n" not in note
     assert "bowl as its convex hull or bounding box, post by 0.9 %" in note
 
@@ -361,5 +303,5 @@ def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path)
 def test_a_note_about_many_things_names_the_worst(tmp_path: Path) -> None:
     world = "".join(f'<geom name="g{k}" type="cylinder" size="0.1 0.1" pos="{k} 1 0"/>' for k in range(12))
     model = planar_arm(tmp_path, world=world)
-    *_, note = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    [note] = notes_on_shapes(model)
     assert note.endswith("g7 by 0.9 %, and 4 more by no more than that")

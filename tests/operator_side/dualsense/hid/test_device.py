@@ -3,6 +3,7 @@
 import builtins
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from operator_side.dualsense.reports.input_report import build_simple_input_repo
 from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
+    USUAL_LIGHT,
+    WARNING_LIGHT,
     OutputReport,
     Rumble,
     build_output_report,
@@ -241,6 +244,15 @@ def test_close_releases_what_was_written(transport: Transport) -> None:
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
         device.write(build_output_report(OutputReport()), 1.0)
+
+
+def test_close_puts_back_a_light_that_was_changed() -> None:
+    handle = FakeHandle()
+    device = open_fake(handle)
+    device.write(build_output_report(OutputReport(lightbar=WARNING_LIGHT)), 0.0)
+    device.write(build_output_report(STIFF), 0.0)
+    device.close()
+    assert handle.written[2:] == [build_output_report(replace(RELEASED, lightbar=USUAL_LIGHT))]
 
 
 def test_it_is_released_when_everything_that_was_written_is_off() -> None:

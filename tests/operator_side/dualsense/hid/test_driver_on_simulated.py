@@ -8,7 +8,6 @@ from common.clock import VirtualClock
 from common.errors import DeviceError
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import StiffnessUpdate
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.hid.device import HidDualSense, HidHandle
@@ -18,6 +17,7 @@ from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID, Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE, SimulatedDualSense
+from tests.helpers.felt import felt
 
 PERIOD_S = 0.004
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
@@ -132,12 +132,11 @@ class Run:
         self.connection = Connection(Search(system), self.core)
         self.core.receive(encode(self.robot.hello(system.clock.now())), system.clock.now())
 
-    def run(self, duration_s: float, r2: float = 0.8) -> None:
+    def run(self, duration_s: float, r2: int = 7) -> None:
         for _ in range(round(duration_s / PERIOD_S)):
             self.system.clock.advance_to(self.system.clock.now() + PERIOD_S)
             now_s = self.system.clock.now()
-            stiffness = StiffnessUpdate(self.robot.stamp(now_s), l2=0.0, r2=r2, rumble=0.0, state="armed")
-            self.core.receive(encode(stiffness), now_s)
+            self.core.receive(encode(felt(self.robot.stamp(now_s), r2=r2)), now_s)
             self.connection.update(now_s)
             if (report := self.connection.read(now_s)) is not None:
                 self.core.read_report(report, now_s)

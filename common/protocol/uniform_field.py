@@ -1,0 +1,25 @@
+"""A trigger field that asks for the same strength in every zone, whatever is ahead and however fast it goes."""
+
+from typing import Final
+
+from common.protocol.messages import TriggerField, Ways
+
+STRENGTHS: Final = 8
+FAR_M: Final = 10.0
+"""Nothing goes so far within a reaction; the horizon of a field that knows no distances."""
+
+
+def uniform_field(strength: int, full_speed_m_s: float = 0.25, acceleration_m_s2: float = 3.0) -> TriggerField:
+    """Ask for `strength`, 0 to 8, at every speed; ValueError for any other."""
+    if not 0 <= strength <= STRENGTHS:
+        raise ValueError(f"strength = {strength}; valid: 0 to {STRENGTHS}")
+    near, far = (-FAR_M,) * strength, (FAR_M,) * (STRENGTHS - strength)
+    ways: Ways = (*near, *far)  # type: ignore[assignment]
+    return TriggerField(
+        fast_m=ways,
+        slow_m=ways,
+        full_speed_m_s=full_speed_m_s,
+        acceleration_m_s2=acceleration_m_s2,
+        displacement_m=0.0,
+        stiffness=strength / STRENGTHS,
+    )

@@ -1,0 +1,111 @@
+"""From what the robot side reports and what our hands commanded to what is written to the controller."""
+
+import dataclasses
+from typing import Any
+
+from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, build_output_report
+from operator_side.feel.blindness import Blindness
+from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
+from operator_side.feel.rendering import RenderingSettings, TriggerRendering
+from operator_side.feel.write_bound import WriteBound
+from operator_side.hands.travel_calibration import TravelCalibration
+
+
+class Haptics:
+    """Renders fields with our own commands under way, and remembers what the controller was told."""
+
+    def __init__(
+        self,
+        settings: RenderingSettings,
+        calibration: TravelCalibration,
+        *,
+        enabled: bool,
+        swap_sides: bool,
+        compensation: Compensation,
+    ) -> None:
+        self.writes = 0
+        """Output reports that were made."""
+        self.without_history = 0
+        """Renderings that took the robot side's displacement, as our own was asked for and is not known."""
+        self._settings = settings
+        self._enabled = enabled
+        self._swap_sides = swap_sides
+        self._compensation = compensation
+        self._bound = WriteBound()
+        self._written: OutputReport | None = RELEASED
+        self._commands = CommandsUnderWay()
+        self._commanding = False
+        self.calibrate(calibration)
+
+    def calibrate(self, calibration: TravelCalibration) -> None:
+        """Render for a controller whose triggers travel so."""
+        self.rendering = TriggerRendering(self._settings, calibration, swap_sides=self._swap_sides)
+
+    def controller_found(self) -> None:
+        """Nobody knows what this controller was told: it is released first, then told anew."""
+        self._written = None if self._enabled else RELEASED
+
+    def commanded(self, command: MotionCommand | None, now_s: float) -> None:
+        """Remember what was sent at `now_s`; None: nothing, so that the arm stops if it had been told to move.
+
+        Without the run button nothing moves. Whether the arm is armed does not matter: what is felt begins with a
+        report that says so, and all that was under way then is followed.
+        """
+        if command is not None:
+            self._commands.sent(command.header.sent_s, command.r2 - command.l2 if command.run else 0.0)
+        elif self._commanding:
+            self._commands.sent(now_s, 0.0)
+        self._commanding = command is not None
+
+    def forget_commands(self) -> None:
+        """Somebody else may drive: ours say nothing any more of what the arm does."""
+        self._commanding = False
+        if len(self._commands) > 0:
+            self._commands = CommandsUnderWay()
+
+    def output_report(
+        self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
+    ) -> bytes | None:
+        """What the controller has to be told now; None while nothing changes, or while a change has to wait.
+
+        felt: the newest field, None while there is none or the arm is not armed. pulled: as TriggerRendering's.
+        """
+        if not self._enabled:
+            return None
+        known = None if felt is None else self._displacement(felt, now_s)
+        wanted = self.rendering.render(felt, pulled, known, now_s)
+        if blindness.light is not None:
+            rumble = blindness.rumble(now_s) if felt is None else wanted.rumble
+            wanted = dataclasses.replace(wanted, rumble=rumble, lightbar=blindness.light)
+        if wanted == self._written:
+            return None
+        before, shown = self._written, self._bound.next(self._written, wanted, now_s)
+        if shown is None:
+            return None
+        self._written, self.writes = shown, self.writes + 1
+        return build_output_report(shown if before is None else shown.change_from(before))
+
+    def _displacement(self, felt: StiffnessUpdate, now_s: float) -> Displacement | None:
+        """δ and w by our own commands under way, from where the gripper was when `felt` was sent."""
+        if self._compensation == "robot":
+            return None
+        header, along = felt.header, felt.r2
+        known = self._commands.displacement(
+            now_s,
+            header.echo_sent_s,
+            header.echo_held_s,
+            felt.speed_m_s,
+            along.full_speed_m_s,
+            along.acceleration_m_s2,
+        )
+        self.without_history += known is None
+        return known
+
+    def status(self) -> str:
+        """A few words for people on each of the controller's own triggers."""
+        return f"L2 {self.rendering.l2.status()}, R2 {self.rendering.r2.status()}"
+
+    def summary(self) -> dict[str, Any]:
+        """What is to be known of the run."""
+        return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}

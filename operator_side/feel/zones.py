@@ -1,0 +1,83 @@
+"""How stiff each of a trigger's ten zones is: by what lies ahead at the speed that the zone commands (§4.2).
+
+A trigger that is let go is free. Its first stiff zone says how far it may be pulled before a person who feels it and
+lets go, one reaction later, comes too near:
+
+    u = (x_z - x_other) v_max                                  x_z: the calibrated travel at the zone's middle
+    D_z = δ + u h + u²/2a + max(0, w - u)²/2a                  δ, w along the trigger: Displacement
+
+and a zone's strength is how many of the field's ways D_z has passed, never less than that of the zone before.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from common.protocol.messages import StiffnessUpdate, TriggerField
+from common.reaction import HORIZON_S
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.feel.commands_under_way import Displacement
+from operator_side.hands.travel_calibration import TriggerTravel
+
+TOUCH_SPEED_M_S: Final = 0.045
+"""Zones slower than this may touch what is to be touched,"""
+TOUCH_SHARE: Final = 0.18
+"""or slower than this share of v_max, where that is less."""
+
+
+class Zones(NamedTuple):
+    """One trigger's ten zones."""
+
+    strengths: tuple[int, ...]
+    """0 to 8, never falling with travel."""
+    beyond_horizon: int
+    """How many are full because nobody knows what lies so far ahead."""
+
+
+def zone_travels(travel: TriggerTravel) -> tuple[float, ...]:
+    """The calibrated travel at the middle of each zone of the mechanical travel: 1 beyond a full pull."""
+    middles = ((zone + 0.5) / ZONE_COUNT for zone in range(ZONE_COUNT))
+    return tuple(travel.travel(min(middle / SENSED_TRAVEL, 1.0)) for middle in middles)
+
+
+def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[Displacement, Displacement]:
+    """δ and w along L2 and along R2: as `known` along R2 from our own commands, or as the robot side reckons them."""
+    if known is None:
+        speed_m_s = update.speed_m_s
+        return Displacement(update.l2.displacement_m, -speed_m_s), Displacement(update.r2.displacement_m, speed_m_s)
+    return Displacement(-known.way_m, -known.speed_m_s), known
+
+
+def zone_strengths(
+    field: TriggerField,
+    horizon_m: float,
+    travels: Sequence[float],
+    other_travel: float,
+    moving: Displacement,
+    horizon_s: float = HORIZON_S,
+) -> Zones:
+    """The zones of a trigger whose middles lie at `travels`, with the other trigger at `other_travel`.
+
+    horizon_m: how far `field` knows what lies ahead; what goes beyond is full. horizon_s: h, from feeling to what the
+    arm is told. A zone that does not advance along the trigger, as the other one is pulled farther, has none.
+    """
+    full_m_s, twice_a = field.full_speed_m_s, 2.0 * field.acceleration_m_s2
+    touch_m_s = min(TOUCH_SPEED_M_S, TOUCH_SHARE * full_m_s)
+    strengths: list[int] = []
+    strength = beyond = 0
+    first = True
+    for travel in travels:
+        speed_m_s = (travel - other_travel) * full_m_s
+        if speed_m_s > 0.0:
+            ways = field.slow_m if first or speed_m_s < touch_m_s else field.fast_m
+            first = False
+            excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
+            needed_m = moving.way_m + speed_m_s * horizon_s + (speed_m_s**2 + excess_m_s**2) / twice_a
+            if needed_m > horizon_m:
+                beyond += 1
+                strength = MAX_STRENGTH
+            else:
+                strength = max(strength, bisect_right(ways, needed_m))
+        strengths.append(strength)
+    return Zones(tuple(strengths), beyond)

@@ -1,0 +1,254 @@
+"""Which overlaps are to be worked out next: at the nodes of the ramps that may still matter, the nearest first."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.ahead.kinds import half_space, sphere
+from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
+from robot_side.ahead.nodes import NODES_PER_MARGIN, is_spent, plan
+from robot_side.ahead.tables import (
+    DONE,
+    FIRST,
+    JOB,
+    NEW,
+    PAIR,
+    RAMP,
+    STRENGTHS,
+    TOUCH_STRENGTH,
+    WINDOW,
+    Record,
+)
+from robot_side.compiled.kernel import (
+    COUNT,
+    NUMBER,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_array,
+    output_indices,
+    record_array,
+)
+from robot_side.compiled.vectors import Vector, add, dot, load, scale
+
+_PLACES: Final = np.array([0, 0, 1, 0, 2])
+"""Of each kind among the kinds of jobs."""
+NOTHING: Final = 1e-9
+"""Shares of the sphere's volume, and of its disc per metre of way, below which a change is rounding."""
+
+
+@building_block
+def add_to_node(ramp: Record, node: int, volume: float, gradient: Vector, along: Vector) -> None:
+    """Add one primitive's overlap to a node; only of the last node it is kept how much still rises."""
+    slope = dot(gradient, along)
+    ramp.volume[node] += volume
+    ramp.slope[node] += slope
+    if node == ramp.nodes + ramp.asked - 1:
+        ramp.rising += max(0.0, slope)
+    if ramp.state == FIRST:
+        for axis in range(3):
+            ramp.push[axis] += gradient[axis]
+        if volume <= NOTHING * 4.0 / 3.0 * math.pi * ramp.radius**3:
+            # It is touched at most: whether it will rise is not known yet.
+            ramp.rising = math.inf
+
+
+@inlined
+def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) -> bool:
+    """Whether a ramp could still shorten a way: nothing of it is felt before it begins, less the margin."""
+    begins: float = ramp.start - margin - ramp.before
+    in_slow_zones: bool = begins < slow[STRENGTHS - 1]
+    if ramp.touchable:
+        in_slow_zones = begins + ramp.expected < slow[TOUCH_STRENGTH - 1]
+    return in_slow_zones or bool(begins < fast[STRENGTHS - 1])
+
+
+@building_block
+def write_job(
+    kind: int,
+    row: int,
+    ramp: int,
+    node: int,
+    center: Vector,
+    radius: float,
+    shapes: FloatArray,
+    job_counts: IntArray,
+    room: int,
+    jobs: np.ndarray,
+    centers: FloatArray,
+    radii: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    vertices: FloatArray,
+) -> None:
+    """Write the job of one sphere and the primitive in `row`, a box, a tetrahedron or a mesh; there must be room."""
+    place = _PLACES[kind]
+    free = job_counts[place]
+    job_counts[place] += 1
+    job = place * room + free
+    jobs[job].ramp, jobs[job].node, jobs[job].row = ramp, node, row
+    radii[job], volumes[job] = radius, 0.0
+    for axis in range(3):
+        centers[job, axis], gradients[job, axis] = center[axis], 0.0
+    if kind == BOX:
+        for axis in range(3):
+            box_centers[free, axis] = shapes[row, axis]
+            box_half_sizes[free, axis] = shapes[row, 12 + axis]
+            for column in range(3):
+                box_rotations[free, axis, column] = shapes[row, 3 + 3 * axis + column]
+    elif kind == TETRAHEDRON:
+        for corner in range(4):
+            for axis in range(3):
+                vertices[free, corner, axis] = shapes[row, 3 * corner + axis]
+
+
+@building_block
+def _ask_node(
+    ramp: Record,
+    k: int,
+    node: int,
+    start: Vector,
+    along: Vector,
+    shapes: FloatArray,
+    kinds: IntArray,
+    pairs: np.ndarray,
+    job_counts: IntArray,
+    room: int,
+    jobs: np.ndarray,
+    centers: FloatArray,
+    radii: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    vertices: FloatArray,
+) -> None:
+    """Work out, or write the jobs for, what the sphere of ramp `k` overlaps at one node of its way."""
+    center = add(start, scale(ramp.way[node], along))
+    for p in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
+        if pairs[p].entry > ramp.way[node]:
+            continue
+        row = pairs[p].row
+        kind = kinds[row]
+        if kind == SPHERE:
+            volume, gradient, _ = sphere.overlap(shapes, row, center, ramp.radius)
+            add_to_node(ramp, node, volume, gradient, along)
+            continue
+        if kind == HALF_SPACE:
+            volume, gradient, _ = half_space.overlap(shapes, row, center, ramp.radius)
+            add_to_node(ramp, node, volume, gradient, along)
+            continue
+        write_job(
+            kind,
+            row,
+            k,
+            node,
+            center,
+            ramp.radius,
+            shapes,
+            job_counts,
+            room,
+            jobs,
+            centers,
+            radii,
+            volumes,
+            gradients,
+            box_centers,
+            box_rotations,
+            box_half_sizes,
+            vertices,
+        )
+
+
+@compiled(
+    *(input_array(2), input_array(1), input_array(2), input_indices()),
+    *(record_array(RAMP), record_array(PAIR), COUNT, NUMBER, NUMBER, input_array(1), input_array(1)),
+    *(output_indices(), COUNT, record_array(JOB), output_array(2), output_array(1), output_array(1), output_array(2)),
+    *(output_array(2), output_array(3), output_array(2), output_array(3)),
+    returns=COUNT,
+)
+def ask(
+    spheres: FloatArray,
+    direction: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    ramps: np.ndarray,
+    pairs: np.ndarray,
+    count: int,
+    margin: float,
+    reach: float,
+    fast: FloatArray,
+    slow: FloatArray,
+    job_counts: IntArray,
+    room: int,
+    jobs: np.ndarray,
+    centers: FloatArray,
+    radii: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    box_centers: FloatArray,
+    box_rotations: FloatArray,
+    box_half_sizes: FloatArray,
+    vertices: FloatArray,
+) -> int:
+    """Write the jobs of the next round of the first `count` ramps; the number of nodes asked for, -1 without room.
+
+    fast and slow (8,): the ways so far. Spheres and half-spaces are worked out here, by their closed forms.
+    """
+    along = load(direction.reshape(1, 3), 0)
+    job_counts[:] = 0
+    nearest = math.inf
+    for k in range(count):
+        ramp = ramps[k]
+        if ramp.state != DONE:
+            if is_spent(ramp, margin, reach) or not _matters(ramp, fast, slow, margin):
+                ramp.state = DONE
+            else:
+                nearest = min(nearest, ramp.start - ramp.before)
+    asked = 0
+    for k in range(count):
+        ramp = ramps[k]
+        if ramp.state == DONE or (ramp.state == NEW and ramp.start - ramp.before > nearest + WINDOW * margin):
+            continue
+        if job_counts.max() + (NODES_PER_MARGIN + 1) * ramp.pairs > room:
+            if asked == 0:
+                return -1
+            continue
+        plan(ramp, pairs, margin, reach)
+        if ramp.asked == 0:
+            ramp.state = DONE
+            continue
+        ramp.rising = 0.0
+        for node in range(ramp.nodes, ramp.nodes + ramp.asked):
+            ramp.volume[node] = ramp.slope[node] = 0.0
+            _ask_node(
+                ramp,
+                k,
+                node,
+                load(spheres, ramp.sphere),
+                along,
+                shapes,
+                kinds,
+                pairs,
+                job_counts,
+                room,
+                jobs,
+                centers,
+                radii,
+                volumes,
+                gradients,
+                box_centers,
+                box_rotations,
+                box_half_sizes,
+                vertices,
+            )
+        asked += ramp.asked
+    return asked

@@ -1,0 +1,185 @@
+"""From ramps to ways: where each of the eight strengths begins (§4.2).
+
+    W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
+    s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
+
+The overlaps V(E) are worked out elsewhere, in rounds: `ask` writes the jobs of the ramps that may still matter, the
+nearest first; `take` puts their results into the ramps and shortens the ways.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.ahead.ask import NOTHING, add_to_node
+from robot_side.ahead.kinds.layout import MESH
+from robot_side.ahead.nodes import ends
+from robot_side.ahead.tables import DONE, FIRST, GOING, JOB, PAIR, RAMP, STRENGTHS, TOUCH_STRENGTH, Record
+from robot_side.compiled.kernel import (
+    COUNT,
+    NUMBER,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_array,
+    record_array,
+)
+from robot_side.compiled.vectors import load
+
+_PARTS: Final = 8
+"""So finely the cubic between two nodes is looked through for where a strength begins."""
+
+
+@inlined
+def _cubic(ramp: Record, node: int, part: float) -> float:
+    """V at `part`, 0 to 1, of the way from `node` to the next one, by both nodes' values and slopes."""
+    rest, step = 1.0 - part, ramp.way[node + 1] - ramp.way[node]
+    value: float = (
+        rest * rest * (1.0 + 2.0 * part) * ramp.volume[node]
+        + part * part * (3.0 - 2.0 * part) * ramp.volume[node + 1]
+        + step * part * rest * (rest * ramp.slope[node] - part * ramp.slope[node + 1])
+    )
+    if ramp.slope[node] * ramp.slope[node + 1] < 0.0:
+        return value
+    # What rises at both ends, or falls, has no peak between them, though the cubic may where something more is met.
+    low, high = min(ramp.volume[node], ramp.volume[node + 1]), max(ramp.volume[node], ramp.volume[node + 1])
+    limited: float = min(max(value, low), high)
+    return limited
+
+
+@building_block
+def _begin_to_rise(ramp: Record) -> bool:
+    """Look for d between the nodes, where V first exceeds V(0); whether it does."""
+    nothing = NOTHING * 4.0 / 3.0 * math.pi * ramp.radius**3
+    way, excess = ramp.way[0], ramp.volume[0] - ramp.floor
+    if excess > nothing:
+        # It rose within a step that no rise could have needed less than: as good as there.
+        ramp.free = way
+        return True
+    for node in range(ramp.nodes - 1):
+        for part in range(1, _PARTS + 1):
+            share = part / _PARTS
+            further = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
+            now = _cubic(ramp, node, share) - ramp.floor
+            if now > nothing:
+                # From a deficit it passes 0 in between; else it rises from where it stood.
+                ramp.free = way + (further - way) * max(0.0, -excess) / (now - min(excess, 0.0))
+                return True
+            way, excess = further, now
+    return False
+
+
+@building_block
+def _go_on(ramp: Record, pairs: np.ndarray, kinds: IntArray) -> None:
+    """Move the first node to where V could begin to exceed V(0), past all ways on which it surely does not."""
+    last = ramp.nodes - 1
+    disc = math.pi * ramp.radius * ramp.radius
+    entered, mesh = math.inf, False
+    for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
+        if pairs[k].entry > ramp.way[last]:
+            entered = min(entered, pairs[k].entry)
+        else:
+            mesh |= kinds[pairs[k].row] == MESH
+    if ramp.rising <= NOTHING * disc and not mesh:
+        # What is convex and does not rise any more never does again.
+        ramp.nodes, ramp.start = 0, entered
+        if entered == math.inf:
+            ramp.state = DONE
+        return
+    # No overlap rises faster than by the sphere's disc.
+    skipped = (ramp.floor - ramp.volume[last]) / disc
+    ramp.start = ramp.way[last] + max(skipped, 0.0)
+    ramp.way[0], ramp.volume[0], ramp.slope[0] = ramp.way[last], ramp.volume[last], ramp.slope[last]
+    ramp.nodes = 0 if skipped > 0.0 else 1
+
+
+@building_block
+def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
+    """Shorten the ways by one ramp; whether it has reached full strength."""
+    full_from = ramp.free + margin
+    top = 0.0
+    for node in range(ramp.nodes - 1):
+        for part in range(_PARTS + 1):
+            share = part / _PARTS
+            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
+            if way <= full_from * (1.0 + 1e-12):
+                top = max(top, _cubic(ramp, node, share) - ramp.floor)
+    reference = max(top, margin * ramp.lean, ramp.least)
+    level, before, reached = 0, ramp.free, 0.0
+    for node in range(ramp.nodes - 1):
+        for part in range(1, _PARTS + 1):
+            share = part / _PARTS
+            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
+            if way <= ramp.free:
+                continue
+            strength = max(reached, min(1.0, (_cubic(ramp, node, share) - ramp.floor) / reference))
+            while level < STRENGTHS and strength >= (level + 0.5) / STRENGTHS:
+                share_of_step = ((level + 0.5) / STRENGTHS - reached) / (strength - reached)
+                found = before + share_of_step * (way - before) - margin - ramp.before
+                fast[level] = min(fast[level], found)
+                if not ramp.touchable:
+                    slow[level] = min(slow[level], found)
+                elif level < TOUCH_STRENGTH:
+                    slow[level] = min(slow[level], found + ramp.expected)
+                level += 1
+            before, reached = way, strength
+    return level == STRENGTHS
+
+
+@inlined
+def _take_first(ramp: Record) -> None:
+    """V(0) and its slope are known: the overlap grows from here, or later, or never."""
+    ramp.floor = ramp.volume[0]
+    ramp.lean = math.sqrt(ramp.push[0] ** 2 + ramp.push[1] ** 2 + ramp.push[2] ** 2)
+    if ramp.slope[0] > NOTHING * math.pi * ramp.radius * ramp.radius:
+        ramp.free = 0.0
+    ramp.state = GOING
+
+
+@compiled(
+    *(input_array(1), input_indices(), record_array(RAMP), record_array(PAIR), COUNT),
+    *(input_indices(), COUNT, record_array(JOB), input_array(1), input_array(2), NUMBER, NUMBER),
+    *(output_array(1), output_array(1)),
+)
+def take(
+    direction: FloatArray,
+    kinds: IntArray,
+    ramps: np.ndarray,
+    pairs: np.ndarray,
+    count: int,
+    job_counts: IntArray,
+    room: int,
+    jobs: np.ndarray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    margin: float,
+    reach: float,
+    fast: FloatArray,
+    slow: FloatArray,
+) -> None:
+    """Put the results of the jobs into the first `count` ramps, and shorten the ways `fast` and `slow` (8,)."""
+    along = load(direction.reshape(1, 3), 0)
+    for kind in range(job_counts.size):
+        for job in range(kind * room, kind * room + job_counts[kind]):
+            add_to_node(ramps[jobs[job].ramp], jobs[job].node, volumes[job], load(gradients, job), along)
+    for k in range(count):
+        ramp = ramps[k]
+        if ramp.asked == 0:
+            continue
+        ramp.nodes += ramp.asked
+        ramp.asked = 0
+        if ramp.state == FIRST:
+            _take_first(ramp)
+        if math.isnan(ramp.free) and not _begin_to_rise(ramp):
+            _go_on(ramp, pairs, kinds)
+            if ramp.start >= reach:
+                ramp.state = DONE
+        elif ramp.nodes > 1:
+            ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
+            known = ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9)
+            if known and (_shorten(ramp, margin, fast, slow) or ended):
+                ramp.state = DONE

@@ -1,0 +1,253 @@
+"""The field along one direction: the ways at which the eight strengths begin."""
+
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray, require_finite
+from robot_side.ahead.ask import ask
+from robot_side.ahead.feel import take
+from robot_side.ahead.find import find
+from robot_side.ahead.meet import COUNTED, LIMITED, RAMPS, meet
+from robot_side.ahead.mesh_ways import find_mesh_ways
+from robot_side.ahead.overlaps import work_out
+from robot_side.ahead.scene_table import SceneTable
+from robot_side.ahead.tables import STRENGTHS, Tables
+from robot_side.arm.port import GripperPose
+
+MARGIN_M = 0.012
+"""m: over this way before the one at which full strength is due, strength grows."""
+LEAST_VOLUME_M3 = 1e-7
+"""V_min: an overlap that grows by less is a graze."""
+_MOST_ROUNDS = 1000
+
+
+@dataclass(frozen=True)
+class Along:
+    """A direction, and how uncertain what lies along it is (eq. 9-10)."""
+
+    direction: FloatArray
+    """û (3,), unit, in the world frame"""
+    mean_m: float
+    """û·(μ_ee - μ_c) + μ_δ"""
+    variance_m2: float
+    """σ_c² + σ_δ²"""
+    quantile: float
+    """Φ⁻¹(P)"""
+    reach_m: float
+    """How far ahead is looked."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """What is ahead along one direction, as it was when it was looked at."""
+
+    fast_m: FloatArray
+    """(8,) the ways at which strengths 1 to 8 begin, never falling; infinite beyond the reach"""
+    slow_m: FloatArray
+    """(8,) the same where what is to be touched is felt less, and where it is expected"""
+    sigma_m: float
+    """The largest D_σ of the gripper's spheres."""
+
+
+@dataclass
+class FieldCounts:
+    """How much work there was, over the run."""
+
+    fields: int = 0
+    ramps: int = 0
+    """Pairs of a sphere and an object that the sphere meets within the reach."""
+    overlaps: int = 0
+    """Of boxes, tetrahedra and meshes."""
+    limited: int = 0
+    """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)."""
+    with_nothing_near: int = 0
+    """Fields of which no block of spheres met anything."""
+
+
+@dataclass
+class Ahead:
+    """Looks ahead along directions; keeps the tables that this takes."""
+
+    encoder_sigma_rad: FloatArray
+    """(n,)"""
+    margin_m: float = MARGIN_M
+    least_volume_m3: float = LEAST_VOLUME_M3
+    counts: FieldCounts = field(default_factory=FieldCounts)
+    tables: Tables = field(default_factory=Tables)
+
+    def __post_init__(self) -> None:
+        self._encoder_variance = self.encoder_sigma_rad * self.encoder_sigma_rad
+
+    def look(
+        self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, widest_m: float = np.inf
+    ) -> Field:
+        """The field at `pose`; standing (k,): what each object is (see `find`); widest_m: half the fingers' gap.
+
+        ValueError that names the field of `pose` or `along` that holds NaN or infinity: that would compare as far away
+        and silently give no warning.
+        """
+        tables, counts = self.tables, self.counts
+        spheres = _spheres(pose)
+        tables.require(len(spheres), len(scene.bounds))
+        meetings = self._find(pose, spheres, scene, standing, along)
+        fast, slow = np.full(STRENGTHS, np.inf), np.full(STRENGTHS, np.inf)
+        counts.fields += 1
+        sigma_m = float(tables.sigma_m[: len(spheres), 0].max())
+        if meetings:
+            found = np.zeros(COUNTED, dtype=np.int64)
+            self._shorten(pose, spheres, scene, standing, along, widest_m, meetings, fast, slow, found)
+            # Beyond the reach not all is known.
+            fast[fast > along.reach_m] = slow[slow > along.reach_m] = np.inf
+            counts.ramps += int(found[RAMPS])
+            counts.limited += int(found[LIMITED])
+        else:
+            counts.with_nothing_near += 1
+        return Field(fast, slow, sigma_m)
+
+    def _find(self, pose: GripperPose, spheres: FloatArray, scene: SceneTable, standing: IntArray, along: Along) -> int:
+        tables = self.tables
+        while True:
+            count: int = find(
+                spheres,
+                pose.tool_position_m,
+                np.ascontiguousarray(pose.tool_jacobian),
+                self._encoder_variance,
+                along.direction,
+                along.mean_m,
+                along.variance_m2,
+                along.quantile,
+                along.reach_m + self.margin_m,
+                scene.bounds,
+                scene.shapes,
+                scene.kinds,
+                scene.first_rows,
+                scene.object_bounds,
+                standing,
+                tables.sigma_m,
+                tables.blocks,
+                tables.meetings,
+                tables.near,
+            )
+            if count < 0:
+                _refuse(pose, along)
+            if count <= len(tables.meetings):
+                return count
+            tables.meetings = np.zeros(2 * count, dtype=tables.meetings.dtype)
+
+    def _shorten(
+        self,
+        pose: GripperPose,
+        spheres: FloatArray,
+        scene: SceneTable,
+        standing: IntArray,
+        along: Along,
+        widest_m: float,
+        meetings: int,
+        fast: FloatArray,
+        slow: FloatArray,
+        found: IntArray,
+    ) -> None:
+        """Round after round, the nearest first, until nothing could shorten a way any more."""
+        tables = self.tables
+        reach_m = along.reach_m + self.margin_m
+        on_finger = _as_indices(pose.sphere_on_finger)
+        left = meetings
+        for _ in range(_MOST_ROUNDS):
+            known = int(found[RAMPS])
+            if left:
+                left = meet(
+                    spheres,
+                    on_finger,
+                    along.direction,
+                    widest_m,
+                    self.margin_m,
+                    reach_m,
+                    scene.bounds,
+                    scene.shapes,
+                    scene.kinds,
+                    scene.first_rows,
+                    scene.object_volumes,
+                    standing,
+                    self.least_volume_m3,
+                    tables.sigma_m,
+                    tables.blocks,
+                    tables.meetings,
+                    meetings,
+                    slow,
+                    tables.ramps,
+                    tables.pairs,
+                    tables.near,
+                    found,
+                )
+                if scene.has_meshes:
+                    find_mesh_ways(tables, slice(known, int(found[RAMPS])), scene, spheres, along.direction, reach_m)
+                if left < 0:
+                    tables.grow()
+                    continue
+            jobs = tables.jobs
+            asked = ask(
+                spheres,
+                along.direction,
+                scene.shapes,
+                scene.kinds,
+                tables.ramps,
+                tables.pairs,
+                int(found[RAMPS]),
+                self.margin_m,
+                reach_m,
+                fast,
+                slow,
+                jobs.counts,
+                jobs.room,
+                jobs.owners,
+                jobs.centers,
+                jobs.radii,
+                jobs.volumes,
+                jobs.gradients,
+                jobs.box_centers,
+                jobs.box_rotations,
+                jobs.box_half_sizes,
+                jobs.vertices,
+            )
+            if asked < 0:
+                tables.jobs = type(jobs)(2 * jobs.room)
+                continue
+            if asked == 0 and left == 0:
+                return
+            self.counts.overlaps += work_out(jobs, scene)
+            take(
+                along.direction,
+                scene.kinds,
+                tables.ramps,
+                tables.pairs,
+                int(found[RAMPS]),
+                jobs.counts,
+                jobs.room,
+                jobs.owners,
+                jobs.volumes,
+                jobs.gradients,
+                self.margin_m,
+                reach_m,
+                fast,
+                slow,
+            )
+
+
+def _spheres(pose: GripperPose) -> FloatArray:
+    """Centres and radii (m, 4)."""
+    return np.concatenate([pose.sphere_centers_m, pose.sphere_radii_m[:, None]], axis=1)
+
+
+def _refuse(pose: GripperPose, along: Along) -> NoReturn:
+    """Raise the ValueError that says what is not finite."""
+    for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
+        require_finite(f"pose.{name}", getattr(pose, name))
+    for name in ("direction", "mean_m", "variance_m2", "quantile", "reach_m"):
+        require_finite(f"along.{name}", getattr(along, name))
+    raise ValueError("the encoders' errors or the sums of all these are not finite; valid: metres and radians")
+
+
+def _as_indices(flags: BoolArray) -> IntArray:
+    return flags.astype(np.int64)

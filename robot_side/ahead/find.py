@@ -1,0 +1,126 @@
+"""From the gripper and the scene to meetings: D_σ of each sphere (eq. 3-10), and which blocks of spheres meet what."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.ahead.kinds.layout import HALF_SPACE
+from robot_side.ahead.tables import BLOCK, MEETING
+from robot_side.ahead.way import passes, way_to
+from robot_side.compiled.kernel import (
+    COUNT,
+    NUMBER,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_array,
+    output_indices,
+    record_array,
+)
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
+
+OBSTACLE, TOUCHABLE, TARGET, PASSED_OVER = 0, 1, 2, 3
+"""What an object is to the field: a target is to be touched and lies between the fingers; a support is to be touched
+while something is held; what is ignored or held is passed over."""
+
+
+@inlined
+def _variance_along(lever: Vector, jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> float:
+    """ûᵀ J diag(σ²) Jᵀ û of the point at `lever` from the tool (eq. 5): û·(v + ω × r) for each joint."""
+    total = 0.0
+    for joint in range(encoder_variance.size):
+        linear = jacobian[0, joint], jacobian[1, joint], jacobian[2, joint]
+        angular = jacobian[3, joint], jacobian[4, joint], jacobian[5, joint]
+        part = dot(along, linear) + dot(cross(along, angular), lever)
+        total += encoder_variance[joint] * part * part
+    return total
+
+
+@building_block
+def _around(spheres: FloatArray, sigma: FloatArray, first: int, end: int) -> tuple[Vector, float]:
+    """A sphere around the inflated spheres from `first` to `end`."""
+    middle = 0.0, 0.0, 0.0
+    for i in range(first, end):
+        middle = add(middle, load(spheres, i))
+    middle = scale(1.0 / max(end - first, 1), middle)
+    radius = 0.0
+    for i in range(first, end):
+        radius = max(radius, norm(subtract(load(spheres, i), middle)) + spheres[i, 3] + sigma[i, 0])
+    return middle, radius
+
+
+@compiled(
+    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER),
+    *(input_array(2), input_array(2), input_indices(), input_indices(), input_array(2), input_indices()),
+    *(output_array(2), output_array(2), record_array(MEETING), output_indices()),
+    returns=COUNT,
+)
+def find(
+    spheres: FloatArray,
+    tool: FloatArray,
+    jacobian: FloatArray,
+    encoder_variance: FloatArray,
+    direction: FloatArray,
+    mean: float,
+    variance: float,
+    quantile: float,
+    reach: float,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    first_rows: IntArray,
+    object_bounds: FloatArray,
+    standing: IntArray,
+    sigma: FloatArray,
+    blocks: FloatArray,
+    meetings: np.ndarray,
+    near: IntArray,
+) -> int:
+    """Fill `sigma`, `blocks` and `meetings`; the number of meetings, more than there is room for where it is short.
+
+    -1 for spheres, or errors, that are not finite: they would compare as far away, and silently give no warning.
+
+    spheres (m, 4): centres and radii. tool (3,), jacobian (6, n), encoder_variance (n,), direction: the unit û (3,).
+    mean, variance: of eq. 10 along û, without the joints' part; quantile: Φ⁻¹(P). standing (k,): what each object is.
+    The scene: see SceneTable. near: room for an object's rows.
+    """
+    along, origin = load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
+    # A maximum may hide what is no number.
+    check = 0.0
+    for i in range(spheres.shape[0]):
+        lever = subtract(load(spheres, i), origin)
+        spread = math.sqrt(_variance_along(lever, jacobian, encoder_variance, along) + variance)
+        sigma[i, 0], sigma[i, 1] = max(0.0, mean + quantile * spread), max(0.0, mean)
+        check += quantile * spread + mean + lever[0] + lever[1] + lever[2] + spheres[i, 3]
+    middle, around = _around(spheres, sigma, 0, spheres.shape[0])
+    if not math.isfinite(check + around + reach):
+        return -1
+    total = (spheres.shape[0] + BLOCK - 1) // BLOCK
+    for block in range(total):
+        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0]))
+        blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
+    found = 0
+    for thing in range(standing.size):
+        if standing[thing] == PASSED_OVER or not passes(middle, along, reach, object_bounds, thing, around):
+            continue
+        count = 0
+        for row in range(first_rows[thing], first_rows[thing + 1]):
+            if kinds[row] == HALF_SPACE or passes(middle, along, reach, bounds, row, around):
+                near[count] = row
+                count += 1
+        for block in range(total):
+            center, radius = load(blocks, block), blocks[block, 3]
+            least = math.inf
+            for k in range(count):
+                row = near[k]
+                if least > 0.0 and (kinds[row] == HALF_SPACE or passes(center, along, reach, bounds, row, radius)):
+                    least = min(least, way_to(kinds[row], shapes, row, center, radius, along, reach))
+            if least <= reach:
+                if found < meetings.size:
+                    meetings[found].block, meetings[found].object, meetings[found].bound = block, thing, least
+                    meetings[found].met = 0
+                found += 1
+    return found

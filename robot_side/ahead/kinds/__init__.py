@@ -1,0 +1,1 @@
+"""The kinds of primitives that objects are made of, a file each: layout, bounds, volume, nearest point."""

@@ -1,0 +1,223 @@
+"""From meetings to ramps: which spheres of a block meet an object, and at which way; the nearest meetings first."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.ahead.find import TARGET, TOUCHABLE
+from robot_side.ahead.kinds.layout import HALF_SPACE, MESH
+from robot_side.ahead.tables import BLOCK, DONE, MEETING, NEW, PAIR, RAMP, STRENGTHS, WINDOW, Record
+from robot_side.ahead.way import passes, way_to
+from robot_side.compiled.kernel import (
+    COUNT,
+    NUMBER,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_indices,
+    output_indices,
+    record_array,
+)
+from robot_side.compiled.vectors import Vector, load
+
+PAIRS, RAMPS, LIMITED = 0, 1, 2
+"""What is counted in `found`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
+COUNTED = 3
+
+
+@building_block
+def _meet(
+    ramps: np.ndarray,
+    pairs: np.ndarray,
+    found: IntArray,
+    near: IntArray,
+    count: int,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    center: Vector,
+    radius: float,
+    along: Vector,
+    reach: float,
+) -> bool:
+    """Add the ramp of one sphere and the `count` primitives `near` of one object, if it meets any; whether it does."""
+    first = found[PAIRS]
+    start, touching = math.inf, False
+    for k in range(count):
+        row = near[k]
+        kind = kinds[row]
+        if kind != HALF_SPACE and not passes(center, along, reach, bounds, row, radius):
+            continue
+        way = way_to(kind, shapes, row, center, radius, along, reach)
+        if way > reach:
+            continue
+        pair = pairs[found[PAIRS]]
+        # A mesh's own way is found out afterwards.
+        pair.row, pair.bound, pair.entry = row, way, math.nan if kind == MESH else way
+        found[PAIRS] += 1
+        start = min(start, way)
+        touching |= way == 0.0
+    if found[PAIRS] == first:
+        return False
+    ramp = ramps[found[RAMPS]]
+    found[RAMPS] += 1
+    ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
+    ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
+    return touching
+
+
+@inlined
+def _next_ramp(ramps: np.ndarray, known: int) -> float:
+    """Where the nearest ramp begins that something may still come of."""
+    nearest = math.inf
+    for k in range(known):
+        if ramps[k].state != DONE:
+            nearest = min(nearest, ramps[k].start - ramps[k].before)
+    return nearest
+
+
+@inlined
+def _next_meeting(meetings: np.ndarray, count: int) -> float:
+    """And the nearest meeting that has not been looked at."""
+    nearest = math.inf
+    for k in range(count):
+        if not meetings[k].met:
+            nearest = min(nearest, meetings[k].bound)
+    return nearest
+
+
+@building_block
+def _meet_block(
+    meeting: Record,
+    spheres: FloatArray,
+    on_finger: IntArray,
+    along: Vector,
+    widest: float,
+    reach: float,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    first_rows: IntArray,
+    object_volumes: FloatArray,
+    standing: IntArray,
+    least_volume: float,
+    sigma: FloatArray,
+    blocks: FloatArray,
+    ramps: np.ndarray,
+    pairs: np.ndarray,
+    near: IntArray,
+    found: IntArray,
+) -> bool:
+    """Add the ramps of one meeting; False where there is no room for them."""
+    block, thing = meeting.block, meeting.object
+    center, radius = load(blocks, block), blocks[block, 3]
+    near_count = 0
+    for row in range(first_rows[thing], first_rows[thing + 1]):
+        if kinds[row] == HALF_SPACE or passes(center, along, reach, bounds, row, radius):
+            near[near_count] = row
+            near_count += 1
+    first, end = block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0])
+    if found[RAMPS] + 2 * BLOCK > ramps.size or found[PAIRS] + 2 * BLOCK * near_count > pairs.size:
+        return False
+    meeting.met = 1
+    for i in range(first, end):
+        inflated = sigma[i, 0]
+        if standing[thing] == TARGET and on_finger[i] and inflated > widest:
+            inflated = widest
+            found[LIMITED] += 1
+        for bare in range(2):
+            place = found[RAMPS]
+            size = spheres[i, 3] + (0.0 if bare else inflated)
+            touching = _meet(
+                ramps, pairs, found, near, near_count, bounds, shapes, kinds, load(spheres, i), size, along, reach
+            )
+            if found[RAMPS] > place:
+                ramp = ramps[place]
+                ramp.sphere, ramp.object = i, thing
+                ramp.least = min(least_volume, 0.5 * object_volumes[thing])
+                ramp.touchable = standing[thing] == TOUCHABLE or standing[thing] == TARGET
+                ramp.expected = inflated - min(sigma[i, 1], inflated)
+                ramp.before = inflated if bare else 0.0
+            # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
+            if not touching:
+                break
+    return True
+
+
+@compiled(
+    *(input_array(2), input_indices(), input_array(1), NUMBER, NUMBER, NUMBER),
+    *(input_array(2), input_array(2), input_indices(), input_indices(), input_array(1), input_indices(), NUMBER),
+    *(input_array(2), input_array(2), record_array(MEETING), COUNT, input_array(1)),
+    *(record_array(RAMP), record_array(PAIR), output_indices(), output_indices()),
+    returns=COUNT,
+)
+def meet(
+    spheres: FloatArray,
+    on_finger: IntArray,
+    direction: FloatArray,
+    widest: float,
+    margin: float,
+    reach: float,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    first_rows: IntArray,
+    object_volumes: FloatArray,
+    standing: IntArray,
+    least_volume: float,
+    sigma: FloatArray,
+    blocks: FloatArray,
+    meetings: np.ndarray,
+    count: int,
+    slow: FloatArray,
+    ramps: np.ndarray,
+    pairs: np.ndarray,
+    near: IntArray,
+    found: IntArray,
+) -> int:
+    """Add the ramps of those of the first `count` meetings that come next; -1 where there is no room for them.
+
+    widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards the target (§3.4),
+    infinite without a gripper. slow (8,): the ways so far; a meeting beyond them cannot shorten any. The number left.
+    """
+    along = load(direction.reshape(1, 3), 0)
+    left = count
+    window = WINDOW * margin
+    while True:
+        nearest = min(_next_ramp(ramps, found[RAMPS]), _next_meeting(meetings, count))
+        left = 0
+        for k in range(count):
+            if meetings[k].met:
+                continue
+            if meetings[k].bound > 0.0 and meetings[k].bound - margin >= slow[STRENGTHS - 1]:
+                meetings[k].met = 1
+            elif meetings[k].bound > nearest + window:
+                left += 1
+            elif not _meet_block(
+                meetings[k],
+                spheres,
+                on_finger,
+                along,
+                widest,
+                reach,
+                bounds,
+                shapes,
+                kinds,
+                first_rows,
+                object_volumes,
+                standing,
+                least_volume,
+                sigma,
+                blocks,
+                ramps,
+                pairs,
+                near,
+                found,
+            ):
+                return -1
+        if left == 0 or _next_ramp(ramps, found[RAMPS]) < math.inf:
+            return left
+        # Blocks that turned out to meet nothing make way for the next ones, and more of these at a time.
+        window *= 2.0

@@ -1,0 +1,53 @@
+"""The overlaps that a round asks for, by the kernels of each kind (eq. 11-12)."""
+
+from robot_side.ahead.scene_table import SceneTable
+from robot_side.ahead.tables import Jobs
+from robot_side.compiled.kernel import Compiled
+from robot_side.overlap.lanes.box_batch import overlap_boxes
+from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
+
+_BOXES, _TETRAHEDRA, _MESHES = 0, 1, 2
+
+
+def work_out(jobs: Jobs, scene: SceneTable) -> int:
+    """Fill in volumes and gradients of all jobs; how many there were."""
+    boxes, tetrahedra, meshes = (int(count) for count in jobs.counts)
+    if boxes:
+        shapes = jobs.box_centers[:boxes], jobs.box_rotations[:boxes], jobs.box_half_sizes[:boxes]
+        _exactly(overlap_boxes, precise_boxes, jobs, slice(0, boxes), shapes)
+    if tetrahedra:
+        part = slice(_TETRAHEDRA * jobs.room, _TETRAHEDRA * jobs.room + tetrahedra)
+        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs, part, (jobs.vertices[:tetrahedra],))
+    if meshes:
+        _meshes(jobs, scene, meshes)
+    return boxes + tetrahedra + meshes
+
+
+def _exactly(overlap: Compiled, precise: Compiled, jobs: Jobs, part: slice, shapes: tuple[object, ...]) -> None:
+    """The lanes, and the precise forms for those for which doubles do not suffice."""
+    results = jobs.volumes[part], jobs.gradients[part], jobs.areas[part]
+    rows = jobs.unsettled[: part.stop - part.start + 1]
+    spheres = jobs.centers[part], jobs.radii[part]
+    unsettled = overlap(*spheres, *shapes, *results, rows)
+    if unsettled:
+        precise(*spheres, *shapes, rows[:unsettled], *results)
+
+
+def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import mesh_pairs  # noqa: PLC0415
+
+    objects = scene.objects
+    if objects.mesh_library is None:
+        raise ValueError("jobs name meshes although the scene has no library of them")
+    part = slice(_MESHES * jobs.room, _MESHES * jobs.room + count)
+    rows = scene.rows_of_kind.take(jobs.owners["row"][part])
+    jobs.volumes[part], jobs.gradients[part], _ = mesh_pairs(
+        jobs.centers[part],
+        jobs.radii[part],
+        objects.mesh_library,
+        objects.mesh_index.take(rows),
+        objects.mesh_positions_m.take(rows, axis=0),
+        objects.mesh_rotations.take(rows, axis=0),
+    )

@@ -1,0 +1,81 @@
+"""The paper's plain law (§4.2), to compare with: every sphere enlarged by D_incr in all directions, one total overlap.
+
+s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
+"""
+
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from robot_side.ahead.find import OBSTACLE, PASSED_OVER
+from robot_side.ahead.law import Sensed, Situation
+from robot_side.ahead.scene_table import scene_table
+from robot_side.ahead.tables import Tables
+from robot_side.ahead.total_overlap import total_overlap_m3
+from robot_side.arm.ability import JointLimits, along_approach
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.objects.perceived import Role
+
+REFERENCE_SHARE: Final = 0.05
+"""f. The paper names no reference: the smaller it is, the earlier all is full, beside and behind, too."""
+PERIOD_S: Final = 0.01
+
+
+class PaperLaw:
+    """Keeps what it found until it looks again."""
+
+    def __init__(
+        self, uncertainty: Uncertainty, encoder_sigma_rad: FloatArray, limits: JointLimits, motion: ToolMotionSettings
+    ) -> None:
+        """encoder_sigma_rad (n,): eq. 3."""
+        self.looked = 0
+        self._uncertainty = uncertainty
+        self._encoder_sigma_rad = encoder_sigma_rad
+        self._limits = limits
+        self._motion = motion
+        self._tables = Tables()
+        self._sensed: tuple[float, Sensed] | None = None
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Work out one tick; the overlap is looked at a hundred times a second."""
+        if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
+            self._sensed = now_s, self._look(situation)
+        return self._sensed[1]
+
+    def summary(self) -> dict[str, int]:
+        """How much work there was, over the run."""
+        return {"fields": self.looked}
+
+    def _look(self, situation: Situation) -> Sensed:
+        self.looked += 1
+        pose = situation.pose
+        enlargement_m = plain_enlargements_m(
+            self._uncertainty,
+            position_covariance(pose.sphere_jacobians, self._encoder_sigma_rad),
+            pose.sphere_jacobians @ situation.joint_velocities_rad_s,
+            situation.loop_age_s,
+        )
+        radii = pose.sphere_radii_m + enlargement_m
+        standing = np.array(
+            [PASSED_OVER if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
+        )
+        if situation.held is not None:
+            standing[situation.held] = PASSED_OVER
+        spheres = np.concatenate([pose.sphere_centers_m, radii[:, None]], axis=1)
+        overlap_m3 = total_overlap_m3(spheres, scene_table(situation.objects), standing, self._tables)
+        stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii**3).sum())))
+        able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
+        felt = uniform_field(round(STRENGTHS * stiffness), able.full_speed_m_s, able.acceleration_m_s2)
+        return Sensed(
+            l2=felt,
+            r2=felt,
+            speed_m_s=float(pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s)),
+            horizon_m=FAR_M,
+            rumble=0.0,
+            enlargement_m=float(enlargement_m.max()),
+            overlap_m3=overlap_m3,
+        )

@@ -1,0 +1,244 @@
+"""The law "swept": the gripper, inflated by D_σ, is moved along each trigger until it overlaps something (§4.2).
+
+Fields are worked out in turns, one a tick at most: R2, L2, and along the stick while that is deflected. In between
+the ways are shortened by what the tool has moved along, which for a translation is exact. The shortest of the last
+tenth of a second hold: where the gripper just passes something, the encoders' noise alone makes full strength of none.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.messages import TriggerField, Ways
+from common.reaction import HORIZON_S
+from robot_side.ahead.field import Ahead, Along, Field
+from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.ahead.law import Sensed, Situation
+from robot_side.ahead.scene_table import scene_table
+from robot_side.ahead.tables import STRENGTHS
+from robot_side.ahead.total_overlap import total_overlap_m3
+from robot_side.arm.ability import Ability, JointLimits, ability
+from robot_side.arm.tool_motion import ToolMotionSettings, deflected
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.objects.perceived import Role
+
+FIELD_PERIOD_S: Final = 0.01
+"""A controller is written to no more often."""
+STEADY_S: Final = 0.1
+"""For so long a way that was found holds; as long as strength takes to fall in the trigger."""
+BEYOND_M: Final = 0.05
+"""So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
+_TOUCHING_SPEED_M_S: Final = 0.045
+_TOUCHING_SHARE: Final = 0.18
+_SAME_DIRECTION: Final = 0.999
+"""Cosine: 2.6° to either side."""
+_MOST_M: Final = 100.0
+"""What a message can say; a simulation about to become unstable shows wild figures, and must get to say so."""
+
+Side = Literal["r2", "l2", "stick"]
+_SIDES: Final[tuple[Side, ...]] = ("r2", "l2", "stick")
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """One field as it was found, and what held then."""
+
+    field: Field
+    direction: FloatArray
+    tool_m: FloatArray
+    ability: Ability
+    reach_m: float
+    at_s: float
+    overlap_m3: float
+
+    def moved_m(self, tool_m: FloatArray) -> float:
+        """How far the tool has got along the field's direction since."""
+        return float(self.direction @ (tool_m - self.tool_m))
+
+
+class _Looks:
+    """What was seen along one side lately, the newest last; there is always one."""
+
+    def __init__(self, first: _Seen) -> None:
+        self._seen = [first]
+
+    @property
+    def newest(self) -> _Seen:
+        """The field of the last look."""
+        return self._seen[-1]
+
+    def add(self, seen: _Seen) -> None:
+        """Take one in, and forget those that hold no more: too old, or along another direction."""
+        self._seen = [
+            one
+            for one in self._seen
+            if seen.at_s - one.at_s < STEADY_S and one.direction @ seen.direction > _SAME_DIRECTION
+        ]
+        self._seen.append(seen)
+
+    def ways_m(self, tool_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The shortest fast and slow ways (8,) from where the tool is now."""
+        moved = [one.moved_m(tool_m) for one in self._seen]
+        fast = np.min([one.field.fast_m - way for one, way in zip(self._seen, moved, strict=True)], axis=0)
+        slow = np.min([one.field.slow_m - way for one, way in zip(self._seen, moved, strict=True)], axis=0)
+        return fast, slow
+
+    def known_m(self, tool_m: FloatArray) -> float:
+        """How far ahead of the tool anything is known."""
+        return self.newest.reach_m - self.newest.moved_m(tool_m)
+
+
+class SweptLaw:
+    """Keeps each side's newest field."""
+
+    def __init__(
+        self, uncertainty: Uncertainty, encoder_sigma_rad: FloatArray, limits: JointLimits, motion: ToolMotionSettings
+    ) -> None:
+        """encoder_sigma_rad (n,): eq. 3."""
+        self.ahead = Ahead(encoder_sigma_rad)
+        self._uncertainty = uncertainty
+        self._limits = limits
+        self._motion = motion
+        self._looks: dict[Side, _Looks] = {}
+        self._standing: tuple[object, IntArray] | None = None
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Work out one tick; at most one field is looked at, but for the first tick."""
+        velocity = situation.pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
+        speed_m_s = float(velocity @ situation.pose.tool_rotation[:, 2])
+        self._look_where_due(situation, speed_m_s, now_s)
+        r2, l2 = self._looks["r2"], self._looks["l2"]
+        tool_m = situation.pose.tool_position_m
+        horizon_m = min(
+            min(self._horizon_m(looks.newest.ability, situation.loop_age_s), looks.known_m(tool_m))
+            for looks in (r2, l2)
+        )
+        leading = (r2 if speed_m_s >= 0.0 else l2).newest
+        return Sensed(
+            l2=self._trigger_field(l2, situation, -speed_m_s, horizon_m),
+            r2=self._trigger_field(r2, situation, speed_m_s, horizon_m),
+            speed_m_s=_bounded(speed_m_s),
+            horizon_m=max(0.0, _bounded(horizon_m)),
+            rumble=self._rumble(situation),
+            enlargement_m=float(np.linalg.norm(velocity)) * situation.loop_age_s + leading.field.sigma_m,
+            overlap_m3=leading.overlap_m3,
+        )
+
+    def summary(self) -> dict[str, int]:
+        """How much work there was and was not, over the run."""
+        return vars(self.ahead.counts)
+
+    def _look_where_due(self, situation: Situation, speed_m_s: float, now_s: float) -> None:
+        """Look along the side that was looked along longest ago, if that is due; along more of them only if overdue."""
+        sides = list(_SIDES)
+        if situation.lateral == (0.0, 0.0):
+            self._looks.pop("stick", None)
+            sides.remove("stick")
+        ages_s = {side: now_s - looks.newest.at_s if (looks := self._looks.get(side)) else math.inf for side in sides}
+        for number, side in enumerate(sorted(sides, key=lambda one: -ages_s[one])):
+            if ages_s[side] >= FIELD_PERIOD_S * (1.0 if number == 0 else 2.0) - 1e-9:
+                seen = self._look(side, situation, speed_m_s, now_s)
+                if side in self._looks:
+                    self._looks[side].add(seen)
+                else:
+                    self._looks[side] = _Looks(seen)
+
+    def _look(self, side: Side, situation: Situation, speed_m_s: float, now_s: float) -> _Seen:
+        pose = situation.pose
+        direction = np.ascontiguousarray({"r2": 1.0, "l2": -1.0}.get(side, 0.0) * pose.tool_rotation[:, 2])
+        full_speed_m_s = self._motion.trigger_speed_m_s
+        if side == "stick":
+            direction, full_speed_m_s = (
+                deflected(situation.lateral, pose.tool_rotation)[0],
+                self._motion.stick_speed_m_s,
+            )
+        able = ability(pose, self._limits, direction, full_speed_m_s)
+        # The stick is felt where it leads with the speed that it commands: nothing is predicted.
+        mean_m, sd_m = (
+            (0.0, 0.0)
+            if side == "stick"
+            else self._uncertainty.predicted_m(situation.compensation, situation.loop_age_s, able.full_speed_m_s)
+        )
+        reach_m = self._horizon_m(able, situation.loop_age_s) + 2.0 * FIELD_PERIOD_S * full_speed_m_s
+        along = Along(
+            direction,
+            self._uncertainty.mean_along_m(direction) + mean_m,
+            self._uncertainty.camera_sd_m**2 + sd_m**2,
+            self._uncertainty.quantile,
+            reach_m,
+        )
+        scene, standing = scene_table(situation.objects), self._stands(situation)
+        widest_m = math.inf if situation.gap_m is None else 0.5 * situation.gap_m
+        found = self.ahead.look(pose, scene, standing, along, widest_m)
+        overlap_m3 = 0.0
+        if side != "stick" and (side == "r2") == (speed_m_s >= 0.0):
+            sigma_m = self.ahead.tables.sigma_m[: len(pose.sphere_radii_m), :1]
+            moved = pose.sphere_centers_m + abs(speed_m_s) * situation.loop_age_s * direction
+            spheres = np.concatenate([moved, pose.sphere_radii_m[:, None] + sigma_m], axis=1)
+            overlap_m3 = total_overlap_m3(spheres, scene, standing, self.ahead.tables)
+        return _Seen(found, direction, pose.tool_position_m, able, reach_m, now_s, overlap_m3)
+
+    def _stands(self, situation: Situation) -> IntArray:
+        """(k,) what each object is to the field."""
+        key = situation.objects.roles, situation.held
+        if self._standing is None or self._standing[0] != key:
+            of_role = {
+                Role.TARGET: TARGET,
+                Role.IGNORED: PASSED_OVER,
+                Role.SUPPORT: OBSTACLE if situation.held is None else TOUCHABLE,
+            }
+            standing = np.array([of_role.get(role, OBSTACLE) for role in key[0]], dtype=np.int64)
+            if situation.held is not None:
+                standing[situation.held] = PASSED_OVER
+            self._standing = key, standing
+        return self._standing[1]
+
+    def _horizon_m(self, able: Ability, loop_age_s: float) -> float:
+        """How far full speed gets before anything felt stops it, and a little more."""
+        speed = able.full_speed_m_s
+        return speed * (loop_age_s + HORIZON_S) + speed * speed / (2.0 * able.acceleration_m_s2) + BEYOND_M
+
+    def _trigger_field(self, looks: _Looks, situation: Situation, speed_m_s: float, horizon_m: float) -> TriggerField:
+        able = looks.newest.ability
+        # What is under way from an operator who has echoed nothing is not known: at worst full speed.
+        under_way_m_s = speed_m_s if situation.loop_age_known else max(speed_m_s, able.full_speed_m_s)
+        displacement_m = _bounded(under_way_m_s * situation.loop_age_s)
+        fast_m, slow_m = looks.ways_m(situation.pose.tool_position_m)
+        fast = _streamed(fast_m, horizon_m)
+        return TriggerField(
+            fast_m=fast,
+            slow_m=_streamed(slow_m, horizon_m),
+            full_speed_m_s=able.full_speed_m_s,
+            acceleration_m_s2=able.acceleration_m_s2,
+            displacement_m=displacement_m,
+            stiffness=sum(way <= displacement_m for way in fast) / STRENGTHS,
+        )
+
+    def _rumble(self, situation: Situation) -> float:
+        """The strength, in eighths, where the stick leads: D = u (t_d + h) + u²/2a (eq. 8)."""
+        looks = self._looks.get("stick")
+        if looks is None:
+            return 0.0
+        speed = self._motion.stick_speed_m_s * deflected(situation.lateral, situation.pose.tool_rotation)[1]
+        braking_m = speed * speed / (2.0 * looks.newest.ability.acceleration_m_s2)
+        fast_m, slow_m = looks.ways_m(situation.pose.tool_position_m)
+        ways_m = slow_m if speed < touching_speed_m_s(self._motion.trigger_speed_m_s) else fast_m
+        reached = ways_m <= speed * (situation.loop_age_s + HORIZON_S) + braking_m
+        return int(np.count_nonzero(reached)) / STRENGTHS
+
+
+def touching_speed_m_s(full_speed_m_s: float) -> float:
+    """v_touch: slower than this, what is to be touched may be touched."""
+    return min(_TOUCHING_SPEED_M_S, _TOUCHING_SHARE * full_speed_m_s)
+
+
+def _streamed(ways_m: FloatArray, horizon_m: float) -> Ways:
+    ways = np.clip(ways_m, -_MOST_M, min(horizon_m, _MOST_M)).tolist()
+    return tuple(ways)
+
+
+def _bounded(value: float) -> float:
+    return min(max(value, -_MOST_M), _MOST_M)

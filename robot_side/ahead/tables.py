@@ -1,0 +1,113 @@
+"""The preallocated tables that the compiled pass fills: pairs of a sphere and a primitive, ramps, and jobs.
+
+A **ramp** is how the overlap of one gripper sphere with one object grows along the way: eq. 11-12 over E. It is kept as
+nodes (E, V, dV/dE), between which a cubic goes. A **job** is one overlap that a node needs, of one primitive.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+
+Record = Any
+"""One record of a table, whose fields no type checker knows."""
+NODES: Final = 48
+"""Of one ramp, at most."""
+STRENGTHS: Final = 8
+TOUCH_STRENGTH: Final = 4
+"""The most that is felt in slow zones of what is to be touched."""
+NEW, FIRST, GOING, DONE = 0, 1, 2, 3
+"""States of a ramp: nothing is known; V(0) is asked for; more nodes may be; nothing more can come of it."""
+
+RAMP: Final = np.dtype(
+    [
+        ("sphere", np.int64),
+        ("object", np.int64),
+        ("first_pair", np.int64),
+        ("pairs", np.int64),
+        ("state", np.int64),
+        ("asked", np.int64),
+        ("nodes", np.int64),
+        ("touchable", np.int64),
+        ("radius", np.float64),
+        ("before", np.float64),
+        ("expected", np.float64),
+        ("start", np.float64),
+        ("free", np.float64),
+        ("floor", np.float64),
+        ("lean", np.float64),
+        ("least", np.float64),
+        ("rising", np.float64),
+        ("way", np.float64, (NODES,)),
+        ("volume", np.float64, (NODES,)),
+        ("slope", np.float64, (NODES,)),
+        ("push", np.float64, (3,)),
+    ]
+)
+"""One ramp. radius: of the sphere, inflated. before: how much earlier it counts, D_σ for a sphere that is not inflated.
+expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this way. free: d; NaN while not known. floor: V(0).
+lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise add to the slope at the last node."""
+
+PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("bound", np.float64)])
+"""A primitive's row in the scene, and the way at which the ramp's sphere touches it first: NaN for a mesh, of which it
+is only known that the way is no shorter than `bound`."""
+
+
+JOB: Final = np.dtype([("ramp", np.int64), ("node", np.int64), ("row", np.int64)])
+"""Whose an overlap is, and of which of the scene's rows."""
+BLOCK: Final = 6
+"""Spheres that follow each other, and are looked at as one first."""
+MEETING: Final = np.dtype([("block", np.int64), ("object", np.int64), ("met", np.int64), ("bound", np.float64)])
+"""A block of spheres may meet an object, at this way at the earliest; met: its ramps are there, or not needed."""
+WINDOW: Final = 0.5
+"""What begins within so many margins of the nearest is worked out in the same round."""
+JOB_KINDS: Final = 3
+"""Boxes, tetrahedra and meshes have jobs; spheres and half-spaces are worked out on the spot."""
+
+
+class Jobs:
+    """Room for so many overlaps of each kind, a kind after the other, in the arrays that the overlap kernels read."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        self.counts: IntArray = np.zeros(JOB_KINDS, dtype=np.int64)
+        self.owners = np.zeros(JOB_KINDS * room, dtype=JOB)
+        self.centers: FloatArray = np.zeros((JOB_KINDS * room, 3))
+        self.radii: FloatArray = np.zeros(JOB_KINDS * room)
+        self.volumes: FloatArray = np.zeros(JOB_KINDS * room)
+        self.gradients: FloatArray = np.zeros((JOB_KINDS * room, 3))
+        self.areas: FloatArray = np.zeros(JOB_KINDS * room)
+        self.box_centers: FloatArray = np.zeros((room, 3))
+        self.box_rotations: FloatArray = np.zeros((room, 3, 3))
+        self.box_half_sizes: FloatArray = np.zeros((room, 3))
+        self.vertices: FloatArray = np.zeros((room, 4, 3))
+        self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
+
+
+@dataclass
+class Tables:
+    """Made once, and made larger when a scene needs more."""
+
+    meetings: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=MEETING))
+    ramps: np.ndarray = field(default_factory=lambda: np.zeros(512, dtype=RAMP))
+    pairs: np.ndarray = field(default_factory=lambda: np.zeros(2048, dtype=PAIR))
+    jobs: Jobs = field(default_factory=lambda: Jobs(1024))
+    sigma_m: FloatArray = field(default_factory=lambda: np.zeros((512, 2)))
+    """(m or more, 2) D_σ of each sphere along the direction: at P, and expected (P = 0.5)"""
+    blocks: FloatArray = field(default_factory=lambda: np.zeros((512 // BLOCK + 1, 4)))
+    """Centre and radius of a sphere around each block, inflated."""
+    near: IntArray = field(default_factory=lambda: np.zeros(1024, dtype=np.int64))
+
+    def require(self, spheres: int, primitives: int) -> None:
+        """Make room for so many spheres and primitives."""
+        if spheres > len(self.sigma_m):
+            self.sigma_m, self.blocks = np.zeros((2 * spheres, 2)), np.zeros((2 * spheres // BLOCK + 1, 4))
+        if primitives > len(self.near):
+            self.near = np.zeros(2 * primitives, dtype=np.int64)
+
+    def grow(self) -> None:
+        """Make room for as many ramps and pairs again."""
+        self.ramps = np.concatenate([self.ramps, np.zeros_like(self.ramps)])
+        self.pairs = np.concatenate([self.pairs, np.zeros_like(self.pairs)])

@@ -1,1 +1,0 @@
-"""Which sphere meets which object, where it is nearest, and how much overlaps."""

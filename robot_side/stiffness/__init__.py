@@ -1,1 +1,0 @@
-"""From overlaps to what the fingers are to feel (§4.2)."""

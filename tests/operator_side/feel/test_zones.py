@@ -1,0 +1,143 @@
+"""The ten zones: exact where worked out by hand, and monotone wherever a finger or the arm may be."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
+from common.protocol.uniform_field import FAR_M, uniform_field
+from common.reaction import HORIZON_S
+from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
+from operator_side.hands.travel_calibration import TriggerTravel
+from tests.helpers.felt import field, ways
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+USUAL = zone_travels(TriggerTravel())
+STILL = Displacement(0.0, 0.0)
+HORIZON_M = 0.4
+TRAVEL = st.floats(0.0, 1.0)
+WAY = st.floats(-0.1, 0.3)
+WAYS = st.lists(st.floats(-0.1, HORIZON_M), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+
+
+@st.composite
+def fields(draw: st.DrawFn) -> TriggerField:
+    """What is to be touched may be touched: the slow ways are never the shorter ones."""
+    fast: Ways = draw(WAYS)
+    slow = ways(*(metres + draw(st.floats(0.0, 0.1)) for metres in fast)) if draw(st.booleans()) else fast
+    full, acceleration = draw(st.floats(0.05, 0.5)), draw(st.floats(1.0, 20.0))
+    return field(fast, ways(*sorted(slow)), full_speed_m_s=full, acceleration_m_s2=acceleration)
+
+
+MOVING = st.builds(Displacement, WAY, st.floats(-0.3, 0.3))
+
+
+def test_the_middles_of_the_zones_are_of_the_mechanical_travel() -> None:
+    whole = zone_travels(TriggerTravel(0.0, 1.0))
+    assert whole == pytest.approx((1 / 15, 0.2, 1 / 3, 7 / 15, 0.6, 11 / 15, 13 / 15, 1.0, 1.0, 1.0))
+    assert USUAL[0] == pytest.approx((1 / 15 - 0.05) / 0.93)
+    assert zone_travels(TriggerTravel(0.2, 0.5))[:5] == pytest.approx((0.0, 0.0, 4 / 9, 8 / 9, 1.0))
+
+
+def test_an_example_worked_out_by_hand() -> None:
+    ahead = field(
+        ways(0.03, 0.045, 0.05, 0.06, 0.07, 0.08, 0.09, 0.12),
+        ways(0.02, 0.2),
+        full_speed_m_s=0.3,
+        acceleration_m_s2=3.0,
+    )
+    # u = 0.02, 0.06, 0.10 .. 0.30 m/s; D = 0.01 + 0.3 u + u²/6 + max(0, 0.2 - u)²/6
+    #   = 21.5, 31.9, 43.3, 55.9, 69.5, 84.1, 99.3, 115, 115, 115 mm; below 45 mm/s by the slow ways.
+    zones = zone_strengths(ahead, 0.2, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
+    assert zones == ((1, 1, 1, 3, 4, 6, 7, 7, 7, 7), 0)
+    zones = zone_strengths(ahead, 0.11, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
+    assert zones == ((1, 1, 1, 3, 4, 6, 7, 8, 8, 8), 3)
+
+
+@given(fields(), TRAVEL, MOVING)
+@REPEATABLE
+def test_strength_never_falls_with_travel(ahead: TriggerField, other: float, moving: Displacement) -> None:
+    strengths, beyond = zone_strengths(ahead, HORIZON_M, USUAL, other, moving)
+    assert list(strengths) == sorted(strengths)
+    assert strengths.count(8) >= beyond
+
+
+@given(fields(), TRAVEL, MOVING, st.floats(0.0, 0.2), st.floats(0.0, 0.3))
+@REPEATABLE
+def test_it_never_falls_as_the_way_under_way_or_its_speed_grow(
+    ahead: TriggerField, other: float, moving: Displacement, farther: float, faster: float
+) -> None:
+    before = zone_strengths(ahead, HORIZON_M, USUAL, other, moving).strengths
+    for more in ((moving.way_m + farther, moving.speed_m_s), (moving.way_m, moving.speed_m_s + faster)):
+        after = zone_strengths(ahead, HORIZON_M, USUAL, other, Displacement(*more)).strengths
+        assert all(a <= b for a, b in zip(before, after, strict=True))
+
+
+@given(fields(), TRAVEL, TRAVEL, MOVING)
+@REPEATABLE
+def test_it_never_falls_as_the_zones_get_faster(
+    ahead: TriggerField, one: float, two: float, moving: Displacement
+) -> None:
+    # The less the other trigger is pulled, the faster is each zone. (Only an arm that goes faster than it can lose
+    # within a reaction is better off with a faster zone than with one that it brakes for.)
+    calm = Displacement(moving.way_m, min(moving.speed_m_s, HORIZON_S * ahead.acceleration_m_s2))
+    slow = zone_strengths(ahead, HORIZON_M, USUAL, max(one, two), calm).strengths
+    fast = zone_strengths(ahead, HORIZON_M, USUAL, min(one, two), calm).strengths
+    assert all(a <= b for a, b in zip(slow, fast, strict=True))
+
+
+@given(fields(), TRAVEL, MOVING)
+@REPEATABLE
+def test_zones_that_do_not_advance_are_free(ahead: TriggerField, other: float, moving: Displacement) -> None:
+    strengths = zone_strengths(ahead, HORIZON_M, USUAL, other, moving).strengths
+    assert all(strength == 0 for strength, travel in zip(strengths, USUAL, strict=True) if travel <= other)
+
+
+def test_pulled_alike_neither_trigger_resists() -> None:
+    assert zone_strengths(uniform_field(8), FAR_M, USUAL, 1.0, STILL).strengths == (0,) * 10
+    for travel in USUAL:
+        strengths = zone_strengths(uniform_field(8), FAR_M, USUAL, travel, STILL).strengths
+        assert strengths[USUAL.index(travel)] == 0
+
+
+@pytest.mark.parametrize("strength", range(9))
+def test_a_uniform_field_is_as_strong_everywhere(strength: int) -> None:
+    assert zone_strengths(uniform_field(strength), FAR_M, USUAL, 0.0, STILL) == ((strength,) * 10, 0)
+
+
+def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
+    free = field(ways(0.05))
+    # u = 0.25 m/s from zone 7 on: 0.3 * 0.25 + 0.25²/6 = 85.4 mm.
+    assert zone_strengths(free, 0.0855, USUAL, 0.0, STILL).beyond_horizon == 0
+    beyond = field(ways(10.0))
+    assert zone_strengths(beyond, 0.0855, USUAL, 0.0, STILL) == ((0,) * 10, 0)
+    assert zone_strengths(beyond, 0.0853, USUAL, 0.0, STILL) == ((0,) * 7 + (8,) * 3, 3)
+    assert zone_strengths(beyond, 0.0853, USUAL, 1.0, Displacement(1.0, 0.0)) == ((0,) * 10, 0)
+
+
+@pytest.mark.parametrize(("full_speed_m_s", "slow_zones"), [(0.25, 2), (0.1, 2), (0.5, 1), (2.0, 1)])
+def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -> None:
+    # Below 45 mm/s, or below 18 % of a slower arm's full speed.
+    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=full_speed_m_s)
+    strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
+    assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
+
+
+def test_the_first_zone_beyond_the_other_triggers_travel_takes_them_however_fast_it_is() -> None:
+    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=2.0)
+    other = USUAL[4] - 0.05  # so that zone 4 goes at 100 mm/s
+    assert zone_strengths(touching, 10.0, USUAL, other, STILL).strengths == (0,) * 5 + (8,) * 5
+
+
+def update(**changes: float) -> StiffnessUpdate:
+    l2, r2 = field(ways(1.0), displacement_m=-0.02), field(ways(1.0), displacement_m=0.03)
+    return StiffnessUpdate(Header(1, 1, 0.0), l2, r2, horizon_m=1.0, rumble=0.0, state="armed", **changes)
+
+
+def test_what_brings_r2_nearer_takes_l2_away() -> None:
+    assert moving_along(update(speed_m_s=0.1), Displacement(0.04, -0.2)) == ((-0.04, 0.2), (0.04, -0.2))
+
+
+def test_without_our_own_the_robot_sides_displacement_of_each_trigger_counts() -> None:
+    assert moving_along(update(speed_m_s=0.1), None) == ((-0.02, -0.1), (0.03, 0.1))

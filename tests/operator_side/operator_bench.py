@@ -1,0 +1,62 @@
+"""An operator side in virtual time, with what it is told and what it does in a test's hands."""
+
+from typing import Any
+
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
+from common.protocol.session import SessionState
+from operator_side.core import OperatorSide
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from tests.helpers.felt import felt
+
+
+class Bench:
+    """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
+
+    def __init__(self, **options: Any) -> None:
+        self.side = OperatorSide(2, "clock", **options)
+        self.robot = LinkEnd("robot", 1, "clock")
+        self.device = SimulatedDualSense()
+        self.now_s = 1.0
+        self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
+        self.notice(SessionState.DISARMED)
+
+    def notice(self, session: SessionState, why: str = "", token: int = 7) -> None:
+        notice = LeaseNotice(self.robot.stamp(self.now_s), session=session, why=why, token=token, waiting=2, place=1)
+        self.side.receive(encode(notice), self.now_s)
+
+    def stiffness(self, r2: int, state: MotionState = "armed", rumble: float = 0.0) -> bytes:
+        return encode(felt(self.robot.stamp(self.now_s), r2=r2, rumble=rumble, state=state))
+
+    def feel(self, r2: int, state: MotionState = "armed", rumble: float = 0.0) -> None:
+        """A field that is as stiff everywhere arrives."""
+        self._take(self.stiffness(r2, state, rumble))
+
+    def feel_field(self, update: StiffnessUpdate) -> None:
+        """This one arrives."""
+        self._take(encode(update))
+
+    def _take(self, payload: bytes) -> None:
+        self.side.receive(payload, self.now_s)
+        self.write()
+
+    def write(self) -> None:
+        if (report := self.side.output_report(self.now_s)) is not None:
+            self.device.write(report, self.now_s)
+
+    def read(self) -> None:
+        report = self.device.read(self.now_s)
+        assert report is not None
+        self.side.read_report(report, self.now_s)
+
+    def hands(self, *buttons: Button, **state: Any) -> None:
+        """A report of a controller that is held so arrives."""
+        report = build_input_report(ControllerState(pressed=frozenset(buttons), **state))
+        self.side.read_report(report, self.now_s)
+
+    def commands(self) -> list[MotionCommand]:
+        messages = [decode(payload) for payload in self.side.motion(self.now_s)]
+        return [message for message in messages if isinstance(message, MotionCommand)]

@@ -1,0 +1,154 @@
+"""The contract of both sides' halves of the law: where a finger stops before a wall does not depend on the link.
+
+The robot side is an arm on a line that tells exactly how far it is from a wall; everything else is as shipped.
+"""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Compensation, Hello, LeaseNotice, Message, MotionCommand, StiffnessUpdate
+from common.protocol.session import SessionState
+from common.protocol.uniform_field import uniform_field
+from operator_side.core import OperatorSide
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from tests.helpers.felt import field, ways
+
+STEP_S = 0.002
+FULL_M_S, ACCELERATION_M_S2 = 0.25, 3.0
+AHEAD_M, RAMP_M, HORIZON_M = 0.3, 0.012, 0.6
+
+
+class Line:
+    """One direction of a link: a steady delay, or one with jitter."""
+
+    def __init__(self, delay_s: float, jitter_s: float, seed: int) -> None:
+        self._delay_s, self._jitter_s = delay_s, jitter_s
+        self._generator = np.random.default_rng(seed)
+        self._under_way: list[tuple[float, int, bytes]] = []
+        self._pushed = 0
+
+    def push(self, now_s: float, payload: bytes) -> None:
+        late_s = self._jitter_s * abs(float(self._generator.normal()))
+        self._pushed += 1
+        heapq.heappush(self._under_way, (now_s + self._delay_s + late_s, self._pushed, payload))
+
+    def pop(self, now_s: float) -> list[bytes]:
+        arrived = []
+        while self._under_way and self._under_way[0][0] <= now_s + 1e-9:
+            arrived.append(heapq.heappop(self._under_way)[2])
+        return arrived
+
+
+class Approach:
+    """A finger of constant force on R2 from one second on, and an arm on a line before a wall."""
+
+    def __init__(self, delay_s: float, jitter_s: float = 0.0, compensation: Compensation = "operator") -> None:
+        self.side = OperatorSide(2, "clock", compensation=compensation)
+        self.robot = LinkEnd("robot", 1, "clock")
+        self.device = SimulatedDualSense()
+        self.device.set_buttons(frozenset({Button.L1}))
+        self.there, self.back = Line(delay_s, jitter_s, 1), Line(delay_s, jitter_s, 2)
+        self.loop_s = 2.0 * delay_s
+        self.left_m, self.speed_m_s, self.wanted_m_s = AHEAD_M, 0.0, 0.0
+        self.tick = 0
+
+    def pull(self, force_n: float, duration_s: float) -> FloatArray:
+        """(n,) the speed at each step."""
+        self.device.set_finger_force(0.0, force_n)
+        speeds = []
+        for _ in range(round(duration_s / STEP_S)):
+            self.tick += 1
+            self._operate(self.tick * STEP_S)
+            self._move(self.tick * STEP_S)
+            speeds.append(self.speed_m_s)
+        return np.array(speeds)
+
+    def _operate(self, now_s: float) -> None:
+        for payload in self.back.pop(now_s):
+            self.side.receive(payload, now_s)
+        if (output := self.side.output_report(now_s)) is not None:
+            self.device.write(output, now_s)
+        if (report := self.device.read(now_s)) is not None:
+            self.side.read_report(report, now_s)
+        if self.tick % 2 == 0:
+            for payload in self.side.motion(now_s):
+                self.there.push(now_s, payload)
+
+    def _move(self, now_s: float) -> None:
+        for payload in self.there.pop(now_s):
+            message = decode(payload)
+            if isinstance(message, Hello | MotionCommand) and self.robot.arrived(message, now_s).fresh:
+                self.wanted_m_s = FULL_M_S * (message.r2 - message.l2) if isinstance(message, MotionCommand) else 0.0
+        most = ACCELERATION_M_S2 * STEP_S
+        self.speed_m_s += min(max(self.wanted_m_s - self.speed_m_s, -most), most)
+        self.left_m -= self.speed_m_s * STEP_S
+        self._say(self.robot.hello(now_s), now_s, every=50)
+        notice = LeaseNotice(self.robot.stamp(now_s), session=SessionState.ARMED, why="", token=1, waiting=0)
+        self._say(notice, now_s, every=50)
+        self._say(self._ahead(now_s), now_s, every=1)
+
+    def _say(self, message: Message, now_s: float, every: int) -> None:
+        if self.tick % every == 0:
+            self.back.push(now_s, encode(message))
+
+    def _ahead(self, now_s: float) -> StiffnessUpdate:
+        """The ramp to a wall: the overlap of a sphere grows with the square of the way."""
+        begin_m = [self.left_m - RAMP_M * (1.0 - math.sqrt((strength - 0.5) / 8)) for strength in range(1, 9)]
+        wall = field(
+            ways(*(min(metres, HORIZON_M) for metres in begin_m)),
+            full_speed_m_s=FULL_M_S,
+            acceleration_m_s2=ACCELERATION_M_S2,
+            displacement_m=self.speed_m_s * self.loop_s,
+        )
+        return StiffnessUpdate(
+            self.robot.stamp(now_s),
+            uniform_field(0),
+            wall,
+            speed_m_s=self.speed_m_s,
+            horizon_m=HORIZON_M,
+            rumble=0.0,
+            state="armed",
+        )
+
+
+def begun(delay_ms: float, jitter_ms: float = 0.0) -> Approach:
+    """With the link up and our commands known to the robot side."""
+    approach = Approach(1e-3 * delay_ms, 1e-3 * jitter_ms)
+    approach.pull(0.0, 1.0)
+    return approach
+
+
+@pytest.mark.parametrize("jitter_ms", [0, 10])
+@pytest.mark.parametrize("delay_ms", [0, 50, 200, 400])
+def test_a_finger_of_two_newtons_stops_at_the_same_place_whatever_the_link(delay_ms: int, jitter_ms: int) -> None:
+    approach = begun(delay_ms, jitter_ms)
+    speeds = approach.pull(2.0, 8.0)
+    # Strength 6 in the first zone holds 2 N. It begins 12 (1 - sqrt(5.5 / 8)) = 2.0 mm before the wall, and the zone's
+    # own 4.5 mm/s need 1.4 mm.
+    assert 1e3 * approach.left_m == pytest.approx(3.3, abs=0.2)
+    assert speeds.max() > 0.1
+    assert np.abs(speeds[-500:]).max() < 1e-3
+    assert approach.device.write_count < 120
+
+
+@pytest.mark.parametrize("delay_ms", [0, 200, 400])
+def test_a_finger_that_overcomes_the_strongest_effect_touches_slowly(delay_ms: int) -> None:
+    approach = begun(delay_ms)
+    speeds = approach.pull(3.0, 8.0)
+    touching = int(np.argmax(np.cumsum(speeds) * STEP_S >= AHEAD_M))
+    assert 0.0 < speeds[touching] < 0.04
+    assert speeds.max() > 0.2
+
+
+def test_by_the_robot_sides_reckoning_it_stops_too_while_the_link_is_quick() -> None:
+    approach = Approach(0.05, compensation="robot")
+    approach.pull(0.0, 1.0)
+    approach.pull(2.0, 8.0)
+    assert 2.0 < 1e3 * approach.left_m < 4.0

@@ -1,0 +1,146 @@
+"""The table of a frame: a row for each primitive, those of an object together; made once, refused where it is bad."""
+
+import dataclasses
+import weakref
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from robot_side.ahead import scene_table as module
+from robot_side.ahead.field import Ahead
+from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
+from robot_side.ahead.scene_table import SceneTable, scene_table
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.validity import require_valid
+from robot_side.overlap import Mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
+from tests.helpers.ahead.fields import along, ball_pose, look
+from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+
+
+def mixed() -> PerceivedObjects:
+    """Objects whose primitives of one kind do not follow each other."""
+    cube = Mesh(0.1 * CUBE_CORNERS, CUBE_TRIANGLES)
+    scene = Scene().add().sphere([1.0, 0.0, 0.0], 0.1).box([1.0, 0.0, 0.2], [0.1, 0.2, 0.3]).mesh(cube, [1.0, 0.5, 0.0])
+    scene.add(Role.IGNORED).add().half_space([0.0, 0.0, 1.0], -1.0)
+    scene.add().box([2.0, 0.0, 0.0], [0.1, 0.1, 0.1]).sphere([2.0, 0.0, 0.3], 0.2)
+    return scene.tetrahedron([[2.0, 0.0, 0.0], [2.1, 0.0, 0.0], [2.0, 0.1, 0.0], [2.0, 0.0, 0.3]]).objects()
+
+
+def rows_of(table: SceneTable, thing: int) -> range:
+    return range(int(table.first_rows[thing]), int(table.first_rows[thing + 1]))
+
+
+def test_the_rows_of_an_object_are_together_and_say_where_they_come_from() -> None:
+    table = scene_table(mixed())
+    kinds = [[int(table.kinds[row]) for row in rows_of(table, thing)] for thing in range(4)]
+    assert kinds == [[SPHERE, BOX, MESH], [], [HALF_SPACE], [SPHERE, BOX, TETRAHEDRON]]
+    assert [int(table.rows_of_kind[row]) for row in rows_of(table, 3)] == [1, 1, 0]
+    assert table.object_index.tolist() == [0, 0, 0, 2, 3, 3, 3]
+    assert table.has_meshes
+    assert table.flat == 0
+    volumes = [4 / 3 * np.pi * 0.1**3 + 8 * 0.1 * 0.2 * 0.3 + 0.2**3, 0.0, np.inf]
+    np.testing.assert_allclose(table.object_volumes, [*volumes, 0.2**3 + 4 / 3 * np.pi * 0.2**3 + 0.003 / 6])
+
+
+def test_what_has_no_volume_is_left_out_and_counted() -> None:
+    scene = Scene().add().sphere([0.0, 0.0, 0.02], 0.0).box([0.0, 0.0, 0.02], [0.1, 0.0, 0.1])
+    scene.tetrahedron([[0.0, 0.0, 0.02], [0.1, 0.0, 0.02], [0.0, 0.1, 0.02], [0.1, 0.1, 0.02]])
+    whole = scene_table(scene.objects())
+    assert whole.flat == 3
+    assert len(whole.kinds) == 0
+    by = Ahead(np.zeros(6))
+    assert np.isinf(look(ball_pose(0.05), whole.objects, along(), by=by).fast_m).all()
+    assert by.counts.with_nothing_near == 1
+    beside = scene_table(scene.sphere([0.0, 0.0, 0.1], 0.01).objects())
+    assert beside.flat == 3
+    assert beside.rows_of_kind.tolist() == [1]
+
+
+def surface_points(objects: PerceivedObjects, kind: int, row: int, rng: np.random.Generator) -> FloatArray:
+    """Points (n, 3) of a primitive that reach as far as it does."""
+    units = rng.normal(size=(200, 3))
+    units /= np.linalg.norm(units, axis=1)[:, None]
+    if kind == SPHERE:
+        return np.asarray(objects.sphere_centers_m[row] + objects.sphere_radii_m[row] * units)
+    if kind == BOX:
+        corners = CUBE_CORNERS * objects.box_half_sizes_m[row]
+        return np.asarray(objects.box_centers_m[row] + corners @ objects.box_rotations[row].T)
+    return np.asarray(objects.tetrahedron_vertices_m[row])
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_bounds_contain_their_primitives_and_those_of_objects_their_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    objects = random_scene(rng, 3)
+    table = scene_table(objects)
+    for row in np.flatnonzero(table.kinds != HALF_SPACE):
+        points = surface_points(objects, int(table.kinds[row]), int(table.rows_of_kind[row]), rng)
+        for bounds in (table.bounds[row], table.object_bounds[table.object_index[row]]):
+            assert np.linalg.norm(points - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
+
+
+def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[PerceivedObjects] = []
+
+    def counting(objects: PerceivedObjects) -> None:
+        seen.append(objects)
+        require_valid(objects)
+
+    monkeypatch.setattr(module, "require_valid", counting)
+    first, second = (random_scene(np.random.default_rng(count), count) for count in (2, 8))
+    tables = [scene_table(objects) for objects in (first, first, second, first, second)]
+    assert [objects is first for objects in seen] == [True, False]
+    assert tables[0] is tables[1] is tables[3]
+    assert tables[2] is tables[4]
+    assert tables[2].objects is second
+
+
+def test_frames_do_not_pile_up() -> None:
+    frames = []
+    for seed in range(100):
+        objects = random_scene(np.random.default_rng(seed), 1)
+        scene_table(objects)
+        frames.append(weakref.ref(objects))
+    del objects
+    # A tick in real time runs without Python's collector of cycles.
+    assert len([frame for frame in frames if frame() is not None]) <= 10
+
+
+@pytest.mark.parametrize(
+    ("field", "factor"),
+    [
+        ("sphere_centers_m", np.nan),
+        ("sphere_radii_m", -1.0),
+        ("box_half_sizes_m", -1.0),
+        ("box_rotations", 1.1),
+        ("half_space_normals", 2.0),
+        ("tetrahedron_vertices_m", np.inf),
+        ("half_space_offsets_m", np.nan),
+        ("mesh_positions_m", np.nan),
+        ("mesh_rotations", 1.1),
+    ],
+)
+def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: float) -> None:
+    objects = random_scene(np.random.default_rng(0), 2, meshes=1)
+    broken = dataclasses.replace(objects, **{field: getattr(objects, field) * factor})
+    for _ in range(2):
+        with pytest.raises(ValueError, match=field):
+            scene_table(broken)
+
+
+def test_a_mesh_is_bounded_where_it_lies() -> None:
+    rotation, position = random_rotation(np.random.default_rng(3)), np.array([1.0, 2.0, 3.0])
+    vertices, triangles = ellipsoid_mesh(np.array([0.05, 0.1, 0.2]), 8)[:2]
+    # Off its own origin.
+    vertices = vertices + np.array([0.3, 0.0, 0.0])
+    table = scene_table(Scene().add().mesh(Mesh(vertices, triangles), position, rotation).objects())
+    placed = position + vertices @ rotation.T
+    for bounds in (table.bounds[0], table.object_bounds[0]):
+        assert np.linalg.norm(placed - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
+        assert 0.2 <= bounds[3] < 0.25

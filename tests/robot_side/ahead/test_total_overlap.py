@@ -1,0 +1,72 @@
+"""Σ V_ij of many spheres and all objects, against the overlaps one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from robot_side.ahead.find import PASSED_OVER
+from robot_side.ahead.scene_table import scene_table
+from robot_side.ahead.tables import Tables
+from robot_side.ahead.total_overlap import total_overlap_m3
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.overlap import Mesh
+from tests.helpers.ahead.ways_by_definition import overlap_of
+from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+
+TABLES = Tables()
+
+
+def total(spheres: FloatArray, objects: PerceivedObjects, passed_over: frozenset[int] = frozenset()) -> float:
+    standing = np.zeros(len(objects.names), dtype=np.int64)
+    standing[list(passed_over)] = PASSED_OVER
+    return total_overlap_m3(spheres, scene_table(objects), standing, TABLES)
+
+
+def any_spheres(rng: np.random.Generator, count: int) -> FloatArray:
+    return np.concatenate([rng.uniform(-0.4, 0.4, (count, 3)), rng.uniform(0.0, 0.2, (count, 1))], axis=1)
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), of_each_kind=st.integers(0, 5), count=st.integers(1, 6))
+def test_it_is_the_sum_over_all_pairs_but_those_passed_over(seed: int, of_each_kind: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    objects, spheres = random_scene(rng, of_each_kind, 0.4), any_spheres(rng, count)
+    passed_over = frozenset(np.flatnonzero(rng.uniform(size=len(objects.names)) < 0.3).tolist())
+    expected = sum(
+        float(overlap_of(sphere[None, :3], sphere[3], objects, thing)[0][0])
+        for sphere in spheres
+        for thing in range(len(objects.names))
+        if thing not in passed_over
+    )
+    assert total(spheres, objects, passed_over) == pytest.approx(expected, rel=1e-9, abs=1e-18)
+
+
+def test_a_box_made_of_tetrahedra_or_of_a_mesh_is_the_box() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        center, half, rotation = rng.normal(size=3) * 0.1, rng.uniform(0.05, 0.2, 3), random_rotation(rng)
+        spheres = any_spheres(rng, 10)
+        whole = total(spheres, Scene().add().box(center, half, rotation).objects())
+        parts = total(spheres, Scene().add().box_of_tetrahedra(center, half, rotation).objects())
+        mesh = Mesh(CUBE_CORNERS * half, CUBE_TRIANGLES)
+        of_faces = total(spheres, Scene().add().mesh(mesh, center, rotation).objects())
+        assert parts == pytest.approx(whole, rel=1e-9, abs=1e-15)
+        assert of_faces == pytest.approx(whole, rel=1e-9, abs=1e-15)
+
+
+def test_more_spheres_than_are_worked_out_at_a_time_are_all_counted() -> None:
+    rng = np.random.default_rng(4)
+    objects, spheres = random_scene(rng, 2, 0.4), any_spheres(rng, 700)
+    one_by_one = sum(total(sphere[None], objects) for sphere in spheres)
+    assert total(spheres, objects) == pytest.approx(one_by_one, rel=1e-9)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_sphere_that_is_not_finite_is_named_and_never_silently_far_away(bad: float) -> None:
+    spheres = any_spheres(np.random.default_rng(5), 3)
+    spheres[1, 3] = bad
+    with pytest.raises(ValueError, match="spheres holds NaN or infinity"):
+        total(spheres, random_scene(np.random.default_rng(6), 1))

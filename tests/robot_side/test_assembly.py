@@ -1,0 +1,116 @@
+"""Settings to a robot side: which law and which table, how the gripper is covered, and what a person is told."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.errors import ConfigurationError
+from robot_side.ahead.paper_law import PaperLaw
+from robot_side.ahead.swept_law import SweptLaw
+from robot_side.assembly import build_robot_side
+from robot_side.core import RobotSide
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
+from robot_side.simulation.joint_reference import MotionLimits
+from tests.helpers.arm_models import planar_arm
+from tests.helpers.repository import ROOT
+
+ROWS = "[[{0}]]\nloop_age_ms = 100.0\nmu_mm = 1.0\nsigma_mm = 2.0\n"
+NOT_MEASURED = "has not been measured"
+
+
+def built(**settings: Any) -> RobotSide:
+    return build_robot_side(RobotSettings(**settings), 1, "clock")
+
+
+def knows(robot: RobotSide) -> Uncertainty:
+    found: Uncertainty = robot._law._uncertainty  # type: ignore[attr-defined]
+    return found
+
+
+def notes_on_prediction(robot: RobotSide) -> list[str]:
+    return [note for note in robot.notes if NOT_MEASURED in note]
+
+
+@pytest.mark.parametrize(("name", "law"), [("swept", SweptLaw), ("paper", PaperLaw)])
+def test_the_law_is_the_one_that_is_set(name: str, law: type) -> None:
+    robot = built(law=name)
+    assert type(robot._law) is law
+    robot.tick(0.0)
+
+
+def test_the_built_in_arm_has_its_table_in_any_scene() -> None:
+    table = load_prediction_errors(BUILT_IN)
+    for scene in ({}, {"model": ROOT / "tests" / "data" / "wall.xml", "site": "tool"}):
+        robot = built(**scene)
+        assert knows(robot).prediction == table
+        assert notes_on_prediction(robot) == []
+
+
+def test_another_arm_has_none_and_its_operator_is_told(tmp_path: Path) -> None:
+    robot = built(model=planar_arm(tmp_path), site="tcp")
+    assert knows(robot).prediction.rows == {}
+    [note] = notes_on_prediction(robot)
+    assert "\n" not in note
+    assert "feelahead bench error --table" in note
+    assert "--prediction-errors" in note
+
+
+def test_a_table_that_is_named_holds_whatever_the_arm(tmp_path: Path) -> None:
+    path = tmp_path / "errors.toml"
+    path.write_text(ROWS.format("operator") + ROWS.format("robot"))
+    for scene in ({}, {"model": planar_arm(tmp_path), "site": "tcp"}):
+        robot = built(prediction_errors=path, **scene)
+        assert knows(robot).prediction.at("operator", 0.1, 0.25) == pytest.approx((0.001, 0.002))
+        assert notes_on_prediction(robot) == []
+    path.write_text("")
+    with pytest.raises(ConfigurationError, match=r"errors\.toml"):
+        built(prediction_errors=path)
+
+
+def test_what_errs_is_known_to_the_law_as_it_is_to_the_simulation() -> None:
+    robot = built(
+        camera=CameraSettings((0.001, -0.002, 0.003), 0.003, 0.004),
+        encoder=EncoderSettings(1e-3, 0.0),
+        kinematic_mean_m=(0.0, 0.001, 0.0),
+        probability=0.9,
+    )
+    known = knows(robot)
+    assert known.camera_mean_m == (0.001, -0.002, 0.003)
+    assert known.camera_sd_m == pytest.approx(0.005)
+    assert known.kinematic_mean_m == (0.0, 0.001, 0.0)
+    assert known.probability == 0.9
+    error = robot._camera._error  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(error.mean_m, [0.001, -0.002, 0.003])
+    assert error.variance_m2 == pytest.approx(0.005**2)
+    law = robot._law
+    assert isinstance(law, SweptLaw)
+    np.testing.assert_allclose(law.ahead.encoder_sigma_rad, 1e-3)
+
+
+def test_the_gripper_is_covered_as_closely_as_is_set() -> None:
+    counts = []
+    for cover_m in (0.003, 0.01):
+        robot = built(cover_m=cover_m)
+        robot.tick(0.0)
+        assert robot._last is not None
+        counts.append(len(robot._last[1].sphere_radii_m))
+    assert counts[0] == 246
+    assert counts[1] < 50
+
+
+def test_the_law_and_the_motion_know_the_limits_of_the_arms_own_controller() -> None:
+    robot, limits = built(), MotionLimits()
+    np.testing.assert_array_equal(robot._limits.velocity_rad_s, np.full(6, limits.velocity_rad_s))
+    np.testing.assert_array_equal(robot._limits.acceleration_rad_s2, np.full(6, limits.acceleration_rad_s2))
+    assert robot._law._limits is robot._limits  # type: ignore[attr-defined]
+
+
+def test_a_person_is_told_what_is_there() -> None:
+    notes = built().notes
+    assert notes[0].startswith("starts at ")
+    assert notes[1].startswith("objects: target: ")
+    assert not any(NOT_MEASURED in note for note in notes)
