@@ -14,7 +14,6 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.ask import NOTHING, add_to_node
-from robot_side.ahead.kinds.layout import MESH
 from robot_side.ahead.nodes import ends
 from robot_side.ahead.tables import DONE, FIRST, GOING, JOB, PAIR, RAMP, STRENGTHS, TOUCH_STRENGTH, Record
 from robot_side.compiled.kernel import (
@@ -74,17 +73,17 @@ def _begin_to_rise(ramp: Record) -> bool:
 
 
 @building_block
-def _go_on(ramp: Record, pairs: np.ndarray, kinds: IntArray) -> None:
+def _go_on(ramp: Record, pairs: np.ndarray, concave: IntArray) -> None:
     """Move the first node to where V could begin to exceed V(0), past all ways on which it surely does not."""
     last = ramp.nodes - 1
     disc = math.pi * ramp.radius * ramp.radius
-    entered, mesh = math.inf, False
+    entered, dented = math.inf, False
     for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
         if pairs[k].entry > ramp.way[last]:
             entered = min(entered, pairs[k].entry)
         else:
-            mesh |= kinds[pairs[k].row] == MESH
-    if ramp.rising <= NOTHING * disc and not mesh:
+            dented |= concave[pairs[k].row] != 0
+    if ramp.rising <= NOTHING * disc and not dented:
         # What is convex and does not rise any more never does again.
         ramp.nodes, ramp.start = 0, entered
         if entered == math.inf:
@@ -147,7 +146,7 @@ def _take_first(ramp: Record) -> None:
 )
 def take(
     direction: FloatArray,
-    kinds: IntArray,
+    concave: IntArray,
     ramps: np.ndarray,
     pairs: np.ndarray,
     count: int,
@@ -175,7 +174,7 @@ def take(
         if ramp.state == FIRST:
             _take_first(ramp)
         if math.isnan(ramp.free) and not _begin_to_rise(ramp):
-            _go_on(ramp, pairs, kinds)
+            _go_on(ramp, pairs, concave)
             if ramp.start >= reach:
                 ramp.state = DONE
         elif ramp.nodes > 1:

@@ -219,7 +219,7 @@ class Ahead:
             self.counts.overlaps += work_out(jobs, scene)
             take(
                 along.direction,
-                scene.kinds,
+                scene.concave,
                 tables.ramps,
                 tables.pairs,
                 int(found[RAMPS]),

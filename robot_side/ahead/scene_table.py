@@ -25,6 +25,8 @@ class SceneTable:
     """(n, 15) as the files of `kinds` lay them out; of meshes the boxes around them"""
     kinds: IntArray
     """(n,)"""
+    concave: IntArray
+    """(n,) 1 for a mesh that is not convex, else 0"""
     rows_of_kind: IntArray
     """(n,) each primitive's row in the arrays of its kind in `objects`"""
     first_rows: IntArray
@@ -88,6 +90,7 @@ def _make(objects: PerceivedObjects) -> SceneTable:
         bounds=bounds,
         shapes=shapes[order],
         kinds=kinds[order],
+        concave=np.concatenate([np.zeros(sum(counts[:MESH]), dtype=np.int64), _concave_meshes(objects)])[order],
         rows_of_kind=np.concatenate([np.arange(count) for count in counts])[order],
         first_rows=first_rows,
         object_bounds=_around(bounds, first_rows),
@@ -100,6 +103,12 @@ def _mesh_volumes(objects: PerceivedObjects) -> FloatArray:
     if objects.mesh_library is None:
         return np.empty(0)
     return objects.mesh_library.tables.volumes.take(objects.mesh_index)
+
+
+def _concave_meshes(objects: PerceivedObjects) -> IntArray:
+    if objects.mesh_library is None:
+        return np.empty(0, dtype=np.int64)
+    return (~mesh_bounds(objects.mesh_library).convex.take(objects.mesh_index)).astype(np.int64)
 
 
 def _mesh_boxes(objects: PerceivedObjects) -> FloatArray:

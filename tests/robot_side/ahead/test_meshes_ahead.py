@@ -125,3 +125,15 @@ def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch
         scene.add().mesh(capsule, place)
     assert np.isfinite(look(pose, scene.objects(), along(AHEAD, 0.007), by=by).fast_m).all()
     assert 0 < sum(rows) < 3 * len(pose.sphere_radii_m) * 20
+
+
+def test_along_a_convex_mesh_that_is_touched_little_is_worked_out() -> None:
+    """Nothing that does not rise now ever will; of one with a dent there is no telling but by going there."""
+    box = Mesh(CUBE_CORNERS * [0.02, 0.4, 0.4], CUBE_TRIANGLES)
+    pose, by = gripper_pose(), Ahead(np.zeros(6))
+    side_m = float((pose.sphere_centers_m[:, 0] + pose.sphere_radii_m).max())
+    beside = Scene().add().mesh(box, [side_m + 0.003 + 0.02, 0.0, 0.1]).objects()
+    assert np.isinf(look(pose, beside, along(AHEAD, 0.007, reach_m=0.3), by=by).fast_m).all()
+    assert by.counts.ramps > 20
+    # One overlap for each sphere that is in it already.
+    assert by.counts.overlaps <= by.counts.ramps
