@@ -9,16 +9,19 @@ from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
 from robot_side.ahead.nodes import NODES_PER_MARGIN, is_spent, plan
+from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
 from robot_side.ahead.tables import (
     DONE,
     FIRST,
-    JOB,
+    JOB_COLUMNS,
+    JOB_KINDS,
     NEW,
     PAIR,
     RAMP,
     STRENGTHS,
     TOUCH_STRENGTH,
     WINDOW,
+    JobColumns,
     Record,
 )
 from robot_side.compiled.kernel import (
@@ -28,9 +31,6 @@ from robot_side.compiled.kernel import (
     compiled,
     inlined,
     input_array,
-    input_indices,
-    output_array,
-    output_indices,
     record_array,
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale
@@ -69,44 +69,34 @@ def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) ->
 
 @building_block
 def write_job(
-    kind: int,
-    row: int,
-    ramp: int,
-    node: int,
-    center: Vector,
-    radius: float,
-    shapes: FloatArray,
-    job_counts: IntArray,
-    room: int,
-    jobs: np.ndarray,
-    centers: FloatArray,
-    radii: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    vertices: FloatArray,
+    kind: int, row: int, ramp: int, node: int, center: Vector, radius: float, shapes: FloatArray, jobs: JobColumns
 ) -> None:
     """Write the job of one sphere and the primitive in `row`, a box, a tetrahedron or a mesh; there must be room."""
     place = _PLACES[kind]
-    free = job_counts[place]
-    job_counts[place] += 1
-    job = place * room + free
-    jobs[job].ramp, jobs[job].node, jobs[job].row = ramp, node, row
-    radii[job], volumes[job] = radius, 0.0
+    free = jobs.counts[place]
+    jobs.counts[place] += 1
+    job = place * room_of(jobs) + free
+    owner = jobs.owners[job]
+    owner.ramp, owner.node, owner.row = ramp, node, row
+    jobs.radii[job], jobs.volumes[job] = radius, 0.0
     for axis in range(3):
-        centers[job, axis], gradients[job, axis] = center[axis], 0.0
+        jobs.centers[job, axis], jobs.gradients[job, axis] = center[axis], 0.0
     if kind == BOX:
         for axis in range(3):
-            box_centers[free, axis] = shapes[row, axis]
-            box_half_sizes[free, axis] = shapes[row, 12 + axis]
+            jobs.box_centers[free, axis] = shapes[row, axis]
+            jobs.box_half_sizes[free, axis] = shapes[row, 12 + axis]
             for column in range(3):
-                box_rotations[free, axis, column] = shapes[row, 3 + 3 * axis + column]
+                jobs.box_rotations[free, axis, column] = shapes[row, 3 + 3 * axis + column]
     elif kind == TETRAHEDRON:
         for corner in range(4):
             for axis in range(3):
-                vertices[free, corner, axis] = shapes[row, 3 * corner + axis]
+                jobs.vertices[free, corner, axis] = shapes[row, 3 * corner + axis]
+
+
+@inlined
+def room_of(jobs: JobColumns) -> int:
+    """How many jobs of each kind there is room for."""
+    return jobs.owners.size // JOB_KINDS
 
 
 @building_block
@@ -116,20 +106,9 @@ def _ask_node(
     node: int,
     start: Vector,
     along: Vector,
-    shapes: FloatArray,
-    kinds: IntArray,
+    scene: SceneColumns,
     pairs: np.ndarray,
-    job_counts: IntArray,
-    room: int,
-    jobs: np.ndarray,
-    centers: FloatArray,
-    radii: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    vertices: FloatArray,
+    jobs: JobColumns,
 ) -> None:
     """Work out, or write the jobs for, what the sphere of ramp `k` overlaps at one node of its way."""
     center = add(start, scale(ramp.way[node], along))
@@ -137,49 +116,27 @@ def _ask_node(
         if pairs[p].entry > ramp.way[node]:
             continue
         row = pairs[p].row
-        kind = kinds[row]
+        kind = scene.kinds[row]
         if kind == SPHERE:
-            volume, gradient, _ = sphere.overlap(shapes, row, center, ramp.radius)
+            volume, gradient, _ = sphere.overlap(scene.shapes, row, center, ramp.radius)
             add_to_node(ramp, node, volume, gradient, along)
-            continue
-        if kind == HALF_SPACE:
-            volume, gradient, _ = half_space.overlap(shapes, row, center, ramp.radius)
+        elif kind == HALF_SPACE:
+            volume, gradient, _ = half_space.overlap(scene.shapes, row, center, ramp.radius)
             add_to_node(ramp, node, volume, gradient, along)
-            continue
-        write_job(
-            kind,
-            row,
-            k,
-            node,
-            center,
-            ramp.radius,
-            shapes,
-            job_counts,
-            room,
-            jobs,
-            centers,
-            radii,
-            volumes,
-            gradients,
-            box_centers,
-            box_rotations,
-            box_half_sizes,
-            vertices,
-        )
+        else:
+            write_job(kind, row, k, node, center, ramp.radius, scene.shapes, jobs)
 
 
 @compiled(
-    *(input_array(2), input_array(1), input_array(2), input_indices()),
-    *(record_array(RAMP), record_array(PAIR), COUNT, NUMBER, NUMBER, input_array(1), input_array(1)),
-    *(output_indices(), COUNT, record_array(JOB), output_array(2), output_array(1), output_array(1), output_array(2)),
-    *(output_array(2), output_array(3), output_array(2), output_array(3)),
+    *(input_array(2), input_array(1), record_array(RAMP), record_array(PAIR), COUNT, NUMBER, NUMBER),
+    *(input_array(1), input_array(1)),
+    *SCENE_COLUMNS,
+    *JOB_COLUMNS,
     returns=COUNT,
 )
 def ask(
     spheres: FloatArray,
     direction: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
     ramps: np.ndarray,
     pairs: np.ndarray,
     count: int,
@@ -187,9 +144,14 @@ def ask(
     reach: float,
     fast: FloatArray,
     slow: FloatArray,
-    job_counts: IntArray,
-    room: int,
-    jobs: np.ndarray,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    first_rows: IntArray,
+    object_bounds: FloatArray,
+    object_volumes: FloatArray,
+    counts: IntArray,
+    owners: np.ndarray,
     centers: FloatArray,
     radii: FloatArray,
     volumes: FloatArray,
@@ -203,8 +165,12 @@ def ask(
 
     fast and slow (8,): the ways so far. Spheres and half-spaces are worked out here, by their closed forms.
     """
+    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
+    jobs = JobColumns(
+        counts, owners, centers, radii, volumes, gradients, box_centers, box_rotations, box_half_sizes, vertices
+    )
     along = load(direction.reshape(1, 3), 0)
-    job_counts[:] = 0
+    counts[:] = 0
     nearest = math.inf
     for k in range(count):
         ramp = ramps[k]
@@ -218,7 +184,7 @@ def ask(
         ramp = ramps[k]
         if ramp.state == DONE or (ramp.state == NEW and ramp.start - ramp.before > nearest + WINDOW * margin):
             continue
-        if job_counts.max() + (NODES_PER_MARGIN + 1) * ramp.pairs > room:
+        if counts.max() + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):
             if asked == 0:
                 return -1
             continue
@@ -229,26 +195,6 @@ def ask(
         ramp.rising = 0.0
         for node in range(ramp.nodes, ramp.nodes + ramp.asked):
             ramp.volume[node] = ramp.slope[node] = 0.0
-            _ask_node(
-                ramp,
-                k,
-                node,
-                load(spheres, ramp.sphere),
-                along,
-                shapes,
-                kinds,
-                pairs,
-                job_counts,
-                room,
-                jobs,
-                centers,
-                radii,
-                volumes,
-                gradients,
-                box_centers,
-                box_rotations,
-                box_half_sizes,
-                vertices,
-            )
+            _ask_node(ramp, k, node, load(spheres, ramp.sphere), along, scene, pairs, jobs)
         asked += ramp.asked
     return asked

@@ -141,8 +141,8 @@ def _take_first(ramp: Record) -> None:
 
 @compiled(
     *(input_array(1), input_indices(), record_array(RAMP), record_array(PAIR), COUNT),
-    *(input_indices(), COUNT, record_array(JOB), input_array(1), input_array(2), NUMBER, NUMBER),
-    *(output_array(1), output_array(1)),
+    *(NUMBER, NUMBER, output_array(1), output_array(1)),
+    *(input_indices(), record_array(JOB), input_array(1), input_array(2)),
 )
 def take(
     direction: FloatArray,
@@ -150,21 +150,22 @@ def take(
     ramps: np.ndarray,
     pairs: np.ndarray,
     count: int,
-    job_counts: IntArray,
-    room: int,
-    jobs: np.ndarray,
-    volumes: FloatArray,
-    gradients: FloatArray,
     margin: float,
     reach: float,
     fast: FloatArray,
     slow: FloatArray,
+    counts: IntArray,
+    owners: np.ndarray,
+    volumes: FloatArray,
+    gradients: FloatArray,
 ) -> None:
     """Put the results of the jobs into the first `count` ramps, and shorten the ways `fast` and `slow` (8,)."""
     along = load(direction.reshape(1, 3), 0)
-    for kind in range(job_counts.size):
-        for job in range(kind * room, kind * room + job_counts[kind]):
-            add_to_node(ramps[jobs[job].ramp], jobs[job].node, volumes[job], load(gradients, job), along)
+    for kind in range(counts.size):
+        first = kind * (owners.size // counts.size)
+        for job in range(first, first + counts[kind]):
+            owner = owners[job]
+            add_to_node(ramps[owner.ramp], owner.node, volumes[job], load(gradients, job), along)
     for k in range(count):
         ramp = ramps[k]
         if ramp.asked == 0:

@@ -119,12 +119,8 @@ class Ahead:
                 along.variance_m2,
                 along.quantile,
                 along.reach_m + self.margin_m,
-                scene.bounds,
-                scene.shapes,
-                scene.kinds,
-                scene.first_rows,
-                scene.object_bounds,
                 standing,
+                *scene.columns,
                 tables.sigma_m,
                 tables.blocks,
                 tables.meetings,
@@ -164,18 +160,14 @@ class Ahead:
                     widest_m,
                     self.margin_m,
                     reach_m,
-                    scene.bounds,
-                    scene.shapes,
-                    scene.kinds,
-                    scene.first_rows,
-                    scene.object_volumes,
-                    standing,
                     self.least_volume_m3,
-                    tables.sigma_m,
-                    tables.blocks,
+                    slow,
                     tables.meetings,
                     meetings,
-                    slow,
+                    standing,
+                    *scene.columns,
+                    tables.sigma_m,
+                    tables.blocks,
                     tables.ramps,
                     tables.pairs,
                     tables.near,
@@ -187,52 +179,16 @@ class Ahead:
                     tables.grow()
                     continue
             jobs = tables.jobs
-            asked = ask(
-                spheres,
-                along.direction,
-                scene.shapes,
-                scene.kinds,
-                tables.ramps,
-                tables.pairs,
-                int(found[RAMPS]),
-                self.margin_m,
-                reach_m,
-                fast,
-                slow,
-                jobs.counts,
-                jobs.room,
-                jobs.owners,
-                jobs.centers,
-                jobs.radii,
-                jobs.volumes,
-                jobs.gradients,
-                jobs.box_centers,
-                jobs.box_rotations,
-                jobs.box_half_sizes,
-                jobs.vertices,
-            )
+            of_ramps = tables.ramps, tables.pairs, int(found[RAMPS]), self.margin_m, reach_m, fast, slow
+            asked = ask(spheres, along.direction, *of_ramps, *scene.columns, *jobs.columns)
             if asked < 0:
                 tables.jobs = type(jobs)(2 * jobs.room)
                 continue
             if asked == 0 and left == 0:
                 return
             self.counts.overlaps += work_out(jobs, scene)
-            take(
-                along.direction,
-                scene.concave,
-                tables.ramps,
-                tables.pairs,
-                int(found[RAMPS]),
-                jobs.counts,
-                jobs.room,
-                jobs.owners,
-                jobs.volumes,
-                jobs.gradients,
-                self.margin_m,
-                reach_m,
-                fast,
-                slow,
-            )
+            done = jobs.columns
+            take(along.direction, scene.concave, *of_ramps, done.counts, done.owners, done.volumes, done.gradients)
 
 
 def _spheres(pose: GripperPose) -> FloatArray:

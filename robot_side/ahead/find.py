@@ -6,6 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds.layout import HALF_SPACE
+from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
 from robot_side.ahead.tables import BLOCK, MEETING
 from robot_side.ahead.way import passes, way_to
 from robot_side.compiled.kernel import (
@@ -52,9 +53,37 @@ def _around(spheres: FloatArray, sigma: FloatArray, first: int, end: int) -> tup
     return middle, radius
 
 
+@building_block
+def near_rows(
+    scene: SceneColumns, thing: int, center: Vector, radius: float, along: Vector, reach: float, near: IntArray
+) -> int:
+    """Write the rows of an object that a sphere may meet, by their bounds alone, to `near`; how many they are."""
+    count = 0
+    for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
+        if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, radius):
+            near[count] = row
+            count += 1
+    return count
+
+
+@building_block
+def _least_way(
+    scene: SceneColumns, near: IntArray, count: int, center: Vector, radius: float, along: Vector, reach: float
+) -> float:
+    """The way of a sphere to the nearest of the first `count` rows in `near`; infinite beyond the reach."""
+    least = math.inf
+    for k in range(count):
+        row = near[k]
+        kind = scene.kinds[row]
+        if least > 0.0 and (kind == HALF_SPACE or passes(center, along, reach, scene.bounds, row, radius)):
+            least = min(least, way_to(kind, scene.shapes, row, center, radius, along, reach))
+    return least
+
+
 @compiled(
     *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER),
-    *(input_array(2), input_array(2), input_indices(), input_indices(), input_array(2), input_indices()),
+    input_indices(),
+    *SCENE_COLUMNS,
     *(output_array(2), output_array(2), record_array(MEETING), output_indices()),
     returns=COUNT,
 )
@@ -68,12 +97,13 @@ def find(
     variance: float,
     quantile: float,
     reach: float,
+    standing: IntArray,
     bounds: FloatArray,
     shapes: FloatArray,
     kinds: IntArray,
     first_rows: IntArray,
     object_bounds: FloatArray,
-    standing: IntArray,
+    object_volumes: FloatArray,
     sigma: FloatArray,
     blocks: FloatArray,
     meetings: np.ndarray,
@@ -85,7 +115,7 @@ def find(
 
     spheres (m, 4): centres and radii. tool (3,), jacobian (6, n), encoder_variance (n,), direction: the unit û (3,).
     mean, variance: of eq. 10 along û, without the joints' part; quantile: Φ⁻¹(P). standing (k,): what each object is.
-    The scene: see SceneTable. near: room for an object's rows.
+    The scene: see SceneColumns. near: room for an object's rows.
     """
     along, origin = load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
     # A maximum may hide what is no number.
@@ -102,25 +132,17 @@ def find(
     for block in range(total):
         center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0]))
         blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
+    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
     found = 0
     for thing in range(standing.size):
         if standing[thing] == PASSED_OVER or not passes(middle, along, reach, object_bounds, thing, around):
             continue
-        count = 0
-        for row in range(first_rows[thing], first_rows[thing + 1]):
-            if kinds[row] == HALF_SPACE or passes(middle, along, reach, bounds, row, around):
-                near[count] = row
-                count += 1
+        count = near_rows(scene, thing, middle, around, along, reach, near)
         for block in range(total):
-            center, radius = load(blocks, block), blocks[block, 3]
-            least = math.inf
-            for k in range(count):
-                row = near[k]
-                if least > 0.0 and (kinds[row] == HALF_SPACE or passes(center, along, reach, bounds, row, radius)):
-                    least = min(least, way_to(kinds[row], shapes, row, center, radius, along, reach))
+            least = _least_way(scene, near, count, load(blocks, block), blocks[block, 3], along, reach)
             if least <= reach:
                 if found < meetings.size:
-                    meetings[found].block, meetings[found].object, meetings[found].bound = block, thing, least
-                    meetings[found].met = 0
+                    meeting = meetings[found]
+                    meeting.block, meeting.object, meeting.bound, meeting.met = block, thing, least, 0
                 found += 1
     return found

@@ -1,12 +1,14 @@
 """From meetings to ramps: which spheres of a block meet an object, and at which way; the nearest meetings first."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.ahead.find import TARGET, TOUCHABLE
+from robot_side.ahead.find import TARGET, TOUCHABLE, near_rows
 from robot_side.ahead.kinds.layout import HALF_SPACE, MESH
+from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
 from robot_side.ahead.tables import BLOCK, DONE, MEETING, NEW, PAIR, RAMP, STRENGTHS, WINDOW, Record
 from robot_side.ahead.way import passes, way_to
 from robot_side.compiled.kernel import (
@@ -27,33 +29,34 @@ PAIRS, RAMPS, LIMITED = 0, 1, 2
 COUNTED = 3
 
 
+class _Search(NamedTuple):
+    """What a meeting adds to, and what it needs for that."""
+
+    sigma: FloatArray
+    blocks: FloatArray
+    ramps: np.ndarray
+    pairs: np.ndarray
+    near: IntArray
+    found: IntArray
+
+
 @building_block
 def _meet(
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    found: IntArray,
-    near: IntArray,
-    count: int,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    center: Vector,
-    radius: float,
-    along: Vector,
-    reach: float,
+    scene: SceneColumns, search: _Search, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> bool:
-    """Add the ramp of one sphere and the `count` primitives `near` of one object, if it meets any; whether it does."""
+    """Add the ramp of one sphere and the first `count` near rows of one object, if it meets any; whether it touches."""
+    found = search.found
     first = found[PAIRS]
     start, touching = math.inf, False
     for k in range(count):
-        row = near[k]
-        kind = kinds[row]
-        if kind != HALF_SPACE and not passes(center, along, reach, bounds, row, radius):
+        row = search.near[k]
+        kind = scene.kinds[row]
+        if kind != HALF_SPACE and not passes(center, along, reach, scene.bounds, row, radius):
             continue
-        way = way_to(kind, shapes, row, center, radius, along, reach)
+        way = way_to(kind, scene.shapes, row, center, radius, along, reach)
         if way > reach:
             continue
-        pair = pairs[found[PAIRS]]
+        pair = search.pairs[found[PAIRS]]
         # A mesh's own way is found out afterwards.
         pair.row, pair.bound, pair.entry = row, way, math.nan if kind == MESH else way
         found[PAIRS] += 1
@@ -61,7 +64,7 @@ def _meet(
         touching |= way == 0.0
     if found[PAIRS] == first:
         return False
-    ramp = ramps[found[RAMPS]]
+    ramp = search.ramps[found[RAMPS]]
     found[RAMPS] += 1
     ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
     ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
@@ -96,49 +99,33 @@ def _meet_block(
     along: Vector,
     widest: float,
     reach: float,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_volumes: FloatArray,
-    standing: IntArray,
+    standing: int,
     least_volume: float,
-    sigma: FloatArray,
-    blocks: FloatArray,
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    near: IntArray,
-    found: IntArray,
+    scene: SceneColumns,
+    search: _Search,
 ) -> bool:
     """Add the ramps of one meeting; False where there is no room for them."""
-    block, thing = meeting.block, meeting.object
-    center, radius = load(blocks, block), blocks[block, 3]
-    near_count = 0
-    for row in range(first_rows[thing], first_rows[thing + 1]):
-        if kinds[row] == HALF_SPACE or passes(center, along, reach, bounds, row, radius):
-            near[near_count] = row
-            near_count += 1
-    first, end = block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0])
-    if found[RAMPS] + 2 * BLOCK > ramps.size or found[PAIRS] + 2 * BLOCK * near_count > pairs.size:
+    block, thing, found = meeting.block, meeting.object, search.found
+    center, radius = load(search.blocks, block), search.blocks[block, 3]
+    count = near_rows(scene, thing, center, radius, along, reach, search.near)
+    if found[RAMPS] + 2 * BLOCK > search.ramps.size or found[PAIRS] + 2 * BLOCK * count > search.pairs.size:
         return False
     meeting.met = 1
-    for i in range(first, end):
-        inflated = sigma[i, 0]
-        if standing[thing] == TARGET and on_finger[i] and inflated > widest:
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0])):
+        inflated = search.sigma[i, 0]
+        if standing == TARGET and on_finger[i] and inflated > widest:
             inflated = widest
             found[LIMITED] += 1
         for bare in range(2):
             place = found[RAMPS]
             size = spheres[i, 3] + (0.0 if bare else inflated)
-            touching = _meet(
-                ramps, pairs, found, near, near_count, bounds, shapes, kinds, load(spheres, i), size, along, reach
-            )
+            touching = _meet(scene, search, count, load(spheres, i), size, along, reach)
             if found[RAMPS] > place:
-                ramp = ramps[place]
+                ramp = search.ramps[place]
                 ramp.sphere, ramp.object = i, thing
-                ramp.least = min(least_volume, 0.5 * object_volumes[thing])
-                ramp.touchable = standing[thing] == TOUCHABLE or standing[thing] == TARGET
-                ramp.expected = inflated - min(sigma[i, 1], inflated)
+                ramp.least = min(least_volume, 0.5 * scene.object_volumes[thing])
+                ramp.touchable = standing in (TOUCHABLE, TARGET)
+                ramp.expected = inflated - min(search.sigma[i, 1], inflated)
                 ramp.before = inflated if bare else 0.0
             # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
             if not touching:
@@ -147,10 +134,10 @@ def _meet_block(
 
 
 @compiled(
-    *(input_array(2), input_indices(), input_array(1), NUMBER, NUMBER, NUMBER),
-    *(input_array(2), input_array(2), input_indices(), input_indices(), input_array(1), input_indices(), NUMBER),
-    *(input_array(2), input_array(2), record_array(MEETING), COUNT, input_array(1)),
-    *(record_array(RAMP), record_array(PAIR), output_indices(), output_indices()),
+    *(input_array(2), input_indices(), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, input_array(1)),
+    *(record_array(MEETING), COUNT, input_indices()),
+    *SCENE_COLUMNS,
+    *(input_array(2), input_array(2), record_array(RAMP), record_array(PAIR), output_indices(), output_indices()),
     returns=COUNT,
 )
 def meet(
@@ -160,18 +147,19 @@ def meet(
     widest: float,
     margin: float,
     reach: float,
+    least_volume: float,
+    slow: FloatArray,
+    meetings: np.ndarray,
+    count: int,
+    standing: IntArray,
     bounds: FloatArray,
     shapes: FloatArray,
     kinds: IntArray,
     first_rows: IntArray,
+    object_bounds: FloatArray,
     object_volumes: FloatArray,
-    standing: IntArray,
-    least_volume: float,
     sigma: FloatArray,
     blocks: FloatArray,
-    meetings: np.ndarray,
-    count: int,
-    slow: FloatArray,
     ramps: np.ndarray,
     pairs: np.ndarray,
     near: IntArray,
@@ -182,39 +170,32 @@ def meet(
     widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards the target (§3.4),
     infinite without a gripper. slow (8,): the ways so far; a meeting beyond them cannot shorten any. The number left.
     """
+    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
+    search = _Search(sigma, blocks, ramps, pairs, near, found)
     along = load(direction.reshape(1, 3), 0)
-    left = count
     window = WINDOW * margin
     while True:
         nearest = min(_next_ramp(ramps, found[RAMPS]), _next_meeting(meetings, count))
         left = 0
         for k in range(count):
-            if meetings[k].met:
+            meeting = meetings[k]
+            if meeting.met:
                 continue
-            if meetings[k].bound > 0.0 and meetings[k].bound - margin >= slow[STRENGTHS - 1]:
-                meetings[k].met = 1
-            elif meetings[k].bound > nearest + window:
+            if meeting.bound > 0.0 and meeting.bound - margin >= slow[STRENGTHS - 1]:
+                meeting.met = 1
+            elif meeting.bound > nearest + window:
                 left += 1
             elif not _meet_block(
-                meetings[k],
+                meeting,
                 spheres,
                 on_finger,
                 along,
                 widest,
                 reach,
-                bounds,
-                shapes,
-                kinds,
-                first_rows,
-                object_volumes,
-                standing,
+                standing[meeting.object],
                 least_volume,
-                sigma,
-                blocks,
-                ramps,
-                pairs,
-                near,
-                found,
+                scene,
+                search,
             ):
                 return -1
         if left == 0 or _next_ramp(ramps, found[RAMPS]) < math.inf:

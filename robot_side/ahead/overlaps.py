@@ -12,13 +12,14 @@ _BOXES, _TETRAHEDRA, _MESHES = 0, 1, 2
 
 def work_out(jobs: Jobs, scene: SceneTable) -> int:
     """Fill in volumes and gradients of all jobs; how many there were."""
-    boxes, tetrahedra, meshes = (int(count) for count in jobs.counts)
+    columns = jobs.columns
+    boxes, tetrahedra, meshes = (int(count) for count in columns.counts)
     if boxes:
-        shapes = jobs.box_centers[:boxes], jobs.box_rotations[:boxes], jobs.box_half_sizes[:boxes]
+        shapes = columns.box_centers[:boxes], columns.box_rotations[:boxes], columns.box_half_sizes[:boxes]
         _exactly(overlap_boxes, precise_boxes, jobs, slice(0, boxes), shapes)
     if tetrahedra:
         part = slice(_TETRAHEDRA * jobs.room, _TETRAHEDRA * jobs.room + tetrahedra)
-        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs, part, (jobs.vertices[:tetrahedra],))
+        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs, part, (columns.vertices[:tetrahedra],))
     if meshes:
         _meshes(jobs, scene, meshes)
     return boxes + tetrahedra + meshes
@@ -26,9 +27,9 @@ def work_out(jobs: Jobs, scene: SceneTable) -> int:
 
 def _exactly(overlap: Compiled, precise: Compiled, jobs: Jobs, part: slice, shapes: tuple[object, ...]) -> None:
     """The lanes, and the precise forms for those for which doubles do not suffice."""
-    results = jobs.volumes[part], jobs.gradients[part], jobs.areas[part]
+    results = jobs.columns.volumes[part], jobs.columns.gradients[part], jobs.areas[part]
     rows = jobs.unsettled[: part.stop - part.start + 1]
-    spheres = jobs.centers[part], jobs.radii[part]
+    spheres = jobs.columns.centers[part], jobs.columns.radii[part]
     unsettled = overlap(*spheres, *shapes, *results, rows)
     if unsettled:
         precise(*spheres, *shapes, rows[:unsettled], *results)
@@ -42,10 +43,10 @@ def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
     if objects.mesh_library is None:
         raise ValueError("jobs name meshes although the scene has no library of them")
     part = slice(_MESHES * jobs.room, _MESHES * jobs.room + count)
-    rows = scene.rows_of_kind.take(jobs.owners["row"][part])
-    jobs.volumes[part], jobs.gradients[part], _ = mesh_pairs(
-        jobs.centers[part],
-        jobs.radii[part],
+    rows = scene.rows_of_kind.take(jobs.columns.owners["row"][part])
+    jobs.columns.volumes[part], jobs.columns.gradients[part], _ = mesh_pairs(
+        jobs.columns.centers[part],
+        jobs.columns.radii[part],
         objects.mesh_library,
         objects.mesh_index.take(rows),
         objects.mesh_positions_m.take(rows, axis=0),

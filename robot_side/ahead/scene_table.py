@@ -2,16 +2,35 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds import box, half_space, sphere, tetrahedron
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
+from robot_side.compiled.kernel import input_array, input_indices
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.objects.validity import require_valid
+
+
+class SceneColumns(NamedTuple):
+    """A scene as kernels read it; the fields are those of SceneTable."""
+
+    bounds: FloatArray
+    shapes: FloatArray
+    kinds: IntArray
+    first_rows: IntArray
+    object_bounds: FloatArray
+    object_volumes: FloatArray
+
+
+SCENE_COLUMNS: Final = (
+    *(input_array(2), input_array(2), input_indices(), input_indices()),
+    *(input_array(2), input_array(1)),
+)
+"""Of a kernel's arguments, the fields of SceneColumns."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +56,13 @@ class SceneTable:
     """(k,) in m³"""
     flat: int
     """How many primitives have no volume, and so nothing to overlap: they are left out."""
+
+    @cached_property
+    def columns(self) -> SceneColumns:
+        """What kernels read of it."""
+        return SceneColumns(
+            self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes
+        )
 
     @cached_property
     def object_index(self) -> IntArray:

@@ -5,11 +5,12 @@ nodes (E, V, dV/dE), between which a cubic goes. A **job** is one overlap that a
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import output_array, output_indices, record_array
 
 Record = Any
 """One record of a table, whose fields no type checker knows."""
@@ -67,22 +68,56 @@ JOB_KINDS: Final = 3
 """Boxes, tetrahedra and meshes have jobs; spheres and half-spaces are worked out on the spot."""
 
 
+class JobColumns(NamedTuple):
+    """Jobs as kernels read them, those of a kind together: j rows in all, r for each kind."""
+
+    counts: IntArray
+    """(3,) how many there are of boxes, tetrahedra and meshes"""
+    owners: np.ndarray
+    """(j,) JOB"""
+    centers: FloatArray
+    """(j, 3)"""
+    radii: FloatArray
+    """(j,)"""
+    volumes: FloatArray
+    """(j,) worked out"""
+    gradients: FloatArray
+    """(j, 3) worked out"""
+    box_centers: FloatArray
+    """(r, 3)"""
+    box_rotations: FloatArray
+    """(r, 3, 3)"""
+    box_half_sizes: FloatArray
+    """(r, 3)"""
+    vertices: FloatArray
+    """(r, 4, 3)"""
+
+
+JOB_COLUMNS: Final = (
+    *(output_indices(), record_array(JOB), output_array(2), output_array(1), output_array(1), output_array(2)),
+    *(output_array(2), output_array(3), output_array(2), output_array(3)),
+)
+"""Of a kernel's arguments, the fields of JobColumns."""
+
+
 class Jobs:
-    """Room for so many overlaps of each kind, a kind after the other, in the arrays that the overlap kernels read."""
+    """Room for so many overlaps of each kind."""
 
     def __init__(self, room: int) -> None:
         self.room = room
-        self.counts: IntArray = np.zeros(JOB_KINDS, dtype=np.int64)
-        self.owners = np.zeros(JOB_KINDS * room, dtype=JOB)
-        self.centers: FloatArray = np.zeros((JOB_KINDS * room, 3))
-        self.radii: FloatArray = np.zeros(JOB_KINDS * room)
-        self.volumes: FloatArray = np.zeros(JOB_KINDS * room)
-        self.gradients: FloatArray = np.zeros((JOB_KINDS * room, 3))
+        self.columns = JobColumns(
+            counts=np.zeros(JOB_KINDS, dtype=np.int64),
+            owners=np.zeros(JOB_KINDS * room, dtype=JOB),
+            centers=np.zeros((JOB_KINDS * room, 3)),
+            radii=np.zeros(JOB_KINDS * room),
+            volumes=np.zeros(JOB_KINDS * room),
+            gradients=np.zeros((JOB_KINDS * room, 3)),
+            box_centers=np.zeros((room, 3)),
+            box_rotations=np.zeros((room, 3, 3)),
+            box_half_sizes=np.zeros((room, 3)),
+            vertices=np.zeros((room, 4, 3)),
+        )
         self.areas: FloatArray = np.zeros(JOB_KINDS * room)
-        self.box_centers: FloatArray = np.zeros((room, 3))
-        self.box_rotations: FloatArray = np.zeros((room, 3, 3))
-        self.box_half_sizes: FloatArray = np.zeros((room, 3))
-        self.vertices: FloatArray = np.zeros((room, 4, 3))
         self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
 
 
