@@ -42,8 +42,8 @@ class CoverageSettings:
     """Processes at the same time."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
     """Write each motion's figures there as soon as it is done, and leave out what is there already."""
-    only: Annotated[str, tyro.conf.arg(metavar="TEXT")] = ""
-    """Only cells whose name contains TEXT, as in 'wall/bell/200 ms'."""
+    only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
+    """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """Write every cell's figures there."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
@@ -71,14 +71,14 @@ class CoverageSettings:
         require_output_file("--csv", self.csv)
         require_output_file("--picture", self.picture, PICTURES)
         if not self.plan().cells:
-            raise ValueError(f"--only {self.only!r}: no cell's name contains it; valid: as wall/bell/200 ms")
+            raise ValueError(f"--only {' '.join(self.only)}: no cell's name contains it; valid: as wall/bell/200 ms")
 
     def plan(self) -> Plan:
         """What is to be done."""
         whole = quick_plan(self.laws) if self.quick else full_plan(self.laws)
         return replace(
             whole,
-            cells=tuple(cell for cell in whole.cells if self.only in cell.key),
+            cells=tuple(cell for cell in whole.cells if not self.only or any(text in cell.key for text in self.only)),
             probabilities=tuple(sorted(set(self.probabilities))) or whole.probabilities,
             checked=whole.checked if self.checked is None else self.checked,
             raced=whole.raced if self.raced is None else self.raced,

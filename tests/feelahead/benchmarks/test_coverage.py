@@ -250,7 +250,7 @@ def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> 
         ({"checked": -1}, "--checked"),
         ({"raced": -1}, "--raced"),
         ({"laws": ("swept", "swept")}, "--laws"),
-        ({"only": "no such cell"}, "--only"),
+        ({"only": ("no such cell",)}, "--only"),
         ({"csv": Path("/no/such/folder/file.csv")}, "--csv"),
         ({"picture": Path("picture.xyz")}, "--picture picture.xyz: .*.png"),
     ],
