@@ -1,6 +1,7 @@
 """What each law puts on the triggers' zones at given moments of a recorded approach."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final, Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.paper_law import PaperLaw
 from robot_side.ahead.swept_law import SweptLaw
 from robot_side.enlargement.distance import Uncertainty
-from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.simulation.joint_reference import MotionLimits
 
@@ -95,9 +96,7 @@ class Pipeline:
 
     def _law(self, draw: Draw) -> RobotLaw:
         replay = draw.replay
-        uncertainty = Uncertainty(
-            self.probability, camera_sd_m=draw.camera_sd_m, prediction=load_prediction_errors(BUILT_IN)
-        )
+        uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
         law: RobotLaw = PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
         return MarginLaw(law, self.margin_m or 0.0) if self.law == "margin" else law
@@ -130,6 +129,11 @@ class Pipeline:
         return replay.commands.displacement(
             now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s, able.acceleration_m_s2
         )
+
+
+@cache
+def _prediction_errors() -> PredictionErrors:
+    return load_prediction_errors(BUILT_IN)
 
 
 def _message(sensed: Sensed, row: int) -> StiffnessUpdate:
