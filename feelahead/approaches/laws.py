@@ -23,6 +23,11 @@ def without_compensation(law: Law) -> str:
     return "swept" if law == "swept_robot" else law
 
 
+def in_words(law: Law) -> str:
+    """As people are shown it."""
+    return "swept, delay by the robot" if law == "swept_robot" else law
+
+
 def compensation_of(law: Law) -> Compensation:
     """Whose reckoning of the delay is felt."""
     return "robot" if law in ("swept_robot", "paper") else "operator"

@@ -7,6 +7,7 @@ from typing import Final
 
 from common.emulation.spec import LinkSpec
 from feelahead.approaches.approach import Approach
+from feelahead.approaches.laws import in_words
 from feelahead.approaches.outcome import Outcome
 from feelahead.approaches.pictures import LAW_COLOURS
 from feelahead.experiments.approach.table import scene_names
@@ -44,7 +45,7 @@ def draw_run(approach: Approach, outcome: Outcome, frozen: str, path: Path) -> N
     motion.set(xlabel="seconds since the pull began", xlim=(0.0, end_s))
     motion.legend()
     link = approach.link or "no delay"
-    title = f"{approach.force_n:g} N in {approach.model.stem}, law {approach.law}, {link} (frozen {frozen})"
+    title = f"{approach.force_n:g} N in {approach.model.stem}, law {in_words(approach.law)}, {link} (frozen {frozen})"
     figure.suptitle(title, fontsize=9)
     figure.savefig(path)
     plt.close(figure)
@@ -74,7 +75,7 @@ def draw_comparison(ended: Sequence[tuple[Approach, Outcome]], frozen: str, path
                         speed = outcome.contact_speed_mm_s or 0.0
                         points.setdefault(_one_way_ms(one), []).append(speed)
                 delays = sorted(points)
-                label = f"{law}, {name}" if force_n == forces[0] else None
+                label = f"{in_words(law)}, {name}" if force_n == forces[0] else None
                 panel.plot(
                     [delay + _APART_MS * place for delay in delays],
                     [median(points[delay]) for delay in delays],

@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from feelahead.approaches.approach import Approach
+from feelahead.approaches.laws import in_words
 from feelahead.approaches.outcome import Outcome
 
 Ended = tuple[Approach, Outcome]
@@ -17,7 +18,7 @@ _FARTHEST_MM = 1000.0
 
 def sentence(approach: Approach, outcome: Outcome) -> str:
     """One run in a line or two."""
-    what = f"{approach.force_n:g} N in {approach.model.stem}, law {approach.law}: "
+    what = f"{approach.force_n:g} N in {approach.model.stem}, law {in_words(approach.law)}: "
     if outcome.why is not None:
         return f"{what}{outcome.end}: {outcome.why}"
     if outcome.contact_speed_mm_s is not None:
@@ -46,7 +47,7 @@ def comparison(ended: Sequence[Ended]) -> Table:
     for heading in ("scene", "link", "N", *(("effect, N",) if several_effects else ())):
         table.add_column(heading, overflow="fold")
     for law in laws:
-        table.add_column(law)
+        table.add_column(in_words(law))
     cells: dict[tuple[Path, str, float, float], dict[str, list[Outcome]]] = {}
     for one, outcome in ended:
         key = (one.model, one.link or "none", one.force_n, one.strongest_n)
