@@ -180,7 +180,7 @@ class RobotSide:
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
     def _record(self, sensed: Sensed, objects: PerceivedObjects, speed_m_s: float, armed: bool, now_s: float) -> None:
-        self.figures.tick(sensed, speed_m_s)
+        self.figures.tick(sensed, speed_m_s, armed=armed)
         target = target_index(objects)
         held = self._held is not None and self._held.index == target
         self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)

@@ -41,15 +41,15 @@ class RunFigures:
         self._rest_height_m: float | None = None
         self._lifted_m = 0.0
 
-    def tick(self, sensed: Sensed, tool_speed_m_s: float) -> None:
-        """One tick's enlargement, overlap and stiffness."""
+    def tick(self, sensed: Sensed, tool_speed_m_s: float, *, armed: bool = True) -> None:
+        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
         self.ticks += 1
         self._enlargement.add(sensed.enlargement_m)
         if tool_speed_m_s > MOVING_M_S:
             self._enlargement_moving.add(sensed.enlargement_m)
         self._overlap.add(sensed.overlap_m3)
-        self._l2.add(sensed.l2.stiffness)
-        self._r2.add(sensed.r2.stiffness)
+        self._l2.add(sensed.l2.stiffness if armed else 0.0)
+        self._r2.add(sensed.r2.stiffness if armed else 0.0)
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""

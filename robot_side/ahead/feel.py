@@ -73,24 +73,33 @@ def _begin_to_rise(ramp: Record) -> bool:
 
 
 @building_block
-def _go_on(ramp: Record, pairs: np.ndarray, concave: IntArray) -> None:
-    """Move the first node to where V could begin to exceed V(0), past all ways on which it surely does not."""
+def _to_come(ramp: Record, pairs: np.ndarray, concave: IntArray) -> tuple[float, bool]:
+    """The way at which the ramp's next primitive is entered, and whether the overlap may rise before that.
+
+    What is convex and does not rise any more never does again.
+    """
     last = ramp.nodes - 1
-    disc = math.pi * ramp.radius * ramp.radius
-    entered, dented = math.inf, False
+    entered, may_rise = math.inf, ramp.rising > NOTHING * math.pi * ramp.radius * ramp.radius
     for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
         if pairs[k].entry > ramp.way[last]:
             entered = min(entered, pairs[k].entry)
         else:
-            dented |= concave[pairs[k].row] != 0
-    if ramp.rising <= NOTHING * disc and not dented:
-        # What is convex and does not rise any more never does again.
+            may_rise |= concave[pairs[k].row] != 0
+    return entered, may_rise
+
+
+@building_block
+def _go_on(ramp: Record, pairs: np.ndarray, concave: IntArray) -> None:
+    """Move the first node to where V could begin to exceed V(0), past all ways on which it surely does not."""
+    last = ramp.nodes - 1
+    entered, may_rise = _to_come(ramp, pairs, concave)
+    if not may_rise:
         ramp.nodes, ramp.start = 0, entered
         if entered == math.inf:
             ramp.state = DONE
         return
     # No overlap rises faster than by the sphere's disc.
-    skipped = (ramp.floor - ramp.volume[last]) / disc
+    skipped = (ramp.floor - ramp.volume[last]) / (math.pi * ramp.radius * ramp.radius)
     ramp.start = ramp.way[last] + max(skipped, 0.0)
     ramp.way[0], ramp.volume[0], ramp.slope[0] = ramp.way[last], ramp.volume[last], ramp.slope[last]
     ramp.nodes = 0 if skipped > 0.0 else 1
@@ -180,6 +189,8 @@ def take(
                 ramp.state = DONE
         elif ramp.nodes > 1:
             ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
-            known = ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9)
-            if known and (_shorten(ramp, margin, fast, slow) or ended):
-                ramp.state = DONE
+            if ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9):
+                full = _shorten(ramp, margin, fast, slow)
+                entered, may_rise = _to_come(ramp, pairs, concave)
+                if full or ended or (entered == math.inf and not may_rise):
+                    ramp.state = DONE

@@ -315,7 +315,8 @@ def test_the_table_has_a_row_for_each_scene_link_and_force_and_a_column_for_each
     ]
     table = comparison(ended)
     assert table.row_count == 4
-    assert [column.header for column in table.columns] == ["scene", "link", "N", *laws]
+    shown = ["swept", "swept, delay by the robot", "none"]
+    assert [column.header for column in table.columns] == ["scene", "link", "N", *shown]
     assert [str(text) for text in table.columns[-1].cells] == [
         f"1/1 at {speed} mm/s, R 1" for speed in (200, 300, 200, 300)
     ]
