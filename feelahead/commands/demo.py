@@ -234,7 +234,7 @@ def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict
 def _report(summary: dict[str, Any]) -> list[str]:
     """The run in a few lines for people."""
     if not summary.get("ticks"):
-        return ["ended before the first tick"]
+        return ["nothing to report: the robot side left no figures"]
     delays = summary.get("delay_ms", {})
     shown = [
         f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"

@@ -44,8 +44,9 @@ def load_prediction_errors(path: Path) -> PredictionErrors:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = (isinstance(error, OSError) and error.strerror) or error
         raise ConfigurationError(
-            f"--prediction-errors {path}: {error}; valid: a table of: feelahead bench error --table"
+            f"--prediction-errors {path}: {reason}; valid: a table of: feelahead bench error --table"
         ) from None
     rows = {kind: _rows(path, kind, content.get(kind, [])) for kind in get_args(Compensation)}
     arm = content.get("arm")

@@ -34,6 +34,14 @@ def try_approach(arguments: Sequence[str]) -> int:
     approaches = list(settings.approaches())
     ended = _run_all(approaches, settings.workers)
     frozen = frozen_hash(settings.models())
+    # Files first: whoever reads the table may leave early.
+    if settings.summary is not None:
+        settings.summary.write_text(json.dumps(_summary(ended, frozen), indent=2) + "\n", encoding="utf-8")
+    if settings.picture is not None and ended:
+        if len(ended) == 1:
+            draw_run(*ended[0], frozen, settings.picture)
+        else:
+            draw_comparison(ended, frozen, settings.picture)
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
     if len(ended) == 1:
         console.print(sentence(*ended[0]))
@@ -42,13 +50,6 @@ def try_approach(arguments: Sequence[str]) -> int:
     if len(ended) < len(approaches):
         console.print(f"interrupted: {len(ended)} of {len(approaches)} approaches are done")
     console.print(f"frozen scenes and limits: {frozen}")
-    if settings.summary is not None:
-        settings.summary.write_text(json.dumps(_summary(ended, frozen), indent=2) + "\n", encoding="utf-8")
-    if settings.picture is not None and ended:
-        if len(ended) == 1:
-            draw_run(*ended[0], frozen, settings.picture)
-        else:
-            draw_comparison(ended, frozen, settings.picture)
     told = all(outcome.end in ("contact", "stopped") for _, outcome in ended)
     return 0 if told and len(ended) == len(approaches) else 1
 

@@ -47,7 +47,7 @@ class ApproachSettings:
     site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
     """The site between the fingertips, z along the approach."""
     force: Annotated[tuple[float, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
-    """Newtons on R2, 1 to 4: 2 is a light pull, 3.7 a normal one."""
+    """Newtons on R2, 0 to 20: 2 is a light pull, 3.7 a normal one."""
     strongest_effect: Annotated[tuple[float, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
     """Newtons that the strongest effect adds (nobody has measured it): 1.5, 2 and 3 span what is likely."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("",)

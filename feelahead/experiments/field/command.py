@@ -14,7 +14,6 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from common.arrays import FloatArray
 from common.command.command_line import parse_settings
 from common.files.output_file import require_output_file
 from feelahead.approaches.frozen import SITE, frozen_hash, frozen_scene
@@ -74,25 +73,23 @@ def try_field(arguments: Sequence[str]) -> int:
     models = settings.model or tuple(frozen_scene(name) for name in _CONVEX)
     ways_mm = np.unique([*np.arange(0.0, 150.1, settings.step_mm), _SHOWN_MM])
     found: dict[str, list[Look]] = {}
+    # All scenes first: one that cannot be used is named before any is timed.
+    lookers = {name: Looker(model, settings.site, settings.probability) for model, name in scene_names(models).items()}
     with progress("scenes", len(models)) as advance:
-        for model, name in scene_names(models).items():
-            found[name] = _look(settings, model, ways_mm)
+        for name, looker in lookers.items():
+            found[name] = [looker.look(1e-3 * way, settings.looks, time.thread_time) for way in ways_mm.tolist()]
             advance(1.0)
     frozen = frozen_hash(models)
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
-    console.print(_table(found))
-    console.print(f"frozen scenes and limits: {frozen}")
+    # Files first: whoever reads the table may leave early.
     if settings.summary is not None:
         figures = {name: [_figures(look) for look in looks] for name, looks in found.items()}
         settings.summary.write_text(json.dumps({"scenes": figures, "frozen": frozen}, indent=2) + "\n")
     if settings.picture is not None:
         draw(found, frozen, settings.picture)
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
+    console.print(_table(found))
+    console.print(f"frozen scenes and limits: {frozen}")
     return 0
-
-
-def _look(settings: FieldSettings, model: Path, ways_mm: FloatArray) -> list[Look]:
-    looker = Looker(model, settings.site, settings.probability)
-    return [looker.look(1e-3 * float(way_mm), settings.looks, time.thread_time) for way_mm in ways_mm]
 
 
 def _figures(look: Look) -> dict[str, Any]:
