@@ -60,7 +60,7 @@ class OperatorSide:
         self.stiffness_received = 0
         self.motion_sent = 0
         self.applied_age = RunningStatistics(seed)
-        self._feels = haptics
+        self._haptics_enabled = haptics
         self._calibration = calibration or TravelCalibration()
         self._compensation: Compensation = compensation
         self._swap_sides = swap_sides
@@ -254,7 +254,7 @@ class OperatorSide:
             "R2": right,
             "L2_pulled": left_pulled,
             "R2_pulled": right_pulled,
-            "haptics": self._feels,
+            "haptics": self._haptics_enabled,
             "feel": self._haptics.status() if sight is Sight.SEEING else sight,
             "release_first": sight is Sight.WAITING,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,

@@ -11,19 +11,15 @@ and a zone's strength is how many of the field's ways D_z has passed, never less
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
+from common.touch_speed import touch_speed_m_s
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.hands.travel_calibration import TriggerTravel
-
-TOUCH_SPEED_M_S: Final = 0.045
-"""Zones slower than this may touch what is to be touched,"""
-TOUCH_SHARE: Final = 0.18
-"""or slower than this share of v_max, where that is less."""
 
 
 class Zones(NamedTuple):
@@ -63,7 +59,7 @@ def zone_strengths(
     arm is told. A zone that does not advance along the trigger, as the other one is pulled farther, has none.
     """
     full_m_s, twice_a = field.full_speed_m_s, 2.0 * field.acceleration_m_s2
-    touch_m_s = min(TOUCH_SPEED_M_S, TOUCH_SHARE * full_m_s)
+    touch_m_s = touch_speed_m_s(full_m_s)
     strengths: list[int] = []
     strength = beyond = 0
     first = True

@@ -11,14 +11,17 @@ from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
 from robot_side.ahead.nodes import NODES_PER_MARGIN, is_spent, plan
 from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
 from robot_side.ahead.tables import (
+    BOX_JOBS,
     DONE,
     FIRST,
     JOB_COLUMNS,
     JOB_KINDS,
+    MESH_JOBS,
     NEW,
     PAIR,
     RAMP,
     STRENGTHS,
+    TETRAHEDRON_JOBS,
     TOUCH_STRENGTH,
     WINDOW,
     JobColumns,
@@ -35,7 +38,7 @@ from robot_side.compiled.kernel import (
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale
 
-_PLACES: Final = np.array([0, 0, 1, 0, 2])
+_PLACES: Final = np.array([0, BOX_JOBS, TETRAHEDRON_JOBS, 0, MESH_JOBS])
 """Of each kind among the kinds of jobs."""
 NOTHING: Final = 1e-9
 """Shares of the sphere's volume, and of its disc per metre of way, below which a change is rounding."""

@@ -64,6 +64,8 @@ class FieldCounts:
     """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)."""
     with_nothing_near: int = 0
     """Fields of which no block of spheres met anything."""
+    flat: int = 0
+    """Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them."""
 
 
 @dataclass
@@ -94,6 +96,7 @@ class Ahead:
         meetings = self._find(pose, spheres, scene, standing, along)
         fast, slow = np.full(STRENGTHS, np.inf), np.full(STRENGTHS, np.inf)
         counts.fields += 1
+        counts.flat = scene.flat
         sigma_m = float(tables.sigma_m[: len(spheres), 0].max())
         if meetings:
             found = np.zeros(COUNTED, dtype=np.int64)

@@ -1,13 +1,11 @@
 """The overlaps that a round asks for, by the kernels of each kind (eq. 11-12)."""
 
 from robot_side.ahead.scene_table import SceneTable
-from robot_side.ahead.tables import Jobs
+from robot_side.ahead.tables import MESH_JOBS, TETRAHEDRON_JOBS, Jobs
 from robot_side.compiled.kernel import Compiled
 from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
-
-_BOXES, _TETRAHEDRA, _MESHES = 0, 1, 2
 
 
 def work_out(jobs: Jobs, scene: SceneTable) -> int:
@@ -18,7 +16,7 @@ def work_out(jobs: Jobs, scene: SceneTable) -> int:
         shapes = columns.box_centers[:boxes], columns.box_rotations[:boxes], columns.box_half_sizes[:boxes]
         _exactly(overlap_boxes, precise_boxes, jobs, slice(0, boxes), shapes)
     if tetrahedra:
-        part = slice(_TETRAHEDRA * jobs.room, _TETRAHEDRA * jobs.room + tetrahedra)
+        part = slice(TETRAHEDRON_JOBS * jobs.room, TETRAHEDRON_JOBS * jobs.room + tetrahedra)
         _exactly(overlap_tetrahedra, precise_tetrahedra, jobs, part, (columns.vertices[:tetrahedra],))
     if meshes:
         _meshes(jobs, scene, meshes)
@@ -42,7 +40,7 @@ def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
     objects = scene.objects
     if objects.mesh_library is None:
         raise ValueError("jobs name meshes although the scene has no library of them")
-    part = slice(_MESHES * jobs.room, _MESHES * jobs.room + count)
+    part = slice(MESH_JOBS * jobs.room, MESH_JOBS * jobs.room + count)
     rows = scene.rows_of_kind.take(jobs.columns.owners["row"][part])
     jobs.columns.volumes[part], jobs.columns.gradients[part], _ = mesh_pairs(
         jobs.columns.centers[part],

@@ -14,6 +14,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import TriggerField, Ways
 from common.reaction import HORIZON_S
+from common.touch_speed import touch_speed_m_s
 from robot_side.ahead.field import Ahead, Along, Field
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.law import Sensed, Situation
@@ -31,8 +32,6 @@ STEADY_S: Final = 0.1
 """For so long a way that was found holds; as long as strength takes to fall in the trigger."""
 BEYOND_M: Final = 0.05
 """So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
-_TOUCHING_SPEED_M_S: Final = 0.045
-_TOUCHING_SHARE: Final = 0.18
 _SAME_DIRECTION: Final = 0.999
 """Cosine: 2.6° to either side."""
 _MOST_M: Final = 100.0
@@ -225,14 +224,9 @@ class SweptLaw:
         speed = self._motion.stick_speed_m_s * deflected(situation.lateral, situation.pose.tool_rotation)[1]
         braking_m = speed * speed / (2.0 * looks.newest.ability.acceleration_m_s2)
         fast_m, slow_m = looks.ways_m(situation.pose.tool_position_m)
-        ways_m = slow_m if speed < touching_speed_m_s(self._motion.trigger_speed_m_s) else fast_m
+        ways_m = slow_m if speed < touch_speed_m_s(self._motion.trigger_speed_m_s) else fast_m
         reached = ways_m <= speed * (situation.loop_age_s + HORIZON_S) + braking_m
         return int(np.count_nonzero(reached)) / STRENGTHS
-
-
-def touching_speed_m_s(full_speed_m_s: float) -> float:
-    """v_touch: slower than this, what is to be touched may be touched."""
-    return min(_TOUCHING_SPEED_M_S, _TOUCHING_SHARE * full_speed_m_s)
 
 
 def _streamed(ways_m: FloatArray, horizon_m: float) -> Ways:

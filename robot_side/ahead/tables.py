@@ -64,6 +64,7 @@ MEETING: Final = np.dtype([("block", np.int64), ("object", np.int64), ("met", np
 """A block of spheres may meet an object, at this way at the earliest; met: its ramps are there, or not needed."""
 WINDOW: Final = 0.5
 """What begins within so many margins of the nearest is worked out in the same round."""
+BOX_JOBS, TETRAHEDRON_JOBS, MESH_JOBS = 0, 1, 2
 JOB_KINDS: Final = 3
 """Boxes, tetrahedra and meshes have jobs; spheres and half-spaces are worked out on the spot."""
 

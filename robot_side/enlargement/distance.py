@@ -112,6 +112,7 @@ def plain_enlargements_m(
 ) -> FloatArray:
     """D_incr of each sphere (m,) as the paper prints it: the same in every direction, with |v| t_d and Σ's trace.
 
+    |μ_c| of the vector: √3 times the mean where that is the same on each axis.
     covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the centres.
     """
     mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)

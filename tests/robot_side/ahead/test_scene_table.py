@@ -55,7 +55,7 @@ def test_what_has_no_volume_is_left_out_and_counted() -> None:
     assert len(whole.kinds) == 0
     by = Ahead(np.zeros(6))
     assert np.isinf(look(ball_pose(0.05), whole.objects, along(), by=by).fast_m).all()
-    assert by.counts.with_nothing_near == 1
+    assert (by.counts.with_nothing_near, by.counts.flat) == (1, 3)
     beside = scene_table(scene.sphere([0.0, 0.0, 0.1], 0.01).objects())
     assert beside.flat == 3
     assert beside.rows_of_kind.tolist() == [1]

@@ -7,8 +7,8 @@ import pytest
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
+from common.touch_speed import touch_speed_m_s
 from robot_side.ahead.law import Sensed
-from robot_side.ahead.swept_law import touching_speed_m_s
 from robot_side.gripper.held_object import grip, with_held
 from robot_side.objects.perceived import PerceivedObjects, Role
 from tests.helpers.ahead.fields import AHEAD, RADIUS_M, ball_pose
@@ -87,16 +87,16 @@ def test_it_grows_with_the_deflection_which_ends_at_1() -> None:
 
 def test_a_stick_that_leads_slowly_to_what_is_to_be_touched_rumbles_half_at_most() -> None:
     slow, fast = 0.4, 1.0
-    assert slow * STICK_SPEED_M_S < touching_speed_m_s(0.25) < fast * STICK_SPEED_M_S
+    assert slow * STICK_SPEED_M_S < touch_speed_m_s(0.25) < fast * STICK_SPEED_M_S
     for role, most in ((Role.TARGET, 0.5), (Role.OBSTACLE, 1.0)):
         assert rumble(wall_to(RIGHT, 0.0, role), (slow, 0.0)) == most
         assert rumble(wall_to(RIGHT, 0.0, role), (fast, 0.0)) == 1.0
 
 
 def test_what_is_touched_slowly_enough() -> None:
-    assert touching_speed_m_s(0.25) == pytest.approx(0.045)
-    assert touching_speed_m_s(1.0) == pytest.approx(0.045)
-    assert touching_speed_m_s(0.1) == pytest.approx(0.018)
+    assert touch_speed_m_s(0.25) == pytest.approx(0.045)
+    assert touch_speed_m_s(1.0) == pytest.approx(0.045)
+    assert touch_speed_m_s(0.1) == pytest.approx(0.018)
 
 
 # Roles and what is held
