@@ -223,7 +223,9 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         world.until(lambda: world.source.commands > 10)
         assert world.notes()[1] == "controller: DualSense on USB (a4:5e:60:01:02:03)"
         assert "feelahead calibrate" in world.notes()[2]
-        assert world.written == [RELEASED]
+        assert world.written[0] == RELEASED
+        # On a machine that stalls a field may expire, which the light tells and nothing else.
+        assert {(report.l2, report.r2) for report in world.written[1:]} <= {(None, None)}
 
 
 def test_unplugged_in_mid_run_it_commands_nothing_and_is_found_again(world: World) -> None:
