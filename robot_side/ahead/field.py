@@ -18,8 +18,9 @@ from robot_side.arm.port import GripperPose
 
 MARGIN_M = 0.012
 """m: over this way before the one at which full strength is due, strength grows."""
-LEAST_VOLUME_M3 = 1e-7
-"""V_min: an overlap that grows by less is a graze."""
+LEAST_DEPTH_M = 0.0004
+"""What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.4 mm)². Noise in the encoders turns a way
+aside by less."""
 _MOST_ROUNDS = 1000
 
 
@@ -37,6 +38,8 @@ class Along:
     """Φ⁻¹(P)"""
     reach_m: float
     """How far ahead is looked."""
+    early_m: FloatArray | None = None
+    """(k,) by how much each object's ways are shorter, as it comes towards the gripper; None: all stand still"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class Ahead:
     encoder_sigma_rad: FloatArray
     """(n,)"""
     margin_m: float = MARGIN_M
-    least_volume_m3: float = LEAST_VOLUME_M3
+    least_depth_m: float = LEAST_DEPTH_M
     counts: FieldCounts = field(default_factory=FieldCounts)
     tables: Tables = field(default_factory=Tables)
 
@@ -93,14 +96,15 @@ class Ahead:
         tables, counts = self.tables, self.counts
         spheres = _spheres(pose)
         tables.require(len(spheres), len(scene.bounds))
-        meetings = self._find(pose, spheres, scene, standing, along)
+        early_m = np.zeros(len(standing)) if along.early_m is None else along.early_m
+        meetings = self._find(pose, spheres, scene, standing, along, early_m)
         fast, slow = np.full(STRENGTHS, np.inf), np.full(STRENGTHS, np.inf)
         counts.fields += 1
         counts.flat = scene.flat
         sigma_m = float(tables.sigma_m[: len(spheres), 0].max())
         if meetings:
             found = np.zeros(COUNTED, dtype=np.int64)
-            self._shorten(pose, spheres, scene, standing, along, widest_m, meetings, fast, slow, found)
+            self._shorten(pose, spheres, scene, standing, along, early_m, widest_m, meetings, fast, slow, found)
             # Beyond the reach not all is known.
             fast[fast > along.reach_m] = slow[slow > along.reach_m] = np.inf
             counts.ramps += int(found[RAMPS])
@@ -109,7 +113,15 @@ class Ahead:
             counts.with_nothing_near += 1
         return Field(fast, slow, sigma_m)
 
-    def _find(self, pose: GripperPose, spheres: FloatArray, scene: SceneTable, standing: IntArray, along: Along) -> int:
+    def _find(
+        self,
+        pose: GripperPose,
+        spheres: FloatArray,
+        scene: SceneTable,
+        standing: IntArray,
+        along: Along,
+        early_m: FloatArray,
+    ) -> int:
         tables = self.tables
         while True:
             count: int = find(
@@ -123,6 +135,7 @@ class Ahead:
                 along.quantile,
                 along.reach_m + self.margin_m,
                 standing,
+                early_m,
                 *scene.columns,
                 tables.sigma_m,
                 tables.blocks,
@@ -142,6 +155,7 @@ class Ahead:
         scene: SceneTable,
         standing: IntArray,
         along: Along,
+        early_m: FloatArray,
         widest_m: float,
         meetings: int,
         fast: FloatArray,
@@ -163,11 +177,12 @@ class Ahead:
                     widest_m,
                     self.margin_m,
                     reach_m,
-                    self.least_volume_m3,
+                    self.least_depth_m,
                     slow,
                     tables.meetings,
                     meetings,
                     standing,
+                    early_m,
                     *scene.columns,
                     tables.sigma_m,
                     tables.blocks,

@@ -82,7 +82,7 @@ def _least_way(
 
 @compiled(
     *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER),
-    input_indices(),
+    *(input_indices(), input_array(1)),
     *SCENE_COLUMNS,
     *(output_array(2), output_array(2), record_array(MEETING), output_indices()),
     returns=COUNT,
@@ -98,6 +98,7 @@ def find(
     quantile: float,
     reach: float,
     standing: IntArray,
+    early: FloatArray,
     bounds: FloatArray,
     shapes: FloatArray,
     kinds: IntArray,
@@ -115,6 +116,7 @@ def find(
 
     spheres (m, 4): centres and radii. tool (3,), jacobian (6, n), encoder_variance (n,), direction: the unit û (3,).
     mean, variance: of eq. 10 along û, without the joints' part; quantile: Φ⁻¹(P). standing (k,): what each object is.
+    early (k,): by how much its ways are to be shorter, as it comes towards the gripper.
     The scene: see SceneColumns. near: room for an object's rows.
     """
     along, origin = load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
@@ -135,14 +137,16 @@ def find(
     scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
     found = 0
     for thing in range(standing.size):
-        if standing[thing] == PASSED_OVER or not passes(middle, along, reach, object_bounds, thing, around):
+        farthest = reach + early[thing]
+        if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, object_bounds, thing, around):
             continue
-        count = near_rows(scene, thing, middle, around, along, reach, near)
+        count = near_rows(scene, thing, middle, around, along, farthest, near)
         for block in range(total):
-            least = _least_way(scene, near, count, load(blocks, block), blocks[block, 3], along, reach)
-            if least <= reach:
+            least = _least_way(scene, near, count, load(blocks, block), blocks[block, 3], along, farthest)
+            if least <= farthest:
                 if found < meetings.size:
                     meeting = meetings[found]
-                    meeting.block, meeting.object, meeting.bound, meeting.met = block, thing, least, 0
+                    meeting.block, meeting.object, meeting.met = block, thing, 0
+                    meeting.bound = least - early[thing]
                 found += 1
     return found

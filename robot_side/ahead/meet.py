@@ -100,7 +100,8 @@ def _meet_block(
     widest: float,
     reach: float,
     standing: int,
-    least_volume: float,
+    early: float,
+    least_depth: float,
     scene: SceneColumns,
     search: _Search,
 ) -> bool:
@@ -123,10 +124,10 @@ def _meet_block(
             if found[RAMPS] > place:
                 ramp = search.ramps[place]
                 ramp.sphere, ramp.object = i, thing
-                ramp.least = min(least_volume, 0.5 * scene.object_volumes[thing])
+                ramp.least = min(math.pi * size * least_depth * least_depth, 0.5 * scene.object_volumes[thing])
                 ramp.touchable = standing in (TOUCHABLE, TARGET)
                 ramp.expected = inflated - min(search.sigma[i, 1], inflated)
-                ramp.before = inflated if bare else 0.0
+                ramp.before = early + (inflated if bare else 0.0)
             # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
             if not touching:
                 break
@@ -135,7 +136,7 @@ def _meet_block(
 
 @compiled(
     *(input_array(2), input_indices(), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, input_array(1)),
-    *(record_array(MEETING), COUNT, input_indices()),
+    *(record_array(MEETING), COUNT, input_indices(), input_array(1)),
     *SCENE_COLUMNS,
     *(input_array(2), input_array(2), record_array(RAMP), record_array(PAIR), output_indices(), output_indices()),
     returns=COUNT,
@@ -147,11 +148,12 @@ def meet(
     widest: float,
     margin: float,
     reach: float,
-    least_volume: float,
+    least_depth: float,
     slow: FloatArray,
     meetings: np.ndarray,
     count: int,
     standing: IntArray,
+    early: FloatArray,
     bounds: FloatArray,
     shapes: FloatArray,
     kinds: IntArray,
@@ -191,9 +193,10 @@ def meet(
                 on_finger,
                 along,
                 widest,
-                reach,
+                reach + early[meeting.object],
                 standing[meeting.object],
-                least_volume,
+                early[meeting.object],
+                least_depth,
                 scene,
                 search,
             ):

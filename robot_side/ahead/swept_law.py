@@ -3,10 +3,14 @@
 Fields are worked out in turns, one a tick at most: R2, L2, and along the stick while that is deflected. In between
 the ways are shortened by what the tool has moved along, which for a translation is exact. The shortest of the last
 tenth of a second hold: where the gripper just passes something, the encoders' noise alone makes full strength of none.
+
+While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from where that will have brought it,
+too, at several moments until a command that is sent now has stopped it: the shortest ways hold. What comes towards the
+gripper by itself shortens its ways by what it covers in that time.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -15,79 +19,28 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.messages import TriggerField, Ways
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
-from robot_side.ahead.field import Ahead, Along, Field
+from robot_side.ahead.field import Ahead, Along
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.law import Sensed, Situation
+from robot_side.ahead.looks import Places, Seen
 from robot_side.ahead.scene_table import scene_table
+from robot_side.ahead.sideways import FingerMotion, Sideways
 from robot_side.ahead.tables import STRENGTHS
 from robot_side.ahead.total_overlap import total_overlap_m3
-from robot_side.arm.ability import Ability, JointLimits, ability
+from robot_side.arm.ability import Ability, JointLimits, ability, along_approach
 from robot_side.arm.tool_motion import ToolMotionSettings, deflected
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.objects.perceived import Role
 
 FIELD_PERIOD_S: Final = 0.01
 """A controller is written to no more often."""
-STEADY_S: Final = 0.1
-"""For so long a way that was found holds; as long as strength takes to fall in the trigger."""
 BEYOND_M: Final = 0.05
 """So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
-_SAME_DIRECTION: Final = 0.999
-"""Cosine: 2.6° to either side."""
 _MOST_M: Final = 100.0
 """What a message can say; a simulation about to become unstable shows wild figures, and must get to say so."""
 
 Side = Literal["r2", "l2", "stick"]
 _SIDES: Final[tuple[Side, ...]] = ("r2", "l2", "stick")
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """One field as it was found, and what held then."""
-
-    field: Field
-    direction: FloatArray
-    tool_m: FloatArray
-    ability: Ability
-    reach_m: float
-    at_s: float
-    overlap_m3: float
-
-    def moved_m(self, tool_m: FloatArray) -> float:
-        """How far the tool has got along the field's direction since."""
-        return float(self.direction @ (tool_m - self.tool_m))
-
-
-class _Looks:
-    """What was seen along one side lately, the newest last; there is always one."""
-
-    def __init__(self, first: _Seen) -> None:
-        self._seen = [first]
-
-    @property
-    def newest(self) -> _Seen:
-        """The field of the last look."""
-        return self._seen[-1]
-
-    def add(self, seen: _Seen) -> None:
-        """Take one in, and forget those that hold no more: too old, or along another direction."""
-        self._seen = [
-            one
-            for one in self._seen
-            if seen.at_s - one.at_s < STEADY_S and one.direction @ seen.direction > _SAME_DIRECTION
-        ]
-        self._seen.append(seen)
-
-    def ways_m(self, tool_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The shortest fast and slow ways (8,) from where the tool is now."""
-        moved = [one.moved_m(tool_m) for one in self._seen]
-        fast = np.min([one.field.fast_m - way for one, way in zip(self._seen, moved, strict=True)], axis=0)
-        slow = np.min([one.field.slow_m - way for one, way in zip(self._seen, moved, strict=True)], axis=0)
-        return fast, slow
-
-    def known_m(self, tool_m: FloatArray) -> float:
-        """How far ahead of the tool anything is known."""
-        return self.newest.reach_m - self.newest.moved_m(tool_m)
 
 
 class SweptLaw:
@@ -101,19 +54,22 @@ class SweptLaw:
         self._uncertainty = uncertainty
         self._limits = limits
         self._motion = motion
-        self._looks: dict[Side, _Looks] = {}
+        self._places: dict[Side, Places] = {}
+        self._fingers = FingerMotion()
+        self._sideways: tuple[float, Sideways, tuple[float, ...]] | None = None
+        """When it was measured, and the moments after which to look from where it leads"""
         self._standing: tuple[object, IntArray] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick; at most one field is looked at, but for the first tick."""
         velocity = situation.pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
         speed_m_s = float(velocity @ situation.pose.tool_rotation[:, 2])
-        self._look_where_due(situation, speed_m_s, now_s)
-        r2, l2 = self._looks["r2"], self._looks["l2"]
+        self._look_where_due(situation, velocity, now_s)
+        r2, l2 = self._places["r2"], self._places["l2"]
         tool_m = situation.pose.tool_position_m
         horizon_m = min(
-            min(self._horizon_m(looks.newest.ability, situation.loop_age_s), looks.known_m(tool_m))
-            for looks in (r2, l2)
+            min(self._horizon_m(places.newest.ability, situation.loop_age_s), places.known_m(tool_m))
+            for places in (r2, l2)
         )
         leading = (r2 if speed_m_s >= 0.0 else l2).newest
         return Sensed(
@@ -130,22 +86,44 @@ class SweptLaw:
         """How much work there was and was not, over the run."""
         return vars(self.ahead.counts)
 
-    def _look_where_due(self, situation: Situation, speed_m_s: float, now_s: float) -> None:
-        """Look along the side that was looked along longest ago, if that is due; along more of them only if overdue."""
-        sides = list(_SIDES)
+    def _look_where_due(self, situation: Situation, velocity: FloatArray, now_s: float) -> None:
+        """Look where that is due longest, and elsewhere only where it is overdue. velocity (3,): of the tool."""
+        if self._sideways is None or now_s - self._sideways[0] >= FIELD_PERIOD_S - 1e-9:
+            self._sideways = self._measure(situation, velocity, now_s)
+        _, sideways, moments = self._sideways
         if situation.lateral == (0.0, 0.0):
-            self._looks.pop("stick", None)
-            sides.remove("stick")
-        ages_s = {side: now_s - looks.newest.at_s if (looks := self._looks.get(side)) else math.inf for side in sides}
-        for number, side in enumerate(sorted(sides, key=lambda one: -ages_s[one])):
-            if ages_s[side] >= FIELD_PERIOD_S * (1.0 if number == 0 else 2.0) - 1e-9:
-                seen = self._look(side, situation, speed_m_s, now_s)
-                if side in self._looks:
-                    self._looks[side].add(seen)
-                else:
-                    self._looks[side] = _Looks(seen)
+            self._places.pop("stick", None)
+        ages_s: dict[tuple[Side, int], float] = {}
+        for side in _SIDES if situation.lateral != (0.0, 0.0) else _SIDES[:2]:
+            count = 1 if side == "stick" else 1 + len(moments)
+            places = self._places.setdefault(side, Places())
+            places.keep(count)
+            ages_s |= {(side, place): places.age_s(place, now_s) for place in range(count)}
+        speed_m_s = float(velocity @ situation.pose.tool_rotation[:, 2])
+        for number, (side, place) in enumerate(sorted(ages_s, key=lambda one: -ages_s[one])):
+            if ages_s[side, place] >= FIELD_PERIOD_S * (1.0 if number == 0 else 2.0) - 1e-9:
+                there, moved = situation, None
+                if place > 0:
+                    there, moved = replace(situation, pose=sideways.moved(situation.pose, moments[place - 1])), sideways
+                self._places[side].add(place, self._look(side, there, moved, speed_m_s, now_s))
 
-    def _look(self, side: Side, situation: Situation, speed_m_s: float, now_s: float) -> _Seen:
+    def _measure(
+        self, situation: Situation, velocity: FloatArray, now_s: float
+    ) -> tuple[float, Sideways, tuple[float, ...]]:
+        pose = situation.pose
+        approach = pose.tool_rotation[:, 2]
+        sideways = Sideways(
+            velocity - (velocity @ approach) * approach,
+            pose.tool_jacobian[3:] @ situation.joint_velocities_rad_s,
+            self._fingers.see(pose, now_s),
+        )
+        able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
+        return now_s, sideways, sideways.moments(pose, _stopping_s(situation, able))
+
+    def _look(
+        self, side: Side, situation: Situation, sideways: Sideways | None, speed_m_s: float, now_s: float
+    ) -> Seen:
+        """sideways: what has brought the gripper to this pose; None where it stands there now."""
         pose = situation.pose
         direction = np.ascontiguousarray({"r2": 1.0, "l2": -1.0}.get(side, 0.0) * pose.tool_rotation[:, 2])
         full_speed_m_s = self._motion.trigger_speed_m_s
@@ -168,17 +146,21 @@ class SweptLaw:
             self._uncertainty.camera_sd_m**2 + sd_m**2,
             self._uncertainty.quantile,
             reach_m,
+            _early_m(situation, direction, able),
         )
         scene, standing = scene_table(situation.objects), self._stands(situation)
+        if sideways is not None and sideways.moves_fingers:
+            # What the fingers close on is what they are to touch.
+            standing = np.where(standing == TARGET, PASSED_OVER, standing)
         widest_m = math.inf if situation.gap_m is None else 0.5 * situation.gap_m
         found = self.ahead.look(pose, scene, standing, along, widest_m)
         overlap_m3 = 0.0
-        if side != "stick" and (side == "r2") == (speed_m_s >= 0.0):
+        if sideways is None and side != "stick" and (side == "r2") == (speed_m_s >= 0.0):
             sigma_m = self.ahead.tables.sigma_m[: len(pose.sphere_radii_m), :1]
             moved = pose.sphere_centers_m + abs(speed_m_s) * situation.loop_age_s * direction
             spheres = np.concatenate([moved, pose.sphere_radii_m[:, None] + sigma_m], axis=1)
             overlap_m3 = total_overlap_m3(spheres, scene, standing, self.ahead.tables)
-        return _Seen(found, direction, pose.tool_position_m, able, reach_m, now_s, overlap_m3)
+        return Seen(found, direction, pose.tool_position_m, able, reach_m, now_s, overlap_m3)
 
     def _stands(self, situation: Situation) -> IntArray:
         """(k,) what each object is to the field."""
@@ -200,7 +182,7 @@ class SweptLaw:
         speed = able.full_speed_m_s
         return speed * (loop_age_s + HORIZON_S) + speed * speed / (2.0 * able.acceleration_m_s2) + BEYOND_M
 
-    def _trigger_field(self, looks: _Looks, situation: Situation, speed_m_s: float, horizon_m: float) -> TriggerField:
+    def _trigger_field(self, looks: Places, situation: Situation, speed_m_s: float, horizon_m: float) -> TriggerField:
         able = looks.newest.ability
         # What is under way from an operator who has echoed nothing is not known: at worst full speed.
         under_way_m_s = speed_m_s if situation.loop_age_known else max(speed_m_s, able.full_speed_m_s)
@@ -218,7 +200,7 @@ class SweptLaw:
 
     def _rumble(self, situation: Situation) -> float:
         """The strength, in eighths, where the stick leads: D = u (t_d + h) + u²/2a (eq. 8)."""
-        looks = self._looks.get("stick")
+        looks = self._places.get("stick")
         if looks is None:
             return 0.0
         speed = self._motion.stick_speed_m_s * deflected(situation.lateral, situation.pose.tool_rotation)[1]
@@ -227,6 +209,21 @@ class SweptLaw:
         ways_m = slow_m if speed < touch_speed_m_s(self._motion.trigger_speed_m_s) else fast_m
         reached = ways_m <= speed * (situation.loop_age_s + HORIZON_S) + braking_m
         return int(np.count_nonzero(reached)) / STRENGTHS
+
+
+def _early_m(situation: Situation, direction: FloatArray, able: Ability) -> FloatArray | None:
+    """By how much each object's ways (k,) are shorter: what it comes nearer by until the arm stands."""
+    velocities = situation.objects.velocities_m_s
+    if velocities is None:
+        return None
+    nearing_m_s = np.maximum(-(velocities @ direction), 0.0)
+    early: FloatArray = np.minimum(nearing_m_s * _stopping_s(situation, able), _MOST_M)
+    return early
+
+
+def _stopping_s(situation: Situation, able: Ability) -> float:
+    """From a report until the arm stands, which went at full speed and was told to stop by what is felt of it."""
+    return situation.loop_age_s + HORIZON_S + able.full_speed_m_s / able.acceleration_m_s2
 
 
 def _streamed(ways_m: FloatArray, horizon_m: float) -> Ways:

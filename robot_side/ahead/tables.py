@@ -47,7 +47,8 @@ RAMP: Final = np.dtype(
         ("push", np.float64, (3,)),
     ]
 )
-"""One ramp. radius: of the sphere, inflated. before: how much earlier it counts, D_σ for a sphere that is not inflated.
+"""One ramp. radius: of the sphere, inflated. before: how much earlier it counts: by the object's coming
+nearer, and D_σ for a sphere that is not inflated.
 expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this way. free: d; NaN while not known. floor: V(0).
 lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise add to the slope at the last node."""
 
@@ -61,7 +62,8 @@ JOB: Final = np.dtype([("ramp", np.int64), ("node", np.int64), ("row", np.int64)
 BLOCK: Final = 6
 """Spheres that follow each other, and are looked at as one first."""
 MEETING: Final = np.dtype([("block", np.int64), ("object", np.int64), ("met", np.int64), ("bound", np.float64)])
-"""A block of spheres may meet an object, at this way at the earliest; met: its ramps are there, or not needed."""
+"""A block of spheres may meet an object, at this way at the earliest, less what the object comes nearer; met: its ramps
+are there, or not needed."""
 WINDOW: Final = 0.5
 """What begins within so many margins of the nearest is worked out in the same round."""
 BOX_JOBS, TETRAHEDRON_JOBS, MESH_JOBS = 0, 1, 2

@@ -44,6 +44,14 @@ def require_valid(objects: PerceivedObjects) -> None:
                 f"objects.{name} holds {_described(values)}; valid: contiguous float64 in the shape {shape}"
             )
     _require_known_meshes(objects)
+    velocities = objects.velocities_m_s
+    if velocities is not None:
+        if velocities.shape != (len(objects.names), 3):
+            raise ValueError(
+                f"objects.velocities_m_s holds {_described(velocities)}; valid: a row of 3 for each of"
+                f" {len(objects.names)} objects"
+            )
+        require_finite("objects.velocities_m_s", velocities)
     if not _are_possible(*(getattr(objects, name) for _, name, _ in _FIELDS)):
         _refuse(objects)
 

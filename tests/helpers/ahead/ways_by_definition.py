@@ -21,7 +21,7 @@ class Definition:
     direction: FloatArray
     reach_m: float
     margin_m: float = 0.012
-    least_m3: float = 1e-7
+    least_depth_m: float = 0.0004
 
     def ways(
         self,
@@ -54,7 +54,7 @@ class Definition:
         if rises.any():
             free = max(int(np.argmax(rises)) - 1, 0)
             full = min(free + round(self.margin_m / STEP_M), len(along) - 1)
-            least = min(self.least_m3, 0.5 * volume_of(self.objects, thing))
+            least = min(np.pi * radius * self.least_depth_m**2, 0.5 * volume_of(self.objects, thing))
             strengths = grown / max(grown[full], self.margin_m * leaning, least)
             for row, slack in enumerate(slacks):
                 for level in range(8):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.ahead.swept_law import FIELD_PERIOD_S, STEADY_S
+from robot_side.ahead.looks import STEADY_S
+from robot_side.ahead.swept_law import FIELD_PERIOD_S
 from robot_side.arm.port import GripperPose
 from tests.helpers.ahead.fields import ball_pose
 from tests.helpers.ahead.situations import Senses, at, situation, swept, walls

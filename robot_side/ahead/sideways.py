@@ -1,0 +1,90 @@
+"""What moves the gripper besides a trigger: drift across, turning, and the fingers' own way. Where will it be by then?
+
+What lies ahead of where the gripper is may not lie ahead of where it will be: the field is looked at from there, too.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
+
+SPACING_M: Final = 0.015
+"""No sphere gets farther between two places that are looked from: less than an inflated fingertip's sphere is wide."""
+LEAST_M: Final = 0.003
+"""Who gets no farther than this is looked at where it is."""
+_MOST_PLACES: Final = 8
+_NOISE_M_S: Final = 0.01
+_FINGERS_S: Final = 0.06
+"""Over so long the fingers' own speed is measured, as their readings are noisy."""
+
+
+@dataclass(frozen=True)
+class Sideways:
+    """The gripper's velocity without that along the tool's approach axis, in the world frame."""
+
+    linear_m_s: FloatArray
+    """(3,) of the tool"""
+    angular_rad_s: FloatArray
+    """(3,)"""
+    own_m_s: FloatArray
+    """(m, 3) of each sphere against the tool: the fingers'"""
+
+    @property
+    def moves_fingers(self) -> bool:
+        """Whether the fingers move faster than what their readings' noise makes of fingers at rest."""
+        return bool((np.abs(self.own_m_s) > _NOISE_M_S).any())
+
+    def farthest_m(self, pose: GripperPose, after_s: float) -> float:
+        """How far the sphere that gets farthest has gone by then."""
+        lever = pose.sphere_centers_m - pose.tool_position_m
+        speeds = self.linear_m_s + np.cross(self.angular_rad_s, lever) + self.own_m_s
+        return after_s * float(np.linalg.norm(speeds, axis=1).max(initial=0.0))
+
+    def moments(self, pose: GripperPose, until_s: float) -> tuple[float, ...]:
+        """When to look from where the gripper will be, evenly in time, the last at `until_s`; none where it stays.
+
+        None for what is not finite, either: whoever looks refuses that.
+        """
+        farthest_m = self.farthest_m(pose, until_s)
+        moves = farthest_m >= LEAST_M and math.isfinite(farthest_m)
+        count = min(math.ceil(farthest_m / SPACING_M), _MOST_PLACES) if moves else 0
+        return tuple(until_s * (number + 1) / count for number in range(count))
+
+    def moved(self, pose: GripperPose, after_s: float) -> GripperPose:
+        """The gripper as it will stand then, had the trigger not moved it."""
+        turn = Rotation.from_rotvec(self.angular_rad_s * after_s).as_matrix()
+        tool_m = pose.tool_position_m + self.linear_m_s * after_s
+        lever = pose.sphere_centers_m + self.own_m_s * after_s - pose.tool_position_m
+        return replace(
+            pose,
+            tool_position_m=tool_m,
+            tool_rotation=turn @ pose.tool_rotation,
+            sphere_centers_m=tool_m + lever @ turn.T,
+        )
+
+
+class FingerMotion:
+    """How the spheres move against the tool, by where they were."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, FloatArray]] = deque()
+
+    def see(self, pose: GripperPose, now_s: float) -> FloatArray:
+        """Take in a pose; velocities (m, 3) in m/s against the tool, world frame; 0 where there were other spheres."""
+        in_tool = (pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation
+        if self._seen and self._seen[-1][1].shape != in_tool.shape:
+            self._seen.clear()
+        self._seen.append((now_s, in_tool))
+        while self._seen[0][0] < now_s - _FINGERS_S - 1e-9:
+            self._seen.popleft()
+        then_s, then = self._seen[0]
+        if now_s <= then_s:
+            return np.zeros_like(in_tool)
+        velocities: FloatArray = (in_tool - then) / (now_s - then_s) @ pose.tool_rotation.T
+        return velocities
