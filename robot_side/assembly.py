@@ -76,7 +76,7 @@ def build_robot_side(
             int(camera_noise),
         ),
     )
-    joint_limits = limits.of_joints(arm.joint_count)
+    joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
     law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(
         settings.uncertainty(prediction),
@@ -98,8 +98,9 @@ def build_robot_side(
         joint_limits,
         settings.motion,
         SimulationObserver(scene),
-        settings.seed,
-        (*_notes(scene), *prediction_note),
+        assists=settings.assist == "speed",
+        seed=settings.seed,
+        notes=(*_notes(scene), *prediction_note),
     )
 
 

@@ -17,6 +17,7 @@ from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
+from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
@@ -57,9 +58,12 @@ class RobotSide:
         limits: JointLimits,
         motion: ToolMotionSettings,
         observer: Observer | None = None,
+        *,
+        assists: bool = False,
         seed: int = 0,
         notes: Sequence[str] = (),
     ) -> None:
+        """assists: cap the speed along the triggers (see `speed_assist`)."""
         self.notes = tuple(notes)
         """What a person should know about the scene before the run."""
         self.figures = RunFigures(seed)
@@ -73,6 +77,8 @@ class RobotSide:
         self._limits = limits
         self._motion = motion
         self._observer = observer
+        self._assists = assists
+        self._told_m_s = 0.0
         self._start_s: float | None = None
         self._held: HeldObject | None = None
         self._held_s = -np.inf
@@ -115,7 +121,7 @@ class RobotSide:
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
         permission = self.session.permission(now_s)
-        self._move(permission, pose, now_s)
+        self._move(permission, pose, state, now_s)
         command = permission.command
         sensed = self._law.sense(
             Situation(
@@ -166,16 +172,21 @@ class RobotSide:
             if index is not None:
                 self._held = grip(objects, index, pose)
 
-    def _move(self, permission: Permission, pose: GripperPose, now_s: float) -> None:
+    def _move(self, permission: Permission, pose: GripperPose, state: ArmState, now_s: float) -> None:
         """Pass the operator's motion on to the arm; without permission nothing is commanded, and it stops."""
         command = permission.command
         if command is None:
+            self._told_m_s = 0.0
             still = np.zeros(self._arm.joint_count)
             self._arm.command(still, now_s)
             self._arm.command_gripper(0.0, now_s)
             return
+        if self._assists and self._last is not None:
+            command = assisted(command, self._last[0].l2, self._last[0].r2)
         twist = tool_twist(command, pose.tool_rotation, self._motion)
         velocity = joint_velocities(pose.tool_jacobian, twist, self._limits.velocity_rad_s)
+        given = self._limits.given(velocity, state.joint_positions_rad)
+        self._told_m_s = float(pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ given))
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
@@ -201,11 +212,11 @@ class RobotSide:
         outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in self.session.take_answers(now_s)]
         if (owner := self.session.owner(now_s)) is not None:
             self.stiffness_sent += 1
-            outgoing.append(stiffness_message(owner, sensed, permission.state))
+            outgoing.append(stiffness_message(owner, sensed, self._told_m_s, permission.state))
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             observers = self.session.observers(now_s)
-            outgoing += [stiffness_message(one, sensed, permission.state) for one in observers]
+            outgoing += [stiffness_message(one, sensed, self._told_m_s, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
             outgoing.append(

@@ -29,8 +29,8 @@ class Outgoing:
     payload: bytes
 
 
-def stiffness_message(receiver: Receiver, sensed: Sensed, state: MotionState) -> Outgoing:
-    """What `receiver` is to feel."""
+def stiffness_message(receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState) -> Outgoing:
+    """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances."""
     update = StiffnessUpdate(
         receiver.header,
         l2=sensed.l2,
@@ -39,6 +39,7 @@ def stiffness_message(receiver: Receiver, sensed: Sensed, state: MotionState) ->
         horizon_m=sensed.horizon_m,
         rumble=sensed.rumble,
         state=state,
+        told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
     )
     return Outgoing("haptics", receiver.peer, encode(update))
 

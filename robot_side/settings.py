@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -86,6 +86,9 @@ class RobotSettings(RunOptions):
     law: LawName = "swept"
     """How what is ahead is felt. swept: in time to let go, along each trigger. paper: the paper's plain law, to compare
     with."""
+    assist: Literal["none", "speed"] = "none"
+    """What the robot side adds to stiffness, which is advice. speed: it caps the speed along the triggers, so that the
+    arm stops where full strength is due, however hard the finger pulls."""
     cover_m: float = 0.003
     """How far the spheres that cover the gripper may stand out of it: fewer of them for more."""
     prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None

@@ -12,7 +12,7 @@ import msgspec
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.messages import AnyMessage, Message
 
-PROTOCOL_VERSION = 4
+PROTOCOL_VERSION = 5
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
 each trigger in place of stiffness and contact, and in each command who reckons with the delay."""
 MAXIMUM_BYTES = 4096

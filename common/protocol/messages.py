@@ -189,9 +189,14 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     rumble: float
     """Danger where the stick leads, in eighths, 0 to 1; 0 while the stick rests."""
     state: MotionState
+    told_m_s: float | None = None
+    """The speed along that direction that the newest command gets, once joints' limits, discarded and stopped commands
+    are through; None where nobody knows: that command is then taken to be followed."""
 
     def __post_init__(self) -> None:
         _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)
+        if self.told_m_s is not None:
+            _in_range("told_m_s", -_FARTHEST_M, _FARTHEST_M, self.told_m_s)
         _in_range("horizon_m", 0.0, _FARTHEST_M, self.horizon_m)
         _in_range("rumble", 0.0, 1.0, self.rumble)
 

@@ -36,7 +36,9 @@ class CommandsUnderWay:
     a stamp of ours and a duration. At T:
 
     - Commands sent until `echo` have had their effect: the arm follows that of `echo`, and its speed v, measured at T,
-      is as far on the way to it as the arm could get. Older ones cannot arrive any more, as the newest wins.
+      is as far on the way to it as the arm could get. Older ones cannot arrive any more, as the newest wins. What the
+      arm makes of it the report says, too (`told`): nothing if it came too late or the arm was stopped, less where a
+      joint is at its limit.
     - All that were sent after `echo` are under way. On a steady link these are the commands sent after e, and one sent
       at t is followed from T + (t - e) on. Where one sent between `echo` and e should have arrived and has not,
       messages take longer than that of `echo` did, and the first of these arrives at T at the earliest. So e is no
@@ -87,13 +89,15 @@ class CommandsUnderWay:
         speed_m_s: float,
         full_speed_m_s: float,
         acceleration_m_s2: float,
+        told_m_s: float | None = None,
     ) -> Displacement | None:
         """δ and w by the time that a command sent at `now_s` is followed.
 
         echo_sent_s, echo_held_s: from the header of the report that `speed_m_s`, v along the direction in which R2
         advances, came in. full_speed_m_s: v_max, of full travel. acceleration_m_s2: a; infinite for an arm that follows
-        at once. None where the commands since the echo are not known: without an echo, or with one that is older than
-        the window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
+        at once. told_m_s: the speed that the robot gives the newest command that it had then; None: what that asked
+        for. None where the commands since the echo are not known: without an echo, or with one that is older than the
+        window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
         none.
         """
         if not math.isfinite(speed_m_s):
@@ -109,8 +113,9 @@ class CommandsUnderWay:
         if not 0.0 <= echo_held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
             return None
         way_m, speed = 0.0, speed_m_s
-        for duration_s, travel in self._from_echo_on(echo_sent_s, echo_held_s, now_s):
-            way_m, speed = _follow(way_m, speed, travel * full_speed_m_s, acceleration_m_s2, duration_s)
+        for number, (duration_s, travel) in enumerate(self._from_echo_on(echo_sent_s, echo_held_s, now_s)):
+            target = told_m_s if number == 0 and told_m_s is not None else travel * full_speed_m_s
+            way_m, speed = _follow(way_m, speed, target, acceleration_m_s2, duration_s)
         return Displacement(way_m, speed)
 
     def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[tuple[float, float]]:

@@ -98,6 +98,7 @@ class Haptics:
             felt.speed_m_s,
             along.full_speed_m_s,
             along.acceleration_m_s2,
+            felt.told_m_s,
         )
         self.without_history += known is None
         return known

@@ -12,6 +12,8 @@ _MET = 1e-6
 """A tool that moves as asked but for this share is held back by nothing."""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
+_AT_END_RAD = 0.002
+"""A joint that holds at its end is this near to it: encoders are noisy."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,18 @@ class JointLimits:
 
     velocity_rad_s: FloatArray
     acceleration_rad_s2: FloatArray
+    lower_rad: FloatArray | None = None
+    """Where each joint ends; None for one that nobody knows, or for none."""
+    upper_rad: FloatArray | None = None
+
+    def given(self, velocities_rad_s: FloatArray, positions_rad: FloatArray) -> FloatArray:
+        """What commanded velocities (n,) become at these positions (n,): a joint at its end goes no farther."""
+        given = velocities_rad_s.copy()
+        if self.lower_rad is not None:
+            given[(positions_rad <= self.lower_rad + _AT_END_RAD) & (given < 0.0)] = 0.0
+        if self.upper_rad is not None:
+            given[(positions_rad >= self.upper_rad - _AT_END_RAD) & (given > 0.0)] = 0.0
+        return given
 
 
 @dataclass(frozen=True)

@@ -50,9 +50,12 @@ class MujocoArm:
             data.qpos[robot.finger_positions] = travel.open_fingers
         start = data.qpos[robot.arm_positions].copy()
         # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
-        lower = np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start)
-        upper = np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start)
-        self._reference = JointReference(start, lower, upper, limits or MotionLimits())
+        self.ends_rad = (
+            np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start),
+            np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start),
+        )
+        """Where the joints (n,) end, lowest and highest"""
+        self._reference = JointReference(start, *self.ends_rad, limits or MotionLimits())
         self._joint_damping: FloatArray = model.dof_damping[robot.arm_velocities].copy()
         self._acceleration: FloatArray = np.zeros(model.nv)
         self._inertial: FloatArray = np.zeros(model.nv)

@@ -27,9 +27,12 @@ class MotionLimits:
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} = {value}; valid: finite and above 0")
 
-    def of_joints(self, count: int) -> JointLimits:
-        """The same for each of `count` joints."""
-        return JointLimits(np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2))
+    def of_joints(
+        self, count: int, lower_rad: FloatArray | None = None, upper_rad: FloatArray | None = None
+    ) -> JointLimits:
+        """The same for each of `count` joints, which end at lower_rad and upper_rad (n,)."""
+        velocity, acceleration = np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2)
+        return JointLimits(velocity, acceleration, lower_rad, upper_rad)
 
 
 class JointReference:
