@@ -15,6 +15,7 @@ from common.statistics import RunningStatistics
 from common.timing.ages import LoopAge
 from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.arm.ability import JointLimits
+from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.speed_assist import assisted
@@ -78,6 +79,7 @@ class RobotSide:
         self._motion = motion
         self._observer = observer
         self._assists = assists
+        self._joints = JointEstimate()
         self._told_m_s = 0.0
         self._start_s: float | None = None
         self._held: HeldObject | None = None
@@ -114,7 +116,7 @@ class RobotSide:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             self._loop_age.update(age_s, now_s)
             self._loop_age_s.add(self._loop_age.value(now_s))
-        state = self._arm.state(now_s)
+        state = self._joints.update(self._arm.state(now_s))
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
         self._follow_target(objects, pose)

@@ -15,6 +15,8 @@ from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
 from robot_side.operators.safety import SafetySettings
 
+Assist = Literal["none", "speed"]
+
 
 def _require(name: str, value: float, low: float, high: float) -> None:
     if not (math.isfinite(value) and low <= value <= high):
@@ -86,7 +88,7 @@ class RobotSettings(RunOptions):
     law: LawName = "swept"
     """How what is ahead is felt. swept: in time to let go, along each trigger. paper: the paper's plain law, to compare
     with."""
-    assist: Literal["none", "speed"] = "none"
+    assist: Assist = "none"
     """What the robot side adds to stiffness, which is advice. speed: it caps the speed along the triggers, so that the
     arm stops where full strength is due, however hard the finger pulls."""
     cover_m: float = 0.003

@@ -9,6 +9,7 @@ from pathlib import Path
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
+from common.protocol.messages import Vector2
 from common.reaction import REACTION_S
 from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.laws import Law, compensation_of, law_of_robot
@@ -21,7 +22,7 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
-from robot_side.settings import RobotSettings
+from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
@@ -45,6 +46,13 @@ class Approach:
     seed: int = 0
     grip: bool = False
     spoil: Spoil = "nothing"
+    stick: Vector2 = (0.0, 0.0)
+    """The left stick, as it counts: across."""
+    turn: Vector2 = (0.0, 0.0)
+    """The right stick, as it counts."""
+    assist: Assist = "none"
+    camera_sd_m: float | None = None
+    """σ_c; None for the settings' own."""
     margin_m: float | None = None
     """The distance of the law `margin`."""
 
@@ -81,7 +89,9 @@ class PullRun:
             move_objects(scene, shift_m)
         self.truth = TrueContact(scene)
         device = controller(approach.strongest_n / MAX_STRENGTH, "full" if approach.law == "full" else approach.spoil)
-        self.hands = PullingHands(device, pull or constant_force(approach.force_n), grip=approach.grip)
+        self.hands = PullingHands(
+            device, pull or constant_force(approach.force_n, approach.stick, approach.turn), grip=approach.grip
+        )
         self.loopback = Loopback(
             LoopbackSettings(robot, operator),
             scene=scene,
@@ -150,6 +160,8 @@ def robot_settings(approach: Approach) -> RobotSettings:
         seed=approach.seed,
         probability=approach.probability,
         law=law_of_robot(approach.law),
+        assist=approach.assist,
+        camera=CameraSettings() if approach.camera_sd_m is None else CameraSettings(sd_m=approach.camera_sd_m),
     )
 
 

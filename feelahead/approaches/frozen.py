@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
+from common.protocol.messages import Vector2
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import (
@@ -28,7 +29,7 @@ SCENES: Final = Path(__file__).parents[2] / "tests" / "data"
 SITE: Final = "tool"
 AHEAD: Final = (
     *("wall", "plate", "ball", "post", "rod_2mm", "rod_5mm", "rod_10mm"),
-    *("wall_45", "slot", "shelf_edge", "moving", "place_held", "u_mesh", "mug"),
+    *("wall_45", "slot", "shelf_edge", "moving", "fleeing", "place_held", "u_mesh", "mug"),
 )
 """Scenes in which a pull that goes on ends in a contact."""
 PASSED: Final = (
@@ -36,6 +37,9 @@ PASSED: Final = (
     *("cluttered", "empty"),
 )
 """Scenes in which it does not: what is felt there is a false alarm."""
+ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}
+"""Scenes that a straight pull passes, and how far the sticks that move across and turn are deflected to end in a
+contact."""
 GRIPPED: Final = ("place_held",)
 """Scenes in which the gripper closes on something before the pull."""
 _HASH_DIGITS = 12
@@ -45,7 +49,7 @@ def frozen_scene(name: str) -> Path:
     """The MJCF file of a frozen scene; ConfigurationError where the scenes are not there, as beside a wheel."""
     path = SCENES / f"{name}.xml"
     if not path.is_file():
-        names = ", ".join((*AHEAD, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
+        names = ", ".join((*AHEAD, *ASIDE, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
         raise ConfigurationError(f"scene {name!r}: {path} is not there; valid: {names}")
     return path
 

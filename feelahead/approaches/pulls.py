@@ -20,6 +20,8 @@ PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)
 
 _TRAVEL = TriggerTravel()
 _STICK = StickRest()
+ASIDE_S: Final = 1.5
+"""150 mm across, or 43°, at full deflection."""
 _NOISE_STEP_S = 0.05
 _LONGEST_S = 20.0
 
@@ -43,10 +45,23 @@ def force_for(travel: float) -> float:
     return SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * _TRAVEL.raw(travel) if travel > 0.0 else 0.0
 
 
-def constant_force(force_n: float) -> Pull:
-    """R2 pressed with `force_n` for good."""
-    hands = Hands(r2_n=force_n)
-    return lambda _: hands
+def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
+    """R2 pressed with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
+
+    They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
+    """
+    straight = Hands(r2_n=force_n)
+    aside = Hands(r2_n=force_n, left_stick=_beyond_dead_zone(across), right_stick=_beyond_dead_zone(turning))
+    return lambda since_s: aside if since_s < ASIDE_S else straight
+
+
+def _beyond_dead_zone(deflection: Vector2) -> Vector2:
+    """Where the stick has to be for this to count."""
+    length = math.hypot(*deflection)
+    if length == 0.0:
+        return deflection
+    part = (_STICK.dead_zone + (1.0 - _STICK.dead_zone) * length) / length
+    return deflection[0] * part, deflection[1] * part
 
 
 def make_pull(kind: PullKind, seed: int) -> Pull:

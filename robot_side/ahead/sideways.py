@@ -19,9 +19,10 @@ SPACING_M: Final = 0.015
 LEAST_M: Final = 0.003
 """Who gets no farther than this is looked at where it is."""
 _MOST_PLACES: Final = 8
-_NOISE_M_S: Final = 0.01
+_NOISE_M_S: Final = 0.015
+"""Slower than this, fingers rest: their readings are noisy."""
 _FINGERS_S: Final = 0.06
-"""Over so long the fingers' own speed is measured, as their readings are noisy."""
+"""Over so long their speed is measured."""
 
 
 @dataclass(frozen=True)
@@ -37,21 +38,23 @@ class Sideways:
 
     @property
     def moves_fingers(self) -> bool:
-        """Whether the fingers move faster than what their readings' noise makes of fingers at rest."""
-        return bool((np.abs(self.own_m_s) > _NOISE_M_S).any())
+        """Whether the fingers move against the tool."""
+        return bool(self.own_m_s.any())
 
-    def farthest_m(self, pose: GripperPose, after_s: float) -> float:
-        """How far the sphere that gets farthest has gone by then."""
+    def farthest_m(self, pose: GripperPose, after_s: float, ahead_m: float) -> float:
+        """How far the sphere that gets farthest has gone by then, or one that is `ahead_m` farther on."""
         lever = pose.sphere_centers_m - pose.tool_position_m
-        speeds = self.linear_m_s + np.cross(self.angular_rad_s, lever) + self.own_m_s
-        return after_s * float(np.linalg.norm(speeds, axis=1).max(initial=0.0))
+        farther = lever + ahead_m * pose.tool_rotation[:, 2]
+        speeds = [self.linear_m_s + np.cross(self.angular_rad_s, one) + self.own_m_s for one in (lever, farther)]
+        return after_s * float(np.linalg.norm(speeds, axis=2).max(initial=0.0))
 
-    def moments(self, pose: GripperPose, until_s: float) -> tuple[float, ...]:
+    def moments(self, pose: GripperPose, until_s: float, ahead_m: float = 0.0) -> tuple[float, ...]:
         """When to look from where the gripper will be, evenly in time, the last at `until_s`; none where it stays.
 
+        ahead_m: so far ahead it is to be looked as finely as near the gripper, which counts while it turns.
         None for what is not finite, either: whoever looks refuses that.
         """
-        farthest_m = self.farthest_m(pose, until_s)
+        farthest_m = self.farthest_m(pose, until_s, ahead_m)
         moves = farthest_m >= LEAST_M and math.isfinite(farthest_m)
         count = min(math.ceil(farthest_m / SPACING_M), _MOST_PLACES) if moves else 0
         return tuple(until_s * (number + 1) / count for number in range(count))
@@ -87,4 +90,4 @@ class FingerMotion:
         if now_s <= then_s:
             return np.zeros_like(in_tool)
         velocities: FloatArray = (in_tool - then) / (now_s - then_s) @ pose.tool_rotation.T
-        return velocities
+        return velocities if np.abs(velocities).max(initial=0.0) > _NOISE_M_S else np.zeros_like(velocities)

@@ -118,7 +118,8 @@ class SweptLaw:
             self._fingers.see(pose, now_s),
         )
         able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
-        return now_s, sideways, sideways.moments(pose, _stopping_s(situation, able))
+        stopping_s = _stopping_s(situation, able)
+        return now_s, sideways, sideways.moments(pose, stopping_s, stopping_s * able.full_speed_m_s)
 
     def _look(
         self, side: Side, situation: Situation, sideways: Sideways | None, speed_m_s: float, now_s: float

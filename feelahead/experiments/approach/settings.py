@@ -11,12 +11,13 @@ import tyro
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
 from common.files.output_file import require_output_file
-from common.protocol.messages import Compensation
+from common.protocol.messages import Compensation, Vector2
 from feelahead.approaches.approach import Approach
-from feelahead.approaches.frozen import AHEAD, GRIPPED, SCENES, SITE, frozen_scene
+from feelahead.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_scene
 from feelahead.approaches.laws import Law, with_compensation
 from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.spoilt import Spoil
+from robot_side.settings import Assist
 
 _LONGEST_LOOP_S = 2.0
 """Beyond this loop age the robot side is never armed (SafetySettings.max_delay_s)."""
@@ -72,6 +73,14 @@ class ApproachSettings:
     """How many seeds."""
     grip: bool = False
     """Close the gripper on what stands between its fingers first."""
+    stick: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
+    """Deflection, 0 to 1, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
+    turn: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
+    """Deflection, 0 to 1, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
+    assist: Assist = "none"
+    """speed: the robot side caps the speed along the triggers itself."""
+    camera_mm: Annotated[float, tyro.conf.arg(metavar="MM")] = 3.0
+    """Standard deviation of the camera's error, which the law knows."""
     spoil: Spoil = "nothing"
     """Spoil what is felt, to see that the figures notice: 100 ms late, or on the other trigger."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
@@ -88,6 +97,7 @@ class ApproachSettings:
             ("force", self.force, 0.0, 20.0),
             ("strongest-effect", self.strongest_effect, 0.0, 20.0),
             ("duration", (self.duration,), 0.05, 1000.0),
+            ("camera-mm", (self.camera_mm,), 0.0, 1000.0),
         ):
             for value in values:
                 if not (math.isfinite(value) and low <= value <= high):
@@ -95,6 +105,9 @@ class ApproachSettings:
         for name in ("force", "strongest_effect", "link", "law", "compensation"):
             if not getattr(self, name):
                 raise ValueError(f"--{name.replace('_', '-')}: valid: one value or more")
+        for name in ("stick", "turn"):
+            if not math.hypot(*getattr(self, name)) <= 1.0 + 1e-9:  # false for NaN, too
+                raise ValueError(f"--{name} {getattr(self, name)}: valid: two numbers, together at most 1 long")
         if not 0.0 < self.probability < 1.0:
             raise ValueError(f"--probability {self.probability}: valid: above 0 and below 1")
         for name, lowest in (("seed", 0), ("seeds", 1), ("workers", 1)):
@@ -113,7 +126,12 @@ class ApproachSettings:
 
     def models(self) -> tuple[Path, ...]:
         """The scenes to try; ConfigurationError where the frozen ones are not there."""
-        return self.model or tuple(frozen_scene(name) for name in AHEAD)
+        return self.model or tuple(frozen_scene(name) for name in (*AHEAD, *ASIDE))
+
+    def sticks(self, model: Path) -> tuple[Vector2, Vector2]:
+        """How the sticks are deflected: as told, or as a frozen scene that a straight pull passes wants them."""
+        frozen = model.parent.resolve() == SCENES and self.stick == self.turn == (0.0, 0.0)
+        return ASIDE.get(model.stem, (self.stick, self.turn)) if frozen else (self.stick, self.turn)
 
     def laws(self) -> tuple[Law, ...]:
         """What is set side by side, each once."""
@@ -142,4 +160,8 @@ class ApproachSettings:
                                     seed=seed,
                                     grip=self.grip or (model.parent.resolve() == SCENES and model.stem in GRIPPED),
                                     spoil=self.spoil,
+                                    stick=self.sticks(model)[0],
+                                    turn=self.sticks(model)[1],
+                                    assist=self.assist,
+                                    camera_sd_m=1e-3 * self.camera_mm,
                                 )

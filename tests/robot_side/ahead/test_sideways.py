@@ -1,0 +1,162 @@
+"""What drift, turning, fingers and moving things bring into the way is felt before it is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.reaction import HORIZON_S
+from robot_side.ahead.sideways import SPACING_M, FingerMotion, Sideways
+from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.objects.perceived import PerceivedObjects
+from tests.helpers.ahead.fields import RADIUS_M, ball_pose
+from tests.helpers.ahead.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
+from tests.helpers.gripper_poses import free_pose
+from tests.helpers.perceived_scenes import Scene
+
+LOOP_S = 0.1
+STOPPING_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
+
+
+def post(x_m: float, z_m: float, half_m: float = 0.01) -> PerceivedObjects:
+    """Upright, so far to the side and ahead of the tool's point."""
+    return Scene().add().box([x_m, 0.0, z_m], [half_m, 0.3, half_m]).objects()
+
+
+def first_ways(objects: PerceivedObjects, velocity: list[float], turning: list[float]) -> tuple[FloatArray, FloatArray]:
+    """L2's and R2's ways of full strength as a ball moves so."""
+    rates = np.array([*velocity, *turning])
+    sensed = swept().sense(situation(ball_pose(), objects, joint_velocities_rad_s=rates, loop_age_s=LOOP_S), 0.0)
+    return np.array(sensed.l2.fast_m), np.array(sensed.r2.fast_m)
+
+
+def felt(objects: PerceivedObjects, velocity: list[float], turning: list[float] | None = None) -> bool:
+    return bool(first_ways(objects, velocity, turning or [0.0, 0.0, 0.0])[1][7] < 0.1)
+
+
+def test_a_post_beside_the_way_is_felt_by_who_drifts_towards_it_and_by_nobody_else() -> None:
+    for x_m in (0.04, 0.055):
+        assert not felt(post(x_m, 0.08), [0.0, 0.0, 0.2])
+        assert felt(post(x_m, 0.08), [0.1, 0.0, 0.2])
+        assert not felt(post(x_m, 0.08), [-0.1, 0.0, 0.2])
+        assert not felt(post(x_m, 0.08), [0.0, 0.1, 0.2])
+    # Farther than it gets before it stands.
+    assert not felt(post(0.1 * STOPPING_S + 0.04, 0.08), [0.1, 0.0, 0.2])
+
+
+def test_a_thin_post_is_not_passed_over_between_two_places() -> None:
+    for x_m in np.arange(0.03, 0.05, 0.001):
+        assert felt(post(float(x_m), 0.08, half_m=0.001), [0.1, 0.0, 0.2])
+
+
+def test_a_post_that_a_turn_brings_into_the_way_is_felt() -> None:
+    """A turn about y by ω takes what lies ahead along z towards +x."""
+    assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2])
+    assert felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, 1.0, 0.0])
+    assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, -1.0, 0.0])
+
+
+def test_what_is_ahead_is_felt_as_before_by_who_drifts() -> None:
+    wall = Scene().add().box([0.0, 0.0, 0.15], [0.5, 0.5, 0.05]).objects()
+    straight, drifting = (first_ways(wall, [drift, 0.0, 0.2], [0.0, 0.0, 0.0])[1] for drift in (0.0, 0.1))
+    np.testing.assert_allclose(drifting, straight, atol=2e-4)
+
+
+def test_a_wall_that_is_drifted_along_or_towards_is_not_ahead() -> None:
+    wall = Scene().add().box([0.06, 0.0, 0.0], [0.05, 0.5, 0.5]).objects()
+    for drift in (0.1, -0.1, 0.0):
+        back, forth = first_ways(wall, [drift, 0.0, 0.2], [0.0, 0.0, 0.0])
+        assert back[0] > 0.1
+        assert forth[0] > 0.1
+
+
+# Objects that move by themselves
+
+
+def moving_wall(ahead_m: float, velocity: list[float]) -> PerceivedObjects:
+    wall = Scene().add().box([0.0, 0.0, RADIUS_M + ahead_m + 0.05], [0.5, 0.5, 0.05]).objects()
+    return replace(wall, velocities_m_s=np.array([velocity]))
+
+
+@pytest.mark.parametrize("speed_m_s", [0.02, 0.1, 0.3])
+def test_what_comes_nearer_shortens_its_ways_by_what_it_covers_until_the_arm_stands(speed_m_s: float) -> None:
+    still = first_ways(moving_wall(0.12, [0.0, 0.0, 0.0]), [0.0] * 3, [0.0] * 3)[1]
+    nearing = first_ways(moving_wall(0.12, [0.0, 0.0, -speed_m_s]), [0.0] * 3, [0.0] * 3)[1]
+    np.testing.assert_allclose(nearing, still - speed_m_s * STOPPING_S, atol=1e-6)
+    for away in ([0.0, 0.0, speed_m_s], [speed_m_s, 0.0, 0.0]):
+        np.testing.assert_allclose(first_ways(moving_wall(0.12, away), [0.0] * 3, [0.0] * 3)[1], still, atol=1e-9)
+
+
+def test_it_is_felt_from_beyond_the_reach() -> None:
+    """What stands there still is not: nobody gets so far."""
+    far_m = FULL_SPEED_M_S * STOPPING_S + 0.15
+    still, nearing = (
+        first_ways(moving_wall(far_m, [0.0, 0.0, -speed]), [0.0] * 3, [0.0] * 3)[1] for speed in (0.0, 0.4)
+    )
+    assert nearing[7] == pytest.approx(far_m - 0.4 * STOPPING_S, abs=0.012)
+    assert still[7] > nearing[7]
+
+
+def test_only_the_object_that_moves_comes_nearer() -> None:
+    scene = Scene().add().box([0.0, 0.0, 0.15], [0.5, 0.5, 0.05]).add().box([0.2, 0.0, 0.0], [0.05, 0.5, 0.5])
+    objects = scene.objects()
+    still = first_ways(objects, [0.0] * 3, [0.0] * 3)[1]
+    other = replace(objects, velocities_m_s=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -0.3]]))
+    np.testing.assert_allclose(first_ways(other, [0.0] * 3, [0.0] * 3)[1], still, atol=1e-9)
+
+
+@pytest.mark.parametrize("velocities", [np.zeros((2, 3)), np.full((1, 3), np.nan)])
+def test_velocities_that_cannot_be_are_refused(velocities: FloatArray) -> None:
+    with pytest.raises(ValueError, match=r"objects\.velocities_m_s"):
+        first_ways(replace(moving_wall(0.1, [0.0] * 3), velocities_m_s=velocities), [0.0] * 3, [0.0] * 3)
+
+
+# Fingers
+
+
+def test_what_the_fingers_close_towards_is_felt() -> None:
+    """Two fingers 80 mm apart that close at 70 mm/s, and a rod that stands 20 mm ahead of them, 20 mm inwards."""
+    objects, law = post(0.02, 0.03, half_m=0.003), swept()
+    for tick in range(12):
+        time_s = tick * FIELD_PERIOD_S
+        apart_m = 0.05 - 0.07 * time_s
+        pose = free_pose([[apart_m, 0.0, 0.0], [-apart_m, 0.0, 0.0]], [RADIUS_M, RADIUS_M])
+        sensed = law.sense(situation(pose, objects, loop_age_s=LOOP_S), time_s)
+        if tick == 0:
+            assert sensed.r2.fast_m[7] > 0.1
+    assert sensed.r2.fast_m[7] < 0.03
+
+
+def test_fingers_that_rest_do_not_move_however_their_readings_shake() -> None:
+    rng, fingers = np.random.default_rng(1), FingerMotion()
+    for tick in range(100):
+        centers = np.array([[0.05, 0.0, 0.0], [-0.05, 0.0, 0.0]]) + 5e-5 * rng.standard_normal((2, 3))
+        assert (fingers.see(free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01) == 0.0).all()
+
+
+# Places
+
+
+def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.0, 0.1]], [RADIUS_M, RADIUS_M])
+    for drift, turn in ((0.1, 0.0), (0.0, 0.5), (0.08, 0.2), (0.001, 0.0)):
+        sideways = Sideways(np.array([drift, 0.0, 0.0]), np.array([0.0, turn, 0.0]), np.zeros((2, 3)))
+        moments = sideways.moments(pose, 0.8)
+        if drift == 0.001:
+            assert moments == ()
+            continue
+        assert moments[-1] == pytest.approx(0.8)
+        centers = [pose.sphere_centers_m, *(sideways.moved(pose, moment).sphere_centers_m for moment in moments)]
+        # Along an arc the chord is shorter, and the arc about a moving point a little longer, than reckoned.
+        assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
+
+
+def test_a_turned_gripper_keeps_its_shape_and_looks_where_it_points() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.02, 0.1]], [RADIUS_M, RADIUS_M])
+    sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.5, 0.0]), np.zeros((2, 3)))
+    moved = sideways.moved(pose, 1.0)
+    np.testing.assert_allclose(moved.tool_position_m, pose.tool_position_m + np.array([0.1, 0.0, 0.0]))
+    np.testing.assert_allclose(moved.tool_rotation[:, 2], [np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
+    in_tool = [(one.sphere_centers_m - one.tool_position_m) @ one.tool_rotation for one in (pose, moved)]
+    np.testing.assert_allclose(in_tool[0], in_tool[1], atol=1e-12)

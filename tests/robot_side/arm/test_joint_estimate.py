@@ -1,0 +1,77 @@
+"""The estimate follows the truth without lag, and what is left of the noise is a fraction of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.arm.joint_estimate import JointEstimate
+from robot_side.arm.port import ArmState
+
+SIGMA = 2e-4
+
+
+def state(time_s: float, joints: FloatArray, velocities: FloatArray, fingers: FloatArray) -> ArmState:
+    return ArmState(time_s, joints, velocities, fingers, 0.08, gripper_holding=False)
+
+
+def errors_of(speed: float, finger_speed: float, count: int = 4000) -> tuple[FloatArray, FloatArray]:
+    """Errors (t,) of a joint and of a finger that move steadily, once the estimate has settled."""
+    rng, estimate, found = np.random.default_rng(5), JointEstimate(), []
+    for tick in range(count):
+        time_s = 1e-3 * tick
+        joint, finger = speed * time_s, 0.01 + finger_speed * time_s
+        read = np.array([joint, finger]) + SIGMA * rng.standard_normal(2)
+        seen = estimate.update(state(time_s, read[:1], np.array([speed]), read[1:]))
+        found.append((seen.joint_positions_rad[0] - joint, seen.finger_positions[0] - finger))
+    errors = np.array(found)[1000:]
+    return errors[:, 0], errors[:, 1]
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.7, -2.0])
+def test_noise_becomes_a_fraction_and_a_steady_motion_has_no_lag(speed: float) -> None:
+    joint, finger = errors_of(speed, 0.05 * speed)
+    assert joint.std() < SIGMA / 5.0
+    assert finger.std() < SIGMA / 3.0
+    assert abs(joint.mean()) < SIGMA / 20.0
+    assert abs(finger.mean()) < SIGMA / 20.0
+
+
+def test_a_change_of_speed_leaves_no_error_behind() -> None:
+    """The drive's velocity says it at once."""
+    estimate, joint = JointEstimate(), 0.0
+    for tick in range(1000):
+        velocity = 1.0 if tick > 500 else 0.0
+        joint += 1e-3 * velocity
+        seen = estimate.update(state(1e-3 * tick, np.array([joint]), np.array([velocity]), np.empty(0)))
+        assert abs(seen.joint_positions_rad[0] - joint) < 0.6e-3
+    assert seen.joint_positions_rad[0] == pytest.approx(joint, abs=1e-9)
+
+
+def test_a_state_that_was_seen_changes_nothing() -> None:
+    estimate = JointEstimate()
+    one = state(0.0, np.array([1.0]), np.zeros(1), np.zeros(1))
+    first = estimate.update(one)
+    again = replace(one, time_s=1e-3, joint_positions_rad=np.array([1.001]))
+    second = estimate.update(again)
+    assert estimate.update(again) is second
+    assert first.joint_positions_rad[0] < second.joint_positions_rad[0] < 1.001
+
+
+@pytest.mark.parametrize("gap_s", [0.1, 5.0, -1.0])
+def test_after_a_gap_or_a_jump_it_begins_anew(gap_s: float) -> None:
+    estimate = JointEstimate()
+    estimate.update(state(1.0, np.array([0.0]), np.array([1.0]), np.zeros(1)))
+    later = state(1.0 + gap_s, np.array([0.005]), np.array([1.0]), np.zeros(1))
+    assert estimate.update(later) is later
+    jumped = replace(later, time_s=later.time_s + 1e-3, joint_positions_rad=np.array([0.5]))
+    assert estimate.update(jumped) is jumped
+    unknown = replace(jumped, time_s=jumped.time_s + 1e-3, joint_positions_rad=np.array([np.nan]))
+    assert estimate.update(unknown) is unknown
+
+
+@pytest.mark.parametrize("time_constant_s", [0.0, -1.0, np.nan, np.inf])
+def test_a_time_constant_that_is_none_is_refused(time_constant_s: float) -> None:
+    with pytest.raises(ValueError, match=r"time_constant_s = .*; valid: finite and above 0"):
+        JointEstimate(time_constant_s)
