@@ -154,7 +154,7 @@ class Ahead:
         tables = self.tables
         reach_m = along.reach_m + self.margin_m
         on_finger = _as_indices(pose.sphere_on_finger)
-        meshes = _mesh_ways(scene, tables, spheres, along.direction, reach_m + self.margin_m)
+        meshes = _mesh_ways(scene, tables, spheres, along.direction, reach_m, self.margin_m)
         left = meetings
         for _ in range(_MOST_ROUNDS):
             known = int(found[RAMPS])
@@ -200,14 +200,14 @@ class Ahead:
 
 
 def _mesh_ways(
-    scene: SceneTable, tables: Tables, spheres: FloatArray, direction: FloatArray, reach_m: float
+    scene: SceneTable, tables: Tables, spheres: FloatArray, direction: FloatArray, reach_m: float, margin_m: float
 ) -> "MeshWays | None":
     if not scene.has_meshes:
         return None
     # A scene without meshes does not load the kernels for them.
     from robot_side.ahead.mesh_ways import MeshWays  # noqa: PLC0415
 
-    return MeshWays(scene, tables, spheres, direction, reach_m)
+    return MeshWays(scene, tables, spheres, direction, reach_m + margin_m, margin_m)
 
 
 def _spheres(pose: GripperPose) -> FloatArray:

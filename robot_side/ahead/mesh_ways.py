@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.ahead.kinds.mesh import Sweep, next_touch, way
+from robot_side.ahead.kinds.mesh import Sweep, most_rise, next_touch, way
 from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.tables import DONE, PAIR, RAMP, Record, Tables
 from robot_side.compiled.kernel import (
@@ -34,19 +34,25 @@ class _Placed(NamedTuple):
 
 
 _ARGUMENTS: Final = (
-    *(input_array(2), input_array(1), NUMBER, record_array(RAMP), record_array(PAIR), COUNT, COUNT),
+    *(input_array(2), input_array(1), NUMBER, NUMBER, record_array(RAMP), record_array(PAIR), COUNT, COUNT),
     *(input_indices(), *PLACED_ARGUMENTS, *MESH_ARGUMENTS),
 )
 
 
 class MeshWays:
-    """The kernels of this file for one look; spheres (m, 4), direction (3,)."""
+    """The kernels of this file for one look; spheres (m, 4), direction (3,), the margin over which strength grows."""
 
     def __init__(
-        self, scene: SceneTable, tables: Tables, spheres: FloatArray, direction: FloatArray, reach_m: float
+        self,
+        scene: SceneTable,
+        tables: Tables,
+        spheres: FloatArray,
+        direction: FloatArray,
+        reach_m: float,
+        margin_m: float,
     ) -> None:
         self._tables = tables
-        self._moving = spheres, direction, reach_m
+        self._moving = spheres, direction, reach_m, margin_m
         self._meshes = scene.rows_of_kind, *scene.placed_meshes
 
     def enter(self, new: slice) -> None:
@@ -76,20 +82,39 @@ def _sweep(placed: _Placed, place: int, start: Vector, along: Vector, radius: fl
 def _enter_ramp(
     ramp: Record, pairs: np.ndarray, start: Vector, along: Vector, reach: float, placed: _Placed, tables: MeshTables
 ) -> None:
-    """Fill in one ramp's entries and what they add up to."""
-    first, most = math.inf, 0.0
+    """Fill in one ramp's entries."""
+    ramp.start, ramp.most = math.inf, 0.0
     for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
         pair = pairs[k]
         if math.isnan(pair.entry):
             place = placed.rows[pair.row]
             sweep = _sweep(placed, place, start, along, ramp.radius, reach)
-            pair.entry, rise = way(tables, placed.index[place], sweep)
-            most += rise
-            pair.again = pair.entry
+            pair.entry = pair.again = way(tables, placed.index[place], sweep)
         else:
-            most = math.inf
-        first = min(first, pair.entry)
-    ramp.start, ramp.most = first, most
+            ramp.most = math.inf
+        ramp.start = min(ramp.start, pair.entry)
+
+
+@building_block
+def _bound_rise(
+    ramp: Record,
+    pairs: np.ndarray,
+    start: Vector,
+    along: Vector,
+    reach: float,
+    margin: float,
+    placed: _Placed,
+    tables: MeshTables,
+) -> None:
+    """Bound the rise of a ramp by those of its meshes, as far as that says which strengths it reaches."""
+    # What V(0) leans by is not known yet; it is at most the sphere's disc.
+    lean = math.pi * ramp.radius * ramp.radius if ramp.start == 0.0 else 0.0
+    enough = max(ramp.least, margin * lean)
+    for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
+        if pairs[k].entry <= reach and ramp.most < enough:
+            place = placed.rows[pairs[k].row]
+            sweep = _sweep(placed, place, start, along, ramp.radius, reach)
+            ramp.most += most_rise(tables, placed.index[place], sweep, enough - ramp.most)
 
 
 @compiled(*_ARGUMENTS)
@@ -97,6 +122,7 @@ def _enter(
     spheres: FloatArray,
     direction: FloatArray,
     reach: float,
+    margin: float,
     ramps: np.ndarray,
     pairs: np.ndarray,
     begin: int,
@@ -119,10 +145,13 @@ def _enter(
     along = load(direction.reshape(1, 3), 0)
     for k in range(begin, end):
         ramp = ramps[k]
-        _enter_ramp(ramp, pairs, load(spheres, ramp.sphere), along, reach, placed, tables)
+        start = load(spheres, ramp.sphere)
+        _enter_ramp(ramp, pairs, start, along, reach, placed, tables)
         # The uninflated sphere, which comes next, counts only beside one that overlaps already.
         if ramp.start == math.inf or (ramp.before > 0.0 and ramps[k - 1].start > 0.0):
             ramp.state = DONE
+        else:
+            _bound_rise(ramp, pairs, start, along, reach, margin, placed, tables)
 
 
 @compiled(*_ARGUMENTS)
@@ -130,6 +159,7 @@ def _look_again(
     spheres: FloatArray,
     direction: FloatArray,
     reach: float,
+    margin: float,
     ramps: np.ndarray,
     pairs: np.ndarray,
     begin: int,

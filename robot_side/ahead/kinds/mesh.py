@@ -23,6 +23,8 @@ from robot_side.overlap.meshes.tree_queries import (
 
 _ENLARGED: Final = 1.0 + 1e-9
 """Bounds are enlarged by this, so that rounding never passes over what is touched."""
+_EXACTLY: Final = 1e-2
+"""What is less than such a share of what is asked for need not be known exactly."""
 
 
 class Sweep(NamedTuple):
@@ -150,13 +152,20 @@ def _across(along: Vector) -> tuple[Vector, Vector]:
 
 
 @building_block
-def _most(tables: MeshTables, triangle: int, sweep: Sweep, basis: tuple[Vector, Vector]) -> float:
-    """By how much the overlap rises at most through a triangle: as much of the ball as passes through it, in m³."""
+def _most(tables: MeshTables, triangle: int, sweep: Sweep, basis: tuple[Vector, Vector], little: float) -> float:
+    """By how much the overlap rises at most through a triangle, in m³: as much of the ball as passes through it.
+
+    Where that is surely no more than `little`, just a bound on it.
+    """
     a = subtract(corner_of(tables, triangle, 0), sweep.start)
     b = subtract(corner_of(tables, triangle, 1), sweep.start)
     c = subtract(corner_of(tables, triangle, 2), sweep.start)
     if max(dot(a, sweep.along), dot(b, sweep.along), dot(c, sweep.along)) < -sweep.radius:
         return 0.0
+    normal = corner_of(tables, triangle, 3)
+    facing = -0.5 * dot(cross(subtract(b, a), subtract(c, a)), normal) * dot(normal, sweep.along)
+    if 2.0 * facing * sweep.radius <= little:
+        return 2.0 * facing * sweep.radius
     return ball_in_prism(
         (dot(a, basis[0]), dot(a, basis[1])),
         (dot(b, basis[0]), dot(b, basis[1])),
@@ -166,17 +175,11 @@ def _most(tables: MeshTables, triangle: int, sweep: Sweep, basis: tuple[Vector, 
 
 
 @building_block
-def way(tables: MeshTables, mesh: int, sweep: Sweep) -> tuple[float, float]:
-    """(the way at which the overlap begins to rise, 0 where there is one; the most by which it rises at all, in m³).
-
-    The way is infinite beyond the reach, and for a sphere that only leaves.
-    """
+def way(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
+    """The way at which the overlap begins to rise, 0 where there is one; infinite beyond the reach."""
     if overlaps(tables, mesh, sweep.start, sweep.radius):
-        return 0.0, _rise(tables, mesh, sweep)
-    found = next_touch(tables, mesh, sweep)
-    if found == math.inf:
-        return math.inf, 0.0
-    return max(found, LEAST_WAY_M), _rise(tables, mesh, sweep)
+        return 0.0
+    return max(next_touch(tables, mesh, sweep), LEAST_WAY_M)
 
 
 @building_block
@@ -197,17 +200,17 @@ def next_touch(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
 
 
 @building_block
-def _rise(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
-    """The most by which the overlap rises along the sweep, in m³."""
+def most_rise(tables: MeshTables, mesh: int, sweep: Sweep, enough: float) -> float:
+    """The most by which the overlap rises along the sweep, in m³; where that is more than `enough`, at least so much."""
     total, basis = 0.0, _across(sweep.along)
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
-    while node < end:
+    while node < end and total < enough:
         if _node_is_passed(tables, node, sweep):
             node = tables.links[3 * node]
             continue
         first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
         for triangle in range(first, first + size):
-            if not _is_passed(tables, triangle, sweep):
-                total += _most(tables, triangle, sweep, basis)
+            if total < enough and not _is_passed(tables, triangle, sweep):
+                total += _most(tables, triangle, sweep, basis, _EXACTLY * enough)
         node += 1
     return total

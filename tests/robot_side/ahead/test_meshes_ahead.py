@@ -106,7 +106,7 @@ def test_meshes_that_are_far_cost_no_kernel_call(monkeypatch: pytest.MonkeyPatch
     enter, overlap = mesh_ways._enter, mesh_kernels.overlap_loop
 
     def counted_enter(*arguments: Any) -> None:
-        begin, end = arguments[5:7]
+        begin, end = arguments[6:8]
         rows.append(end - begin)
         enter(*arguments)
 
