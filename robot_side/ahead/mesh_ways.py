@@ -28,13 +28,13 @@ class _Placed(NamedTuple):
     """Placed meshes as kernels read them, after the row of each primitive of the scene among them."""
 
     rows: IntArray
-    index: IntArray
+    meshes: IntArray
     positions: FloatArray
     rotations: FloatArray
 
 
 _ARGUMENTS: Final = (
-    *(input_array(2), input_array(1), NUMBER, NUMBER, record_array(RAMP), record_array(PAIR), COUNT, COUNT),
+    *(input_array(2), input_array(1), NUMBER, record_array(RAMP), record_array(PAIR), COUNT, COUNT),
     *(input_indices(), *PLACED_ARGUMENTS, *MESH_ARGUMENTS),
 )
 
@@ -52,12 +52,14 @@ class MeshWays:
         margin_m: float,
     ) -> None:
         self._tables = tables
-        self._moving = spheres, direction, reach_m, margin_m
+        self._moving = spheres, direction, reach_m
+        self._margin_m = margin_m
         self._meshes = scene.rows_of_kind, *scene.placed_meshes
 
     def enter(self, new: slice) -> None:
         """Fill in the entries of all pairs with a mesh among the `new` ramps, and what follows for these."""
-        _enter(*self._moving, self._tables.ramps, self._tables.pairs, new.start, new.stop, *self._meshes)
+        tables = self._tables
+        _enter(self._margin_m, *self._moving, tables.ramps, tables.pairs, new.start, new.stop, *self._meshes)
 
     def look_again(self, count: int) -> None:
         """Find out where the first `count` ramps may rise anew after the nodes that are being worked out."""
@@ -89,7 +91,7 @@ def _enter_ramp(
         if math.isnan(pair.entry):
             place = placed.rows[pair.row]
             sweep = _sweep(placed, place, start, along, ramp.radius, reach)
-            pair.entry = pair.again = way(tables, placed.index[place], sweep)
+            pair.entry = pair.again = way(tables, placed.meshes[place], sweep)
         else:
             ramp.most = math.inf
         ramp.start = min(ramp.start, pair.entry)
@@ -114,15 +116,15 @@ def _bound_rise(
         if pairs[k].entry <= reach and ramp.most < enough:
             place = placed.rows[pairs[k].row]
             sweep = _sweep(placed, place, start, along, ramp.radius, reach)
-            ramp.most += most_rise(tables, placed.index[place], sweep, enough - ramp.most)
+            ramp.most += most_rise(tables, placed.meshes[place], sweep, enough - ramp.most)
 
 
-@compiled(*_ARGUMENTS)
+@compiled(NUMBER, *_ARGUMENTS)
 def _enter(
+    margin: float,
     spheres: FloatArray,
     direction: FloatArray,
     reach: float,
-    margin: float,
     ramps: np.ndarray,
     pairs: np.ndarray,
     begin: int,
@@ -159,7 +161,6 @@ def _look_again(
     spheres: FloatArray,
     direction: FloatArray,
     reach: float,
-    margin: float,
     ramps: np.ndarray,
     pairs: np.ndarray,
     begin: int,
@@ -192,4 +193,4 @@ def _look_again(
                 place = placed.rows[pair.row]
                 start = add(load(spheres, ramp.sphere), scale(last, along))
                 left = _sweep(placed, place, start, along, ramp.radius, reach - last)
-                pair.again = last + next_touch(tables, placed.index[place], left)
+                pair.again = last + next_touch(tables, placed.meshes[place], left)

@@ -12,6 +12,7 @@ from robot_side.objects.perceived import PerceivedObjects
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
+
 @dataclass(frozen=True)
 class MeshBounds:
     """What contains each of m meshes, in its own frame: a box along the axes, and a sphere about the same middle."""

@@ -33,8 +33,8 @@ class SceneObject:
 class ObjectPrimitives:
     """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
 
-    A sphere, a box, a plane, a closed mesh and a height field are exact. A cylinder, a capsule and an ellipsoid stand for meshes
-    around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
+    A sphere, a box, a plane, a closed mesh and a height field are exact. A cylinder, a capsule and an ellipsoid stand
+    for meshes around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
     """
 
     def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:

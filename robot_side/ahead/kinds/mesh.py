@@ -73,7 +73,7 @@ def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep) -> bool:
     offset = subtract(load(tables.spheres, triangle), sweep.start)
     part = min(max(dot(offset, sweep.along), 0.0), sweep.reach)
     apart = subtract(offset, scale(part, sweep.along))
-    most = (tables.spheres[triangle, 3] + sweep.radius) * _ENLARGED + TOUCHING_M
+    most: float = (tables.spheres[triangle, 3] + sweep.radius) * _ENLARGED + TOUCHING_M
     return dot(apart, apart) > most * most
 
 
@@ -201,7 +201,7 @@ def next_touch(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
 
 @building_block
 def most_rise(tables: MeshTables, mesh: int, sweep: Sweep, enough: float) -> float:
-    """The most by which the overlap rises along the sweep, in m³; where that is more than `enough`, at least so much."""
+    """The most by which the overlap rises along the sweep, in m³, no farther than to where it is `enough`."""
     total, basis = 0.0, _across(sweep.along)
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
     while node < end and total < enough:

@@ -20,7 +20,7 @@ def _beyond(place: float, half_chord: float, distance: float, radius: float) -> 
 
 @building_block
 def _beside(start: Flat, end: Flat, radius: float) -> float:
-    """The ball's part, by its sign, in the prism of the triangle (centre, start, end): 2/3 ∫ (r³ - (r² - ρ²)^(3/2)) dφ."""
+    """The ball's part in the prism over (centre, start, end), by its sign: 2/3 ∫ (r³ - (r² - ρ²)^(3/2)) dφ."""
     x, y = end[0] - start[0], end[1] - start[1]
     length = math.sqrt(x * x + y * y)
     turned = start[0] * end[1] - start[1] * end[0]
