@@ -37,13 +37,15 @@ class Sweep(NamedTuple):
 
 
 @building_block
-def overlaps(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
-    """Whether a sphere overlaps a mesh, deeper than what only touches."""
-    if is_clear_of(tables, mesh, point, radius):
+def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
+    """Whether a sphere overlaps a mesh at its start, deeper than what only touches."""
+    if is_clear_of(tables, mesh, sweep.start, sweep.radius):
         return False
-    if touches_surface(tables, mesh, point, radius - TOUCHING_M):
+    if touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M):
         return True
-    return winding_number(tables, mesh, point) > 0
+    if is_clear_of(tables, mesh, sweep.start, 0.0):
+        return False
+    return winding_number(tables, mesh, sweep.start) > 0
 
 
 @building_block
@@ -166,10 +168,11 @@ def _most(tables: MeshTables, triangle: int, sweep: Sweep, basis: tuple[Vector, 
     facing = -0.5 * dot(cross(subtract(b, a), subtract(c, a)), normal) * dot(normal, sweep.along)
     if 2.0 * facing * sweep.radius <= little:
         return 2.0 * facing * sweep.radius
+    across, up, along = basis[0], basis[1], sweep.along
     return ball_in_prism(
-        (dot(a, basis[0]), dot(a, basis[1])),
-        (dot(b, basis[0]), dot(b, basis[1])),
-        (dot(c, basis[0]), dot(c, basis[1])),
+        (dot(a, across), dot(a, up), dot(a, along)),
+        (dot(b, across), dot(b, up), dot(b, along)),
+        (dot(c, across), dot(c, up), dot(c, along)),
         sweep.radius,
     )
 
@@ -177,7 +180,7 @@ def _most(tables: MeshTables, triangle: int, sweep: Sweep, basis: tuple[Vector, 
 @building_block
 def way(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
     """The way at which the overlap begins to rise, 0 where there is one; infinite beyond the reach."""
-    if overlaps(tables, mesh, sweep.start, sweep.radius):
+    if overlaps(tables, mesh, sweep):
         return 0.0
     return max(next_touch(tables, mesh, sweep), LEAST_WAY_M)
 

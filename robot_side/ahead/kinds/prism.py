@@ -3,6 +3,7 @@
 import math
 
 from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector
 
 Flat = tuple[float, float]
 """A point across the prism, from the ball's centre."""
@@ -37,7 +38,34 @@ def _beside(start: Flat, end: Flat, radius: float) -> float:
     return math.copysign(2.0 / 3.0 * part, turned)
 
 
+@inlined
+def _flat(point: Vector) -> Flat:
+    return point[0], point[1]
+
+
 @building_block
-def ball_in_prism(a: Flat, b: Flat, c: Flat, radius: float) -> float:
-    """The volume (m³) that a ball about the origin has in common with the endless prism over the triangle abc (m)."""
-    return abs(_beside(a, b, radius) + _beside(b, c, radius) + _beside(c, a, radius))
+def ball_in_prism(a: Vector, b: Vector, c: Vector, radius: float) -> float:
+    """The volume (m³) that a ball about the origin has in common with an endless prism along z.
+
+    The prism is that over the part of the triangle abc (m) with z >= -radius, which the ball has not passed yet.
+    """
+    total, corners = 0.0, 0
+    first, last = (0.0, 0.0), (0.0, 0.0)
+    for side in range(3):
+        start, end = (a if side == 0 else b if side == 1 else c), (b if side == 0 else c if side == 1 else a)
+        above, end_above = start[2] + radius, end[2] + radius
+        for crossing in range(2):
+            if crossing == 0 and above >= 0.0:
+                corner = _flat(start)
+            elif crossing == 1 and above * end_above < 0.0:
+                share = above / (above - end_above)
+                corner = start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
+            else:
+                continue
+            if corners == 0:
+                first = corner
+            else:
+                total += _beside(last, corner, radius)
+            last = corner
+            corners += 1
+    return abs(total + _beside(last, first, radius))

@@ -138,7 +138,8 @@ def test_walls_that_lean_in_are_entered_and_walls_that_lead_away_are_not() -> No
 
 @compiled(*([NUMBER] * 7), returns=NUMBER)
 def _prism(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, radius: float) -> float:
-    return ball_in_prism((ax, ay), (bx, by), (cx, cy), radius)
+    # All but a third of the way along the first corner's sides lies behind the ball.
+    return ball_in_prism((ax, ay, 1.0 - radius), (bx, by, -2.0 - radius), (cx, cy, -2.0 - radius), radius)
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -147,9 +148,10 @@ def test_the_ball_in_a_prism_is_what_a_grid_counts(seed: int) -> None:
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(3, 2)) * rng.choice([0.2, 1.0, 4.0]) + rng.normal(size=2) * 0.5
     x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 801)] * 2)
+    ahead = corners[0] + (corners - corners[0]) / 3.0
     signs = [
         (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) > 0.0
-        for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+        for p, q in zip(ahead, np.roll(ahead, -1, axis=0), strict=True)
     ]
     inside = (signs[0] == signs[1]) & (signs[1] == signs[2])
     expected = float((2.0 * np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0)) * inside).sum()) * 0.0025**2
