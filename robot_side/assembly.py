@@ -117,14 +117,16 @@ def _notes(scene: Scene) -> tuple[str, ...]:
         for name in scene.shared_names[:_NAMED_OBJECTS]
     ]
     if scene.volume_errors:
-        largest_first = sorted(scene.volume_errors.items(), key=lambda item: -item[1])
+        largest_first = sorted(scene.stands_out_m.items(), key=lambda item: -item[1])
         shown = [
-            f"{name} by {100.0 * error:.1f} %" if math.isfinite(error) else f"{name} as its convex hull or bounding box"
-            for name, error in largest_first[:_NAMED_OBJECTS]
+            f"{name} by {1e3 * reach_m:.2f} mm ({100.0 * scene.volume_errors[name]:.1f} % of its volume)"
+            if math.isfinite(reach_m)
+            else f"{name} as its convex hull or bounding box"
+            for name, reach_m in largest_first[:_NAMED_OBJECTS]
         ]
         if len(largest_first) > len(shown):
             shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
-        notes.append(f"perceived larger than they are (in volume): {', '.join(shown)}")
+        notes.append(f"perceived larger than they are, at most: {', '.join(shown)}")
     return tuple(notes)
 
 

@@ -44,6 +44,10 @@ NOTHING: Final = 1e-9
 """Shares of the sphere's volume, and of its disc per metre of way, below which a change is rounding."""
 
 
+_ENLARGED: Final = 1.0 + 1e-6
+"""What bounds a rise is enlarged by this, so that rounding never hides a strength."""
+
+
 @building_block
 def add_to_node(ramp: Record, node: int, volume: float, gradient: Vector, along: Vector) -> None:
     """Add one primitive's overlap to a node; only of the last node it is kept how much still rises."""
@@ -61,13 +65,23 @@ def add_to_node(ramp: Record, node: int, volume: float, gradient: Vector, along:
 
 
 @inlined
+def most_strength(ramp: Record, margin: float) -> int:
+    """How many of the strengths a ramp could reach at all."""
+    share = ramp.most * _ENLARGED / max(margin * ramp.lean, ramp.least)
+    return STRENGTHS if share >= 1.0 else int(STRENGTHS * share + 0.5)
+
+
+@inlined
 def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) -> bool:
     """Whether a ramp could still shorten a way: nothing of it is felt before it begins, less the margin."""
+    strength = most_strength(ramp, margin)
+    if strength == 0:
+        return False
     begins: float = ramp.start - margin - ramp.before
-    in_slow_zones: bool = begins < slow[STRENGTHS - 1]
+    in_slow_zones: bool = begins < slow[strength - 1]
     if ramp.touchable:
-        in_slow_zones = begins + ramp.expected < slow[TOUCH_STRENGTH - 1]
-    return in_slow_zones or bool(begins < fast[STRENGTHS - 1])
+        in_slow_zones = begins + ramp.expected < slow[min(strength, TOUCH_STRENGTH) - 1]
+    return in_slow_zones or bool(begins < fast[strength - 1])
 
 
 @building_block

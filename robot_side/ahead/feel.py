@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.ahead.ask import NOTHING, add_to_node
+from robot_side.ahead.ask import NOTHING, add_to_node, most_strength
 from robot_side.ahead.nodes import ends
 from robot_side.ahead.tables import DONE, FIRST, GOING, JOB, PAIR, RAMP, STRENGTHS, TOUCH_STRENGTH, Record
 from robot_side.compiled.kernel import (
@@ -73,26 +73,27 @@ def _begin_to_rise(ramp: Record) -> bool:
 
 
 @building_block
-def _to_come(ramp: Record, pairs: np.ndarray, concave: IntArray) -> tuple[float, bool]:
+def _to_come(ramp: Record, pairs: np.ndarray) -> tuple[float, bool]:
     """The way at which the ramp's next primitive is entered, and whether the overlap may rise before that.
 
     What is convex and does not rise any more never does again.
     """
-    last = ramp.nodes - 1
+    last = ramp.way[ramp.nodes - 1]
     entered, may_rise = math.inf, ramp.rising > NOTHING * math.pi * ramp.radius * ramp.radius
     for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
-        if pairs[k].entry > ramp.way[last]:
-            entered = min(entered, pairs[k].entry)
+        comes = pairs[k].entry if pairs[k].entry > last else pairs[k].again
+        if comes > last:
+            entered = min(entered, comes)
         else:
-            may_rise |= concave[pairs[k].row] != 0
+            may_rise = True
     return entered, may_rise
 
 
 @building_block
-def _go_on(ramp: Record, pairs: np.ndarray, concave: IntArray) -> None:
+def _go_on(ramp: Record, pairs: np.ndarray) -> None:
     """Move the first node to where V could begin to exceed V(0), past all ways on which it surely does not."""
     last = ramp.nodes - 1
-    entered, may_rise = _to_come(ramp, pairs, concave)
+    entered, may_rise = _to_come(ramp, pairs)
     if not may_rise:
         ramp.nodes, ramp.start = 0, entered
         if entered == math.inf:
@@ -107,7 +108,7 @@ def _go_on(ramp: Record, pairs: np.ndarray, concave: IntArray) -> None:
 
 @building_block
 def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
-    """Shorten the ways by one ramp; whether it has reached full strength."""
+    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
     full_from = ramp.free + margin
     top = 0.0
     for node in range(ramp.nodes - 1):
@@ -135,7 +136,7 @@ def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) ->
                     slow[level] = min(slow[level], found + ramp.expected)
                 level += 1
             before, reached = way, strength
-    return level == STRENGTHS
+    return bool(level >= most_strength(ramp, margin))
 
 
 @inlined
@@ -149,13 +150,12 @@ def _take_first(ramp: Record) -> None:
 
 
 @compiled(
-    *(input_array(1), input_indices(), record_array(RAMP), record_array(PAIR), COUNT),
+    *(input_array(1), record_array(RAMP), record_array(PAIR), COUNT),
     *(NUMBER, NUMBER, output_array(1), output_array(1)),
     *(input_indices(), record_array(JOB), input_array(1), input_array(2)),
 )
 def take(
     direction: FloatArray,
-    concave: IntArray,
     ramps: np.ndarray,
     pairs: np.ndarray,
     count: int,
@@ -184,13 +184,13 @@ def take(
         if ramp.state == FIRST:
             _take_first(ramp)
         if math.isnan(ramp.free) and not _begin_to_rise(ramp):
-            _go_on(ramp, pairs, concave)
+            _go_on(ramp, pairs)
             if ramp.start >= reach:
                 ramp.state = DONE
         elif ramp.nodes > 1:
             ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
             if ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9):
                 full = _shorten(ramp, margin, fast, slow)
-                entered, may_rise = _to_come(ramp, pairs, concave)
+                entered, may_rise = _to_come(ramp, pairs)
                 if full or ended or (entered == math.inf and not may_rise):
                     ramp.state = DONE

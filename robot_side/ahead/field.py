@@ -1,7 +1,7 @@
 """The field along one direction: the ways at which the eight strengths begin."""
 
 from dataclasses import dataclass, field
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -10,11 +10,13 @@ from robot_side.ahead.ask import ask
 from robot_side.ahead.feel import take
 from robot_side.ahead.find import find
 from robot_side.ahead.meet import COUNTED, LIMITED, RAMPS, meet
-from robot_side.ahead.mesh_ways import find_mesh_ways
 from robot_side.ahead.overlaps import work_out
 from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.tables import STRENGTHS, Tables
 from robot_side.arm.port import GripperPose
+
+if TYPE_CHECKING:
+    from robot_side.ahead.mesh_ways import MeshWays
 
 MARGIN_M = 0.012
 """m: over this way before the one at which full strength is due, strength grows."""
@@ -166,6 +168,7 @@ class Ahead:
         tables = self.tables
         reach_m = along.reach_m + self.margin_m
         on_finger = _as_indices(pose.sphere_on_finger)
+        meshes = _mesh_ways(scene, tables, spheres, along.direction, reach_m, self.margin_m)
         left = meetings
         for _ in range(_MOST_ROUNDS):
             known = int(found[RAMPS])
@@ -191,8 +194,8 @@ class Ahead:
                     tables.near,
                     found,
                 )
-                if scene.has_meshes:
-                    find_mesh_ways(tables, slice(known, int(found[RAMPS])), scene, spheres, along.direction, reach_m)
+                if meshes is not None:
+                    meshes.enter(slice(known, int(found[RAMPS])))
                 if left < 0:
                     tables.grow()
                     continue
@@ -205,8 +208,21 @@ class Ahead:
             if asked == 0 and left == 0:
                 return
             self.counts.overlaps += work_out(jobs, scene)
+            if meshes is not None:
+                meshes.look_again(int(found[RAMPS]))
             done = jobs.columns
-            take(along.direction, scene.concave, *of_ramps, done.counts, done.owners, done.volumes, done.gradients)
+            take(along.direction, *of_ramps, done.counts, done.owners, done.volumes, done.gradients)
+
+
+def _mesh_ways(
+    scene: SceneTable, tables: Tables, spheres: FloatArray, direction: FloatArray, reach_m: float, margin_m: float
+) -> "MeshWays | None":
+    if not scene.has_meshes:
+        return None
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.ahead.mesh_ways import MeshWays  # noqa: PLC0415
+
+    return MeshWays(scene, tables, spheres, direction, reach_m + margin_m, margin_m)
 
 
 def _spheres(pose: GripperPose) -> FloatArray:

@@ -58,7 +58,7 @@ def _meet(
             continue
         pair = search.pairs[found[PAIRS]]
         # A mesh's own way is found out afterwards.
-        pair.row, pair.bound, pair.entry = row, way, math.nan if kind == MESH else way
+        pair.row, pair.entry, pair.again = row, math.nan if kind == MESH else way, math.inf
         found[PAIRS] += 1
         start = min(start, way)
         touching |= way == 0.0
@@ -68,6 +68,7 @@ def _meet(
     found[RAMPS] += 1
     ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
     ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
+    ramp.most, ramp.lean = math.inf, 0.0
     return touching
 
 

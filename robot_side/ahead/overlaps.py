@@ -35,18 +35,9 @@ def _exactly(overlap: Compiled, precise: Compiled, jobs: Jobs, part: slice, shap
 
 def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
     # A scene without meshes does not load the kernels for them.
-    from robot_side.overlap.meshes.mesh_library import mesh_pairs  # noqa: PLC0415
+    from robot_side.overlap.meshes.mesh_kernels import overlap_loop  # noqa: PLC0415
 
-    objects = scene.objects
-    if objects.mesh_library is None:
-        raise ValueError("jobs name meshes although the scene has no library of them")
-    part = slice(MESH_JOBS * jobs.room, MESH_JOBS * jobs.room + count)
-    rows = scene.rows_of_kind.take(jobs.columns.owners["row"][part])
-    jobs.columns.volumes[part], jobs.columns.gradients[part], _ = mesh_pairs(
-        jobs.columns.centers[part],
-        jobs.columns.radii[part],
-        objects.mesh_library,
-        objects.mesh_index.take(rows),
-        objects.mesh_positions_m.take(rows, axis=0),
-        objects.mesh_rotations.take(rows, axis=0),
-    )
+    columns, part = jobs.columns, slice(MESH_JOBS * jobs.room, MESH_JOBS * jobs.room + count)
+    placed = scene.rows_of_kind.take(columns.owners["row"][part])
+    results = columns.volumes[part], columns.gradients[part], jobs.areas[part], jobs.unsettled[:count]
+    overlap_loop(columns.centers[part], columns.radii[part], placed, *scene.placed_meshes, *results)

@@ -44,8 +44,6 @@ class SceneTable:
     """(n, 15) as the files of `kinds` lay them out; of meshes the boxes around them"""
     kinds: IntArray
     """(n,)"""
-    concave: IntArray
-    """(n,) 1 for a mesh that is not convex, else 0"""
     rows_of_kind: IntArray
     """(n,) each primitive's row in the arrays of its kind in `objects`"""
     first_rows: IntArray
@@ -73,6 +71,14 @@ class SceneTable:
     def has_meshes(self) -> bool:
         """Whether any primitive is a mesh."""
         return len(self.objects.mesh_object) > 0
+
+    @cached_property
+    def placed_meshes(self) -> tuple[np.ndarray, ...]:
+        """What kernels read of meshes: which there are, where they are, and the library's tables; () for none."""
+        objects = self.objects
+        if objects.mesh_library is None:
+            return ()
+        return objects.mesh_index, objects.mesh_positions_m, objects.mesh_rotations, *objects.mesh_library.tables
 
 
 _KEPT: Final = 8
@@ -116,7 +122,6 @@ def _make(objects: PerceivedObjects) -> SceneTable:
         bounds=bounds,
         shapes=shapes[order],
         kinds=kinds[order],
-        concave=np.concatenate([np.zeros(sum(counts[:MESH]), dtype=np.int64), _concave_meshes(objects)])[order],
         rows_of_kind=np.concatenate([np.arange(count) for count in counts])[order],
         first_rows=first_rows,
         object_bounds=_around(bounds, first_rows),
@@ -129,12 +134,6 @@ def _mesh_volumes(objects: PerceivedObjects) -> FloatArray:
     if objects.mesh_library is None:
         return np.empty(0)
     return objects.mesh_library.tables.volumes.take(objects.mesh_index)
-
-
-def _concave_meshes(objects: PerceivedObjects) -> IntArray:
-    if objects.mesh_library is None:
-        return np.empty(0, dtype=np.int64)
-    return (~mesh_bounds(objects.mesh_library).convex.take(objects.mesh_index)).astype(np.int64)
 
 
 def _mesh_boxes(objects: PerceivedObjects) -> FloatArray:

@@ -41,6 +41,7 @@ RAMP: Final = np.dtype(
         ("lean", np.float64),
         ("least", np.float64),
         ("rising", np.float64),
+        ("most", np.float64),
         ("way", np.float64, (NODES,)),
         ("volume", np.float64, (NODES,)),
         ("slope", np.float64, (NODES,)),
@@ -50,12 +51,13 @@ RAMP: Final = np.dtype(
 """One ramp. radius: of the sphere, inflated. before: how much earlier it counts: by the object's coming
 nearer, and D_σ for a sphere that is not inflated.
 expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this way. free: d; NaN while not known. floor: V(0).
-lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise add to the slope at the last node."""
+lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise add to the slope at the last node. most: by so
+much the overlap rises at most; infinite where nobody has worked that out."""
 
-PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("bound", np.float64)])
-"""A primitive's row in the scene, and the way at which the ramp's sphere touches it first: NaN for a mesh, of which it
-is only known that the way is no shorter than `bound`."""
-
+PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("again", np.float64)])
+"""A primitive's row in the scene, and the way at which the ramp's sphere begins to enter it: NaN for a mesh until that
+is found out. again: where it may begin to enter it anew, after the last node, that way itself for at once; infinite
+for what is convex, into which only what rises goes on to rise."""
 
 JOB: Final = np.dtype([("ramp", np.int64), ("node", np.int64), ("row", np.int64)])
 """Whose an overlap is, and of which of the scene's rows."""

@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects
 
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
-
-_SAME_VOLUME = 1e-6
-"""Vertices in single precision leave a convex solid with dents of such a share."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,6 @@ class MeshBounds:
     """(m, 3)"""
     radii_m: FloatArray
     """(m,)"""
-    convex: BoolArray
-    """(m,) whether it is its own convex hull, but for a millionth of its volume"""
 
 
 _bounds: "weakref.WeakKeyDictionary[MeshLibrary, MeshBounds]" = weakref.WeakKeyDictionary()
@@ -59,20 +54,4 @@ def _work_out(library: "MeshLibrary") -> MeshBounds:
     corners = tables.triangles[:, :9].reshape(-1, 3, 3)
     counts = np.diff(first_triangles, append=len(corners))
     apart = np.linalg.norm(corners - np.repeat(middles, counts, axis=0)[:, None, :], axis=2).max(axis=1)
-    of_meshes = np.split(corners, first_triangles[1:])
-    convex = [_is_convex(mesh.reshape(-1, 3), volume) for mesh, volume in zip(of_meshes, tables.volumes, strict=True)]
-    return MeshBounds(
-        middles, 0.5 * (highest - lowest), np.maximum.reduceat(apart, first_triangles), np.array(convex, dtype=np.bool_)
-    )
-
-
-def _is_convex(corners_m: FloatArray, volume_m3: float) -> bool:
-    # A scene without meshes does not load it.
-    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
-
-    try:
-        hull = ConvexHull(np.unique(corners_m, axis=0))
-    except QhullError:
-        # It has no extent in some direction, and so nothing to overlap.
-        return False
-    return bool(hull.volume <= volume_m3 * (1.0 + _SAME_VOLUME))
+    return MeshBounds(middles, 0.5 * (highest - lowest), np.maximum.reduceat(apart, first_triangles))

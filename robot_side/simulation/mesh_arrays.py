@@ -1,4 +1,4 @@
-"""The surface of a mesh geom, out of the arrays in which a compiled MuJoCo model keeps all meshes."""
+"""The surfaces of mesh geoms and height fields, out of the arrays in which a compiled MuJoCo model keeps them all."""
 
 from typing import Any
 
@@ -21,3 +21,35 @@ def mesh_triangles(model: Any, geom: int) -> IntArray:
     first = int(model.mesh_faceadr[mesh])
     triangles: IntArray = model.mesh_face[first : first + int(model.mesh_facenum[mesh])].astype(np.int64)
     return triangles
+
+
+def height_field_surface(model: Any, geom: int) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) in m, in the geom's frame, and triangles (t, 3) of the solid between a height field and its base.
+
+    As MuJoCo collides it: each cell is two triangles, which share the diagonal from its least to its greatest x and y.
+    """
+    field = int(model.geom_dataid[geom])
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    half_x, half_y, height, base = model.hfield_size[field].tolist()
+    first = int(model.hfield_adr[field])
+    elevations = model.hfield_data[first : first + rows * columns].astype(np.float64)
+    y, x = np.meshgrid(np.linspace(-half_y, half_y, rows), np.linspace(-half_x, half_x, columns), indexing="ij")
+    top = np.column_stack([x.ravel(), y.ravel(), height * elevations])
+    numbers = np.arange(rows * columns).reshape(rows, columns)
+    here, right = numbers[:-1, :-1].ravel(), numbers[:-1, 1:].ravel()
+    beyond, across = numbers[1:, :-1].ravel(), numbers[1:, 1:].ravel()
+    # Around the field, anticlockwise as seen from above; below each of these a vertex of the base, and one amid it.
+    rim = np.concatenate([numbers[0, :-1], numbers[:-1, -1], numbers[-1, :0:-1], numbers[:0:-1, 0]])
+    bottom = top[rim] * [1.0, 1.0, 0.0] - [0.0, 0.0, base]
+    below = len(top) + np.arange(len(rim))
+    next_rim, next_below = np.roll(rim, -1), np.roll(below, -1)
+    amid = np.full(len(rim), len(top) + len(rim))
+    triangles = [
+        *((here, right, across), (here, across, beyond)),
+        *((below, next_below, next_rim), (below, next_rim, rim)),
+        (amid, next_below, below),
+    ]
+    return (
+        np.concatenate([top, bottom, [[0.0, 0.0, -base]]]),
+        np.concatenate([np.column_stack(corners) for corners in triangles]),
+    )

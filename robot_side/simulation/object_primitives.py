@@ -14,9 +14,10 @@ from robot_side.simulation.model_enums import GeomKind
 
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
+    from robot_side.simulation.geom_meshes import GeomMesh
 
 _EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
-_MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH}
+_MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
 """What a mesh describes, unless it is a tetrahedron."""
 
 
@@ -32,8 +33,8 @@ class SceneObject:
 class ObjectPrimitives:
     """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
 
-    A sphere, a box, a plane and a closed mesh are exact. A cylinder, a capsule and an ellipsoid stand for meshes
-    around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
+    A sphere, a box, a plane, a closed mesh and a height field are exact. A cylinder, a capsule and an ellipsoid stand
+    for meshes around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
     """
 
     def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:
@@ -48,16 +49,21 @@ class ObjectPrimitives:
         self._mesh_library, meshes, boxes = _meshes(model, [geom for geom, _ in wanted])
         of_kind["box"] += [(geom, index) for geom, index in wanted if geom in boxes]
         of_kind["mesh"] = [(geom, index) for geom, index in wanted if geom in meshes]
-        errors: dict[str, float] = {}
+        volume_errors: dict[str, float] = {}
+        stands_out_m: dict[str, float] = {}
         for geom, index in wanted:
-            error = meshes[geom][1] if geom in meshes else math.inf
-            if error > 0.0:
-                errors[self._names[index]] = max(error, errors.get(self._names[index], 0.0))
-        self.volume_errors: Mapping[str, float] = errors
+            name, mesh = self._names[index], meshes[geom][1] if geom in meshes else None
+            if mesh is None or mesh.volume_error > 0.0:
+                share, distance_m = (mesh.volume_error, mesh.stands_out_m) if mesh else (math.inf, math.inf)
+                volume_errors[name] = max(share, volume_errors.get(name, 0.0))
+                stands_out_m[name] = max(distance_m, stands_out_m.get(name, 0.0))
+        self.volume_errors: Mapping[str, float] = volume_errors
         """Of each object that is seen larger than it is, the greatest share by which a part's volume is greater.
 
         Infinite for what has no known volume of its own, and stands for its convex hull or bounding box.
         """
+        self.stands_out_m: Mapping[str, float] = stands_out_m
+        """And how far what is seen of it reaches beyond it, at most."""
 
         self._sphere_geoms, self._sphere_object = _columns(of_kind["sphere"])
         self._radii_m: FloatArray = model.geom_size[self._sphere_geoms, 0].copy()
@@ -144,8 +150,8 @@ def _primitive_kind(model: Any, geom: int) -> str | None:
 
 def _meshes(
     model: Any, geoms: Sequence[int]
-) -> tuple["MeshLibrary | None", dict[int, tuple[int, float]], frozenset[int]]:
-    """The library, (mesh index, volume error) of each geom that has a mesh, and the geoms that have none."""
+) -> tuple["MeshLibrary | None", dict[int, tuple[int, "GeomMesh"]], frozenset[int]]:
+    """The library, (mesh index, mesh) of each geom that has a mesh, and the geoms that have none."""
     candidates = [geom for geom in geoms if int(model.geom_type[geom]) in _MESHES]
     if not candidates:
         return None, {}, frozenset(geoms)

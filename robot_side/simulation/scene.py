@@ -56,6 +56,11 @@ class Scene:
         """How much larger `approximated` objects are perceived, see `ObjectPrimitives.volume_errors`."""
         return self.primitives.volume_errors
 
+    @property
+    def stands_out_m(self) -> Mapping[str, float]:
+        """How far what is perceived of these reaches beyond them, see `ObjectPrimitives.stands_out_m`."""
+        return self.primitives.stands_out_m
+
 
 def load_scene(
     model_path: Path | None = None, site: str | None = None, roles: Mapping[str, Role] | None = None

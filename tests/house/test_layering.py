@@ -41,6 +41,7 @@ ARROWS = """
     robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/objects: common robot_side/compiled robot_side/overlap/meshes
     robot_side/ahead/kinds: common robot_side/compiled robot_side/objects robot_side/overlap/closed_forms
+        robot_side/overlap/meshes
     robot_side/ahead: common common/protocol robot_side/ahead/kinds robot_side/arm robot_side/compiled
         robot_side/enlargement robot_side/objects robot_side/overlap/lanes robot_side/overlap/meshes
         robot_side/overlap/precise

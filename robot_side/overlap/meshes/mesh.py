@@ -80,9 +80,9 @@ class Mesh:
         count = len(rows[1])
         volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
         touched = np.empty(count, dtype=np.int64)
-        mesh_index, positions = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
-        rotations = np.ascontiguousarray(np.broadcast_to(np.eye(3), (count, 3, 3)))
-        overlap_loop(*rows, mesh_index, positions, rotations, *self.tables, volumes, gradients, areas, touched)
+        nowhere = np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.eye(3)[None]
+        everywhere = np.zeros(count, dtype=np.int64)
+        overlap_loop(*rows, everywhere, *nowhere, *self.tables, volumes, gradients, areas, touched)
         results = volumes.reshape(shape), gradients.reshape(*shape, 3), areas.reshape(shape)
         return results, touched.reshape(shape)
 

@@ -28,6 +28,8 @@ MESH_ARGUMENTS = (
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
 )
 """The Numba types of the fields of `MeshTables`."""
+PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
+"""Those of placed meshes: their indices (q,), positions (q, 3) and rotations (q, 3, 3)."""
 
 _ON_SURFACE = 1e-12
 """A point is on the surface within this share of the mesh's size: its side is then the nearest triangle's."""
@@ -61,13 +63,14 @@ def _to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
 
 
 @compiled(
-    *(input_array(2), input_array(1), input_indices(), input_array(2), input_array(3)),
+    *(input_array(2), input_array(1), input_indices(), *PLACED_ARGUMENTS),
     *MESH_ARGUMENTS,
     *(output_array(1), output_array(2), output_array(1), output_indices()),
 )
 def overlap_loop(
     centers: FloatArray,
     radii: FloatArray,
+    placed: IntArray,
     mesh_index: IntArray,
     positions: FloatArray,
     rotations: FloatArray,
@@ -83,21 +86,25 @@ def overlap_loop(
     areas: FloatArray,
     touched: IntArray,
 ) -> None:
-    """Fill volumes, gradients (in the world's frame), areas, and how many triangles each pair evaluated."""
+    """Fill volumes, gradients (in the world's frame), areas, and how many triangles each pair evaluated.
+
+    placed (p,): which of the placed meshes, rows of the three arrays that follow, each sphere is paired with.
+    """
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     near, scratch = np.empty(len(triangles) + 1, np.int64), np.empty(SCRATCH)
     for pair in range(radii.size):
-        mesh, radius = mesh_index[pair], radii[pair]
-        away = subtract(load(centers, pair), load(positions, pair))
-        turned = rotations[pair].T
+        place, radius = placed[pair], radii[pair]
+        mesh = mesh_index[place]
+        away = subtract(load(centers, pair), load(positions, place))
+        turned = rotations[place].T
         rounded = dot(load(turned, 0), away), dot(load(turned, 1), away), dot(load(turned, 2), away)
         if is_clear_of(tables, mesh, rounded, radius):
             volumes[pair], areas[pair], touched[pair] = 0.0, 0.0, 0
             gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = 0.0, 0.0, 0.0
             continue
-        center = _to_mesh(load(centers, pair), positions, rotations, pair)
+        center = _to_mesh(load(centers, pair), positions, rotations, place)
         overlap, count = mesh_overlap(center, radius, tables, mesh, near, scratch)
-        gradient = _to_world(rotations, pair, overlap[1])
+        gradient = _to_world(rotations, place, overlap[1])
         volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
         gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient
 
@@ -121,7 +128,7 @@ def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
 
 
 @compiled(
-    *(input_array(2), input_indices(), input_array(2), input_array(3)),
+    *(input_array(2), *PLACED_ARGUMENTS),
     *MESH_ARGUMENTS,
     *(output_array(1), output_array(2)),
 )

@@ -42,8 +42,8 @@ def mesh_pairs(
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
     touched = np.empty(count, dtype=np.int64)
-    arrays = centers, radii, mesh_index, positions, rotations
-    overlap_loop(*arrays, *library.tables, volumes, gradients, areas, touched)
+    arrays = mesh_index, positions, rotations
+    overlap_loop(centers, radii, np.arange(count), *arrays, *library.tables, volumes, gradients, areas, touched)
     return volumes, gradients, areas
 
 

@@ -1,8 +1,9 @@
-"""Closed meshes around round solids, never smaller than these, with a bound on the volume they add; convex hulls.
+"""Closed meshes around round solids, never smaller than these, with bounds on what they add; convex hulls.
 
-Each function returns (vertices (v, 3) in m, triangles (t, 3), excess): the solid lies within the mesh, whose volume is
-greater by at most the share `excess` of the solid's. Rounding may move a vertex by its last digit.
+Rounding may move a vertex by its last digit.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +12,19 @@ from scipy.spatial import ConvexHull, QhullError
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.checks.arguments import lengths, numbers
 
-ShapeMesh = tuple[FloatArray, IntArray, float]
-"""(vertices (v, 3), triangles (t, 3), greatest share of the solid's volume by which the mesh's is greater)."""
+
+class ShapeMesh(NamedTuple):
+    """A mesh within which a solid lies."""
+
+    vertices: FloatArray
+    """(v, 3) in m"""
+    triangles: IntArray
+    """(t, 3)"""
+    excess: float
+    """The share of the solid's volume by which the mesh's is greater, at most."""
+    stands_out_m: float
+    """How far any point of the mesh is from the solid, at most."""
+
 
 _LEAST_SEGMENTS = 3
 
@@ -31,7 +43,7 @@ def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> Shap
     ends = [np.column_stack([ring, np.full(segments, z)]) for z in (-half_length, half_length)]
     excess = segments / np.pi * np.tan(np.pi / segments) - 1.0
     vertices = np.concatenate(ends)
-    return vertices, _outward_hull(vertices), float(excess)
+    return ShapeMesh(vertices, _outward_hull(vertices), float(excess), float(reach - radius))
 
 
 def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh:
@@ -44,8 +56,8 @@ def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh
     axes = lengths("semi_axes", semi_axes).values
     if axes.shape != (3,) or not np.all(axes > 0.0):
         raise ValueError(f"semi_axes = {axes.tolist()} is out of range; valid: three lengths above 0 m")
-    vertices, triangles, excess = _round(subdivisions, 0.0)
-    return vertices * axes, triangles, excess
+    unit = _round(subdivisions, 0.0)
+    return unit._replace(vertices=unit.vertices * axes, stands_out_m=unit.stands_out_m * float(axes.max()))
 
 
 def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> ShapeMesh:
@@ -54,12 +66,12 @@ def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> Sh
     The halves of an `ellipsoid_mesh` of equal axes, moved apart. ValueError as for that.
     """
     _require_sizes(radius=radius, half_length=half_length)
-    vertices, triangles, excess = _round(subdivisions, half_length / radius)
-    return vertices * radius, triangles, excess
+    unit = _round(subdivisions, half_length / radius)
+    return unit._replace(vertices=unit.vertices * radius, stands_out_m=unit.stands_out_m * radius)
 
 
 def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
-    """The convex hull of `points` (n, 3) in m, with only those vertices that it needs; the excess is 0.
+    """The convex hull of `points` (n, 3) in m, with only those vertices that it needs; nothing is added.
 
     ValueError for points all in one plane.
     """
@@ -71,7 +83,7 @@ def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
             f"points ({len(places)}, 3) have no convex hull; valid: 4 or more, not in one plane"
         ) from error
     vertices = places[hull.vertices]
-    return vertices, _outward_hull(vertices), 0.0
+    return ShapeMesh(vertices, _outward_hull(vertices), 0.0, 0.0)
 
 
 def _outward_hull(vertices: FloatArray) -> IntArray:
@@ -106,7 +118,7 @@ def _round(subdivisions: int, half_length: float) -> ShapeMesh:
     solid = np.pi * (4.0 / 3.0 + 2.0 * half_length)
     corners = vertices[triangles]
     volume = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    return vertices, triangles, float(volume / solid - 1.0)
+    return ShapeMesh(vertices, triangles, float(volume / solid - 1.0), float(1.0 / nearest - 1.0))
 
 
 def _face_distances(vertices: FloatArray, triangles: IntArray) -> FloatArray:

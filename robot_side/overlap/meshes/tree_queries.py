@@ -55,7 +55,8 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
 
 
 @inlined
-def _corner(tables: MeshTables, triangle: int, number: int) -> Vector:
+def corner_of(tables: MeshTables, triangle: int, number: int) -> Vector:
+    """A corner of a triangle (m), 0 to 2; its outward unit normal for 3."""
     return (
         tables.triangles[triangle, 3 * number],
         tables.triangles[triangle, 3 * number + 1],
@@ -64,14 +65,14 @@ def _corner(tables: MeshTables, triangle: int, number: int) -> Vector:
 
 
 @building_block
-def _to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
+def to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
     """The vector (m) from `point` to the nearest point of a triangle."""
-    normal = _corner(tables, triangle, 3)
+    normal = corner_of(tables, triangle, 3)
     best, best_2 = (0.0, 0.0, 0.0), math.inf
     inside = True
     for number in range(3):
-        start = subtract(_corner(tables, triangle, number), point)
-        end = subtract(_corner(tables, triangle, (number + 1) % 3), point)
+        start = subtract(corner_of(tables, triangle, number), point)
+        end = subtract(corner_of(tables, triangle, (number + 1) % 3), point)
         edge = subtract(end, start)
         along = min(max(-dot(start, edge) * tables.triangles[triangle, 12 + number] ** 2, 0.0), 1.0)
         foot = add(start, scale(along, edge)) if along < 0.5 else subtract(end, scale(1.0 - along, edge))
@@ -88,8 +89,26 @@ def _to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
 @building_block
 def squared_distance(tables: MeshTables, triangle: int, point: Vector) -> float:
     """The squared distance (m²) from `point` to a triangle."""
-    foot = _to_triangle(tables, triangle, point)
+    foot = to_triangle(tables, triangle, point)
     return dot(foot, foot)
+
+
+@building_block
+def touches_surface(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
+    """Whether any triangle is nearer to `point` than `radius`."""
+    node, end = tables.roots[mesh], tables.roots[mesh + 1]
+    while node < end:
+        if radius <= 0.0 or _box_distance_2(tables, node, point) > radius * radius:
+            node = tables.links[3 * node]
+            continue
+        first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(first, first + size):
+            gap = subtract(load(tables.spheres, triangle), point)
+            reach = tables.spheres[triangle, 3] + radius
+            if dot(gap, gap) <= reach * reach and squared_distance(tables, triangle, point) < radius * radius:
+                return True
+        node += 1
+    return False
 
 
 @building_block
@@ -103,7 +122,7 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
         nearer = _box_distance_2(tables, node + 1, point) <= _box_distance_2(tables, second, point)
         node = node + 1 if nearer else second
     best = tables.links[3 * node + 1]
-    foot = _to_triangle(tables, best, point)
+    foot = to_triangle(tables, best, point)
     bound = dot(foot, foot)
     node = first
     while node < end:
@@ -115,7 +134,7 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
             gap = subtract(load(tables.spheres, triangle), point)
             reach = tables.spheres[triangle, 3] + math.sqrt(bound)
             if dot(gap, gap) <= reach * reach:
-                other = _to_triangle(tables, triangle, point)
+                other = to_triangle(tables, triangle, point)
                 if dot(other, other) < bound:
                     best, foot, bound = triangle, other, dot(other, other)
         node += 1
@@ -125,9 +144,9 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
 @inlined
 def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
     """The signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
-    a = subtract(_corner(tables, triangle, 0), point)
-    b = subtract(_corner(tables, triangle, 1), point)
-    c = subtract(_corner(tables, triangle, 2), point)
+    a = subtract(corner_of(tables, triangle, 0), point)
+    b = subtract(corner_of(tables, triangle, 1), point)
+    c = subtract(corner_of(tables, triangle, 2), point)
     length_a, length_b, length_c = norm(a), norm(b), norm(c)
     cosine = length_a * length_b * length_c
     cosine += dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b

@@ -47,7 +47,6 @@ def _each(kind: int, points_m: FloatArray, *columns: FloatArray) -> Nearest:
         bounds=nothing,
         shapes=rows(*(np.ascontiguousarray(column, dtype=np.float64) for column in columns)),
         kinds=np.full(count, kind),
-        concave=np.zeros(count, dtype=np.int64),
         rows_of_kind=places,
         first_rows=np.zeros(1, dtype=np.int64),
         object_bounds=nothing,

@@ -7,7 +7,8 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+from robot_side.overlap import MeshLibrary, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+from robot_side.overlap.meshes.mesh_library import mesh_pairs
 
 STEP_M = 5e-5
 _NOTHING = 1e-9
@@ -78,7 +79,23 @@ def overlap_of(path_m: FloatArray, radius_m: float, objects: PerceivedObjects, t
             primitive = (np.broadcast_to(array[row], (len(path_m), *array[row].shape)) for array in arrays)
             volumes, gradients, _ = function(path_m, radii, *primitive, gradient=True)
             total, push = total + volumes, push + gradients[0]
+    for row in np.flatnonzero(objects.mesh_object == thing):
+        same = np.full(len(path_m), row)
+        volumes, gradients, _ = mesh_pairs(
+            path_m,
+            radii,
+            required(objects.mesh_library),
+            objects.mesh_index[same],
+            objects.mesh_positions_m[same],
+            objects.mesh_rotations[same],
+        )
+        total, push = total + volumes, push + gradients[0]
     return total, float(np.linalg.norm(push))
+
+
+def required(library: MeshLibrary | None) -> MeshLibrary:
+    assert library is not None
+    return library
 
 
 def volume_of(objects: PerceivedObjects, thing: int) -> float:
@@ -88,4 +105,6 @@ def volume_of(objects: PerceivedObjects, thing: int) -> float:
     total = (4.0 / 3.0 * np.pi * objects.sphere_radii_m**3)[objects.sphere_object == thing].sum()
     total += (8.0 * objects.box_half_sizes_m.prod(axis=1))[objects.box_object == thing].sum()
     total += tetrahedra[objects.tetrahedron_object == thing].sum()
+    if objects.mesh_library is not None:
+        total += objects.mesh_library.tables.volumes[objects.mesh_index][objects.mesh_object == thing].sum()
     return float("inf") if (objects.half_space_object == thing).any() else float(total)

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from common.arrays import FloatArray, IntArray
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.meshes.mesh_shapes import capsule_mesh, ellipsoid_mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.scene_meshes import CELL_M, cup
@@ -27,29 +26,6 @@ def test_bounds_contain_each_mesh_and_no_more() -> None:
         corners = mesh.tables.triangles[:, :9].reshape(-1, 3)
         reach = np.linalg.norm(corners - bounds.middles_m[row], axis=1).max()
         assert bounds.radii_m[row] == pytest.approx(reach, rel=1e-12)
-
-
-def test_what_is_its_own_hull_is_convex_though_it_is_told_in_single_precision() -> None:
-    library = MeshLibrary(list(MESHES.values()))
-    assert dict(zip(MESHES, mesh_bounds(library).convex.tolist(), strict=True)) == {
-        "cube": True,
-        "plate": True,
-        "cup": False,
-        "ellipsoid": True,
-    }
-    rounded = [Mesh(*surface) for surface in in_single_precision()]
-    assert mesh_bounds(MeshLibrary(rounded)).convex.tolist() == [True, True, False]
-
-
-def in_single_precision() -> list[tuple[FloatArray, IntArray]]:
-    """A turned ellipsoid, a capsule, and two cubes apart from each other, in one mesh."""
-    turned = random_rotation(np.random.default_rng(2))
-    ellipsoid, capsule = ellipsoid_mesh([0.05, 0.07, 0.1], 12), capsule_mesh(0.03, 0.1, 12)
-    cubes = np.concatenate([CUBE_CORNERS, CUBE_CORNERS + 3.0]), np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
-    return [
-        ((vertices @ turned.T).astype(np.float32).astype(np.float64), triangles)
-        for vertices, triangles in (ellipsoid[:2], capsule[:2], cubes)
-    ]
 
 
 def test_the_middles_go_where_the_meshes_do() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from common.arrays import FloatArray
 from robot_side.overlap import Mesh
@@ -42,11 +43,28 @@ SHAPES: dict[str, tuple[Callable[[int], ShapeMesh], float, Callable[[FloatArray]
 }
 
 
+def _outside_ellipsoid(point: FloatArray) -> float:
+    """The nearest point of the surface is that at which the normal leads to `point`: x_i = a_i² p_i / (a_i² + t)."""
+
+    def excess(t: float) -> float:
+        return float(((AXES * point / (AXES**2 + t)) ** 2).sum()) - 1.0
+
+    t = brentq(excess, 0.0, 1e3, xtol=1e-15)
+    return float(np.linalg.norm(t * point / (AXES**2 + t)))
+
+
+OUTSIDE: dict[str, Callable[[FloatArray], float]] = {
+    "cylinder": lambda point: float(max(np.hypot(*point[:2]) - 0.5, abs(point[2]) - 2.0)),
+    "capsule": lambda point: float(np.linalg.norm(point - [0.0, 0.0, np.clip(point[2], -2.0, 2.0)]) - 0.5),
+    "ellipsoid": _outside_ellipsoid,
+}
+
+
 @pytest.mark.parametrize("fineness", [1, 2, 5, 12])
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_solid_lies_within_and_the_excess_is_as_stated(name: str, fineness: int) -> None:
     make, volume, surface_points = SHAPES[name]
-    vertices, triangles, excess = make(fineness)
+    vertices, triangles, excess, stands_out_m = make(fineness)
     mesh = Mesh(vertices, triangles)
     assert volume < mesh.volume_m3 <= volume * (1.0 + excess) * (1.0 + 1e-12)
     assert mesh.volume_m3 == pytest.approx(volume * (1.0 + excess), rel=1e-12)
@@ -56,6 +74,10 @@ def test_the_solid_lies_within_and_the_excess_is_as_stated(name: str, fineness: 
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offsets = np.sum(normals * corners[:, 0], axis=1)
     assert (points @ normals.T - offsets).max() < 1e-12
+    # Of a convex mesh, whose distance from the solid is convex too, a vertex stands out farthest.
+    farthest_m = max(OUTSIDE[name](vertex) for vertex in vertices[:: max(1, len(vertices) // 100)])
+    assert farthest_m <= stands_out_m * (1.0 + 1e-9)
+    assert farthest_m > 0.2 * stands_out_m
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -69,9 +91,9 @@ def test_the_excess_falls_with_the_square_of_the_fineness(name: str) -> None:
 def test_a_convex_hull_keeps_what_it_needs() -> None:
     rng = np.random.default_rng(2)
     points = np.concatenate([rng.uniform(-0.9, 0.9, (200, 3)), np.array([*np.ndindex(2, 2, 2)]) * 2.0 - 1.0])
-    vertices, triangles, excess = convex_hull_mesh(points)
+    vertices, triangles, excess, stands_out_m = convex_hull_mesh(points)
     assert len(vertices) == 8
-    assert excess == 0.0
+    assert excess == stands_out_m == 0.0
     assert Mesh(vertices, triangles).volume_m3 == pytest.approx(8.0)
 
 

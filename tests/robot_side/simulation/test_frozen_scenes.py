@@ -21,6 +21,7 @@ from tests.robot_side.simulation.test_scene_meshes import overlap_of
 
 FARTHEST_M = 0.45
 TOUCHING_M = 1e-5
+STEP_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ SCENES = {
         "left_box left_ball right_box right_tetrahedron board_above box_below ball_below box_behind", None
     ),
     "empty": Expected("box", None),
+    "terrain": Expected("terrain", None),
+    "terrain_ahead": Expected("terrain", Hit(320, "fingertip", "terrain")),
 }
 TABLES = [name for name in SCENES if name.startswith("table_")]
 every_scene = pytest.mark.parametrize("name", SCENES)
@@ -91,22 +94,30 @@ def split_geoms(scene: Scene) -> tuple[list[int], list[int]]:
 
 
 def first_hit(scene: Scene) -> Hit | None:
-    """Where the true gripper ends when it goes straight on, each time by as much as is surely free."""
+    """Where the true gripper ends when it goes straight on, by halves of the step in which it meets something."""
     data = copy.copy(scene.data)
+    # MuJoCo's tree of a body's geoms was built where they stood.
+    scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     moving, others = split_geoms(scene)
     start, axis = data.geom_xpos[moving].copy(), approach(scene)
-    gone_m = 0.0
-    while gone_m < FARTHEST_M:
+
+    def touching(gone_m: float) -> list[tuple[int, int]]:
         data.geom_xpos[moving] = start + gone_m * axis
-        distance_m, mine, other = min(
-            (float(mujoco.mj_geomDistance(scene.model, data, mine, other, FARTHEST_M, None)), mine, other)
-            for mine in moving
-            for other in others
-        )
-        if distance_m < TOUCHING_M:
-            return Hit(1e3 * gone_m, part_name(scene, mine), part_name(scene, other))
-        gone_m += distance_m
-    return None
+        mujoco.mj_collision(scene.model, data)
+        pairs = [(int(pair[0]), int(pair[1])) for pair in data.contact.geom]
+        ordered = [pair if pair[0] in moving else pair[::-1] for pair in pairs]
+        return [(mine, other) for mine, other in ordered if mine in moving and other in others]
+
+    steps_m = np.arange(0.0, FARTHEST_M, STEP_M)
+    met_m = next((float(gone_m) for gone_m in steps_m if touching(gone_m)), None)
+    if met_m is None:
+        return None
+    free_m = met_m - STEP_M
+    while met_m - free_m > TOUCHING_M:
+        middle_m = 0.5 * (free_m + met_m)
+        free_m, met_m = (free_m, middle_m) if touching(middle_m) else (middle_m, met_m)
+    mine, other = touching(met_m)[0]
+    return Hit(1e3 * met_m, part_name(scene, mine), part_name(scene, other))
 
 
 def go_on(scene: Scene, data: Any, position_m: FloatArray) -> float:

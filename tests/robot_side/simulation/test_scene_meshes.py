@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
@@ -225,15 +226,69 @@ def test_a_capsule_too_thin_for_a_mesh_stands_for_its_bounding_box(tmp_path: Pat
     assert scene.volume_errors == {"thread": math.inf}
 
 
-def test_what_no_mesh_describes_stands_for_its_bounding_box(tmp_path: Path) -> None:
-    field = '<asset><hfield name="hills" nrow="2" ncol="2" size="0.2 0.2 0.1 0.05" elevation="0 1 1 0"/></asset>'
-    world = '<geom name="hills" type="hfield" hfield="hills" pos="1 0 0.3"/>'
-    scene = scene_with(tmp_path, world, field)
-    assert scene.volume_errors == {"hills": math.inf}
+@pytest.mark.parametrize("shape", ["cylinder", "capsule", "ellipsoid"])
+@pytest.mark.parametrize("size_m", [0.003, 0.02, 0.1, 0.25])
+def test_a_thing_of_ordinary_size_stands_out_by_half_a_millimetre_at_most(
+    shape: str, size_m: float, tmp_path: Path
+) -> None:
+    numbers = {"cylinder": f"{size_m} 0.1", "capsule": f"{size_m} 0.1", "ellipsoid": f"{size_m} 0.01 {size_m}"}[shape]
+    scene = scene_with(tmp_path, f'<geom name="round" type="{shape}" size="{numbers}" pos="1 0 0"/>')
+    assert 0.0 < scene.stands_out_m["round"] <= 5e-4
+    assert scene.volume_errors["round"] <= LARGEST_ERROR
+
+
+def test_a_thing_of_any_size_says_how_far_it_stands_out(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, '<geom name="round" type="ellipsoid" size="3 3 3" pos="9 0 0"/>')
+    assert 5e-4 < scene.stands_out_m["round"] < 0.01
     objects = MujocoCamera(scene).perceive(0.0)
-    assert len(objects.box_object) == 1
-    assert len(objects.mesh_object) == 0
-    assert objects.mesh_library is None
+    unit = np.random.default_rng(1).normal(size=(2000, 3))
+    surface = [9.0, 0.0, 0.0] + 3.0 * unit / np.linalg.norm(unit, axis=1)[:, None]
+    depths = [-distance_to_object(objects, 0, point) for point in surface]
+    assert min(depths) >= -1e-12
+    assert max(depths) <= scene.stands_out_m["round"]
+
+
+# Terrain
+
+
+def hills(path: Path, placed: str, rows: int = 5, columns: int = 7, seed: int = 0) -> Scene:
+    elevation = " ".join(f"{height:.17g}" for height in np.random.default_rng(seed).uniform(size=rows * columns))
+    size = 'size="0.3 0.2 0.15 0.05"'
+    field = f'<hfield name="hills" nrow="{rows}" ncol="{columns}" {size} elevation="{elevation}"/>'
+    return scene_with(path, f'<geom name="hills" type="hfield" hfield="hills" {placed}/>', f"<asset>{field}</asset>")
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (2, 2), (30, 20)])
+def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_path: Path) -> None:
+    scene = hills(tmp_path, 'pos="1 0.2 0.3" euler="20 30 40"', *shape)
+    assert scene.approximated == ()
+    objects = MujocoCamera(scene).perceive(0.0)
+    assert len(objects.mesh_object) == 1
+    geom, random = scene.data.geom("hills"), np.random.default_rng(1)
+    rotation, hit = geom.xmat.reshape(3, 3), 0
+    for _ in range(200):
+        # From all round towards somewhere in the solid, through its top, its sides or its base.
+        way = random.normal(size=3)
+        way /= np.linalg.norm(way)
+        aim = geom.xpos + rotation @ (random.uniform(-1.0, 1.0, 3) * [0.3, 0.2, 0.05])
+        start, found = aim - 2.0 * way, np.zeros(1, dtype=np.int32)
+        far = mujoco.mj_ray(scene.model, scene.data, start, way, None, 1, -1, found, None)
+        if far >= 0.0 and scene.model.geom(int(found[0])).name == "hills":
+            hit += 1
+            assert abs(distance_to_object(objects, 0, start + far * way)) < 1e-8
+            assert distance_to_object(objects, 0, start + (far - 1e-3) * way) > 0.0
+            assert distance_to_object(objects, 0, start + (far + 1e-6) * way) < 1e-8
+    assert hit > 100
+
+
+def test_a_ball_in_a_valley_overlaps_the_slopes_alone(tmp_path: Path) -> None:
+    field = '<asset><hfield name="v" nrow="2" ncol="3" size="0.2 0.2 0.2 0.05" elevation="1 0 1 1 0 1"/></asset>'
+    scene = scene_with(tmp_path, '<geom name="valley" type="hfield" hfield="v" pos="1 0 0"/>', field)
+    objects, radius = MujocoCamera(scene).perceive(0.0), 0.02
+    # Two planes at 45° that meet at the origin.
+    for height_m, overlapped in ((0.03, 0.0), (0.02, 2.0 * cap(radius, radius - 0.02 / math.sqrt(2.0)))):
+        found = overlap_of(objects, "valley", np.array([[1.0, 0.0, height_m]]), radius)[0]
+        assert found == pytest.approx(overlapped, rel=1e-6)
 
 
 def test_a_frame_moves_and_leaves_out_meshes_as_other_primitives(tmp_path: Path) -> None:
@@ -297,11 +352,11 @@ def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path)
     model = planar_arm(tmp_path, world=world, extra_top=mesh_asset("bowl", vertices, triangles[1:]))
     [note] = notes_on_shapes(model)
     assert "\n" not in note
-    assert "bowl as its convex hull or bounding box, post by 0.9 %" in note
+    assert "bowl as its convex hull or bounding box, post by 0.48 mm (0.3 % of its volume)" in note
 
 
 def test_a_note_about_many_things_names_the_worst(tmp_path: Path) -> None:
     world = "".join(f'<geom name="g{k}" type="cylinder" size="0.1 0.1" pos="{k} 1 0"/>' for k in range(12))
     model = planar_arm(tmp_path, world=world)
     [note] = notes_on_shapes(model)
-    assert note.endswith("g7 by 0.9 %, and 4 more by no more than that")
+    assert note.endswith("g7 by 0.48 mm (0.3 % of its volume), and 4 more by no more than that")
