@@ -145,3 +145,14 @@ def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
         if solid is not None:
             solids.append(solid.placed(Rotation.from_quat(part.quaternion).as_matrix(), np.array(part.position_m)))
     return solids
+
+
+def placed_corners(model: Any, data: Any, geoms: IntArray) -> FloatArray:
+    """The triangles (t, 3, 3) of the geoms' shapes in the world, as the simulation's state `data` has them."""
+    placed = []
+    for geom in geoms.tolist():
+        body = int(model.geom_bodyid[geom])
+        placed += [
+            solid.corners_m @ data.xmat[body].reshape(3, 3).T + data.xpos[body] for solid in link_solids(model, [geom])
+        ]
+    return np.concatenate([np.empty((0, 3, 3)), *placed])
