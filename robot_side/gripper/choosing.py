@@ -11,16 +11,13 @@ _ROWS_AT_A_TIME = 512
 def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray) -> BoolArray:
     """(m, p): whether each sphere, centres (m, 3), radii (m,), contains each point (p, 3)."""
     # Squared distances by one product; a few parts in 1e15 of the frame's size are nothing beside the margins.
-    inside: BoolArray = (
-        (centers_m**2).sum(axis=1)[:, None] - 2.0 * centers_m @ points_m.T + (points_m**2).sum(axis=1)
-        <= (radii_m**2)[:, None]
-    )
+    inside: BoolArray = (centers_m**2).sum(axis=1)[:, None] - 2.0 * centers_m @ points_m.T + (points_m**2).sum(
+        axis=1
+    ) <= (radii_m**2)[:, None]
     return inside
 
 
-def contained_points(
-    centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray
-) -> csr_array:
+def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray) -> csr_array:
     """(m, p), true where an image of a sphere contains the point; `images` (g, 3, 3) turn or mirror the centres."""
     pieces = [(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))]
     for first in range(0, len(centers_m), _ROWS_AT_A_TIME):
@@ -65,15 +62,13 @@ def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
         new = columns[left[columns]]
         left[new] = False
         touched = of_column[new]
-        gains -= np.bincount(
-            touched.indices, np.repeat(weights[new], np.diff(touched.indptr)), minlength=len(gains)
-        )
+        gains -= np.bincount(touched.indices, np.repeat(weights[new], np.diff(touched.indptr)), minlength=len(gains))
     return without_vain(inside, np.array(chosen, dtype=np.int64), costs)
 
 
 def without_vain(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
     """The rows of `chosen` less those all of whose columns other rows have; the dearest and smallest go first."""
-    times = np.asarray(inside[chosen].sum(axis=0)).ravel()
+    times: FloatArray = np.asarray(inside[chosen].sum(axis=0), dtype=np.float64).ravel()
     sizes = np.diff(inside.indptr)
     kept = []
     for row in sorted(chosen.tolist(), key=lambda row: (-costs[row], sizes[row])):

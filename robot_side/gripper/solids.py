@@ -55,9 +55,7 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
     def depth_m(points: FloatArray) -> FloatArray:
         # A point's distance to a convex polyhedron's surface is that to the nearest of its planes.
         pieces = range(0, len(points), _POINTS_AT_A_TIME)
-        nearest = [
-            (offsets - points[first : first + _POINTS_AT_A_TIME] @ normals.T).min(axis=1) for first in pieces
-        ]
+        nearest = [(offsets - points[first : first + _POINTS_AT_A_TIME] @ normals.T).min(axis=1) for first in pieces]
         return np.concatenate([np.empty(0), *nearest])
 
     return Solid(corners, depth_m, excess_m)
@@ -125,7 +123,9 @@ def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     units = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0.0)
     points = corners_m.reshape(-1, 3)
-    _, first, place = np.unique((points / 1e-7).round().astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    _, first, place = np.unique(
+        (points / 1e-7).round().astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
     place = place.ravel()
     # Faces that a sharp edge divides count alike, however finely each is cut.
     faces = np.column_stack([place, np.repeat((units * 1e3).round().astype(np.int64), 3, axis=0)])

@@ -132,7 +132,12 @@ def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most
 
 
 def _below(
-    union: _Union, points_m: FloatArray, normals: FloatArray, stand_out_m: float, images: FloatArray, origin_m: FloatArray
+    union: _Union,
+    points_m: FloatArray,
+    normals: FloatArray,
+    stand_out_m: float,
+    images: FloatArray,
+    origin_m: FloatArray,
 ) -> FloatArray:
     """Centres (c, 3) below points of the surface, down to where the solid is thickest, and there on mirror planes."""
     every = max(1, -(-len(points_m) // _MOST_STARTS))

@@ -50,6 +50,13 @@ def placed_middles(objects: PerceivedObjects) -> FloatArray:
     return placed
 
 
+def mesh_corners(library: "MeshLibrary") -> list[FloatArray]:
+    """Each mesh's triangles (t, 3, 3) in its own frame, in metres."""
+    tables = library.tables
+    first_triangles = tables.links.reshape(-1, 3)[tables.roots[:-1], 1]
+    return np.split(tables.triangles[:, :9].reshape(-1, 3, 3), first_triangles[1:])
+
+
 def _work_out(library: "MeshLibrary") -> MeshBounds:
     tables = library.tables
     roots = tables.roots[:-1]
@@ -59,8 +66,10 @@ def _work_out(library: "MeshLibrary") -> MeshBounds:
     corners = tables.triangles[:, :9].reshape(-1, 3, 3)
     counts = np.diff(first_triangles, append=len(corners))
     apart = np.linalg.norm(corners - np.repeat(middles, counts, axis=0)[:, None, :], axis=2).max(axis=1)
-    of_meshes = np.split(corners, first_triangles[1:])
-    convex = [_is_convex(mesh.reshape(-1, 3), volume) for mesh, volume in zip(of_meshes, tables.volumes, strict=True)]
+    convex = [
+        _is_convex(mesh.reshape(-1, 3), volume)
+        for mesh, volume in zip(mesh_corners(library), tables.volumes, strict=True)
+    ]
     return MeshBounds(
         middles, 0.5 * (highest - lowest), np.maximum.reduceat(apart, first_triangles), np.array(convex, dtype=np.bool_)
     )

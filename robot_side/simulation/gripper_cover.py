@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray, IntArray
 from robot_side.gripper.capsule_cover import cover_capsule
+from robot_side.gripper.kept_covers import kept_cover
 from robot_side.gripper.solids import Solid, capsule, convex_solid, cylinder, ellipsoid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
@@ -98,7 +99,7 @@ def _cover_link(parts: tuple[_Part, ...], stand_out_m: float) -> tuple[FloatArra
             for solid, rotation, position in zip(solids, rotations, positions, strict=True)
             if solid is not None
         ]
-        return cover_surface(placed, stand_out_m, rotations)
+        return kept_cover(repr((parts, stand_out_m)).encode(), lambda: cover_surface(placed, stand_out_m, rotations))
     centers, radii, stand_outs = [], [], []
     for part, rotation, position in zip(parts, rotations, positions, strict=True):
         found, found_radii, stand_out = _with_rows(part, stand_out_m)

@@ -1,6 +1,6 @@
 """How closely a gripper's spheres cover it: what sticks out of them, and what of them stands out.
 
-    feelahead bench cover [--model FILE.xml... --site NAME]
+feelahead bench cover [--model FILE.xml... --site NAME]
 """
 
 import sys
@@ -68,9 +68,7 @@ def bench_cover(arguments: Sequence[str]) -> int:
     with progress("grippers", len(wanted)) as advance:
         for name, model in wanted:
             site = None if model is None else settings.site
-            found.append(
-                measure(name, model, site, settings.points, settings.looks, settings.seed, time.process_time)
-            )
+            found.append(measure(name, model, site, settings.points, settings.looks, settings.seed, time.process_time))
             advance(1.0)
     fits = [fit for fit, _ in found]
     report = _report(fits)

@@ -13,7 +13,7 @@ from robot_side.gripper.solids import Solid
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_library import MeshLibrary, nearest_mesh_pairs
 from robot_side.simulation.gripper_cover import cover_gripper, link_solids
-from robot_side.simulation.gripper_gap import open_gap
+from robot_side.simulation.gripper_measurement import open_gap
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 
@@ -32,7 +32,7 @@ class Fit:
     stands_out_mm: float
     """The greatest distance of a point of the spheres' outer surface from the nearest geom of the same link."""
     gap_mm: float | None
-    """Between the two links that grip, open; None where nothing opens."""
+    """Between the two geoms that grip, open; None where nothing opens."""
     gap_kept_mm: float | None
     """Between their spheres."""
     made_s: float
@@ -102,7 +102,9 @@ def _stands_out_m(
     solids: Sequence[Solid], centers_m: FloatArray, radii_m: FloatArray, count: int, random: np.random.Generator
 ) -> float:
     """Of points all over the spheres that are in no other sphere."""
-    meshes = [Mesh(solid.corners_m.reshape(-1, 3), np.arange(3 * len(solid.corners_m)).reshape(-1, 3)) for solid in solids]
+    meshes = [
+        Mesh(solid.corners_m.reshape(-1, 3), np.arange(3 * len(solid.corners_m)).reshape(-1, 3)) for solid in solids
+    ]
     library = MeshLibrary(meshes)
     chances = radii_m**2 / (radii_m**2).sum()
     rows = random.choice(len(radii_m), count, p=chances)

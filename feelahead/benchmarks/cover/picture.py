@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from robot_side.arm.port import ArmState
-from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.gripper_cover import placed_corners
+from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene
 
 
@@ -31,7 +31,8 @@ def draw(grippers: Sequence[tuple[str, Scene]], path: Path) -> None:
             seen = axes[row, column]
             spheres = EllipseCollection(
                 sizes, sizes, np.zeros_like(sizes), units="xy", offsets=centers[:, [across, 2]],
-                transOffset=seen.transData, facecolor=(0.3, 0.55, 0.85, 0.25), edgecolor=(0.1, 0.3, 0.6, 0.5), linewidth=0.4,
+                offset_transform=seen.transData,
+                facecolor=(0.3, 0.55, 0.85, 0.25), edgecolor=(0.1, 0.3, 0.6, 0.5), linewidth=0.4,
             )  # fmt: skip
             seen.add_collection(spheres)
             seen.add_collection(PolyCollection(corners[:, :, [across, 2]], facecolor=(0.0, 0.0, 0.0, 0.25)))
