@@ -35,7 +35,7 @@ def draw(grippers: Sequence[tuple[str, Scene]], path: Path) -> None:
                 facecolor=(0.3, 0.55, 0.85, 0.25), edgecolor=(0.1, 0.3, 0.6, 0.5), linewidth=0.4,
             )  # fmt: skip
             seen.add_collection(spheres)
-            seen.add_collection(PolyCollection(corners[:, :, [across, 2]], facecolor=(0.0, 0.0, 0.0, 0.25)))
+            seen.add_collection(PolyCollection(list(corners[:, :, [across, 2]]), facecolor=(0.0, 0.0, 0.0, 0.25)))
             seen.set(aspect="equal", xlabel=f"{'xy'[across]} of the tool, mm")
             seen.autoscale_view()
         axes[0, column].set_title(f"{name}: {len(sizes)} spheres", fontsize=9)

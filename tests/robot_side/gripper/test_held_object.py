@@ -240,7 +240,10 @@ def test_a_cup_is_felt_at_its_wall_and_not_at_its_box() -> None:
 
 def mesh_points(corners_m: FloatArray, random: np.random.Generator) -> FloatArray:
     """Points (n, 3) of triangles (t, 3, 3)."""
-    return np.einsum("tnk,tki->tni", random.dirichlet(np.ones(3), (len(corners_m), 20)), corners_m).reshape(-1, 3)
+    points: FloatArray = np.einsum(
+        "tnk,tki->tni", random.dirichlet(np.ones(3), (len(corners_m), 20)), corners_m
+    ).reshape(-1, 3)
+    return points
 
 
 def test_a_scene_unknown_before_is_held_without_a_search() -> None:
