@@ -15,7 +15,8 @@ from robot_side.arm.port import Arm
 from robot_side.core import RobotSide
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.figures import RunFigures
-from robot_side.objects.perceived import Role
+from robot_side.gripper.held_covers import HeldCovers
+from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.settings import RobotSettings
@@ -23,6 +24,7 @@ from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.camera_error import CameraError
 from robot_side.simulation.encoders import Encoder
+from robot_side.simulation.gripper_cover import GripperCover
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
@@ -76,6 +78,8 @@ def build_robot_side(
             int(camera_noise),
         ),
     )
+    # Before the first tick, as a search for spheres takes far longer than one.
+    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
     law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(
@@ -100,7 +104,8 @@ def build_robot_side(
         SimulationObserver(scene),
         assists=settings.assist == "speed",
         seed=settings.seed,
-        notes=(*_notes(scene), *prediction_note),
+        notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
+        held_covers=held_covers,
     )
 
 
@@ -128,6 +133,27 @@ def _notes(scene: Scene) -> tuple[str, ...]:
             shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
         notes.append(f"perceived larger than they are, at most: {', '.join(shown)}")
     return tuple(notes)
+
+
+def _as_loaded(scene: Scene) -> PerceivedObjects:
+    """The objects where the scene has them at its start."""
+    nowhere = np.zeros((len(scene.objects), 3))
+    return scene.primitives.place(0.0, scene.roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
+
+
+def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[str]:
+    """What a person should know about the spheres."""
+    notes = []
+    if cover.stand_out_m > asked_m * (1.0 + 1e-9):
+        notes.append(
+            f"the gripper's {len(cover.radii_m)} spheres stand out of it by up to {1e3 * cover.stand_out_m:.1f} mm"
+            f" instead of {1e3 * asked_m:.1f}: its links are large"
+        )
+    if held.coarse:
+        shown = [f"{name} by {1e3 * stand_out:.0f} mm" for name, stand_out in held.coarse[:_NAMED_OBJECTS]]
+        more = [f"and {len(held.coarse) - len(shown)} more"] if len(held.coarse) > len(shown) else []
+        notes.append(f"felt early while held, as spheres stand out: {', '.join([*shown, *more])}")
+    return notes
 
 
 def _roles(roles: Mapping[str, Role]) -> str:

@@ -21,6 +21,7 @@ from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
 from robot_side.figures import RunFigures
+from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.gripper.perceived_distances import perceived_distances
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
@@ -63,6 +64,7 @@ class RobotSide:
         assists: bool = False,
         seed: int = 0,
         notes: Sequence[str] = (),
+        held_covers: HeldCovers | None = None,
     ) -> None:
         """assists: cap the speed along the triggers (see `speed_assist`)."""
         self.notes = tuple(notes)
@@ -81,6 +83,7 @@ class RobotSide:
         self._assists = assists
         self._joints = JointEstimate()
         self._told_m_s = 0.0
+        self._held_covers = held_covers
         self._start_s: float | None = None
         self._held: HeldObject | None = None
         self._held_s = -np.inf
@@ -172,7 +175,7 @@ class RobotSide:
         elif self._held is None and state.gripper_holding:
             index = gripped_object(objects, pose.tool_position_m, state.gripper_opening_m)
             if index is not None:
-                self._held = grip(objects, index, pose)
+                self._held = grip(objects, index, pose, self._held_covers)
 
     def _move(self, permission: Permission, pose: GripperPose, state: ArmState, now_s: float) -> None:
         """Pass the operator's motion on to the arm; without permission nothing is commanded, and it stops."""

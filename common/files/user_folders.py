@@ -1,4 +1,4 @@
-"""Where a person's settings live, by each system's custom."""
+"""Where a person's settings live, and what is kept from one run to the next, by each system's custom."""
 
 import os
 import sys
@@ -24,3 +24,9 @@ def configuration_folder(
         variable, usual = "XDG_CONFIG_HOME", home / ".config"
     given = Path(environment.get(variable, ""))
     return (given if given.is_absolute() else usual) / "feelahead"
+
+
+def cache_folder(environment: Mapping[str, str] = os.environ, home: Path | None = None) -> Path:
+    """The folder of what can be worked out again: $XDG_CACHE_HOME/feelahead, else ~/.cache/feelahead."""
+    given = Path(environment.get("XDG_CACHE_HOME", ""))
+    return (given if given.is_absolute() else (Path.home() if home is None else home) / ".cache") / "feelahead"

@@ -65,6 +65,12 @@ bench = Menu(
             "run time against error of the error propagation, and of the prediction of the gripper's way",
             "pip install 'feelahead[robot,operator,bench]'",
         ),
+        "cover": Entry(
+            "feelahead.benchmarks.cover.bench",
+            "bench_cover",
+            "how closely a gripper's spheres cover it, measured both ways",
+            "pip install 'feelahead[robot,bench]'",
+        ),
         "coverage": Entry(
             "feelahead.benchmarks.coverage.bench",
             "bench_coverage",

@@ -7,8 +7,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.ahead.distances import distance_to_object
 from robot_side.arm.port import GripperPose
-from robot_side.gripper.spheres import cover_boxes
-from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.gripper.held_covers import HeldCovers
 from robot_side.objects.perceived import PerceivedObjects, Role
 
 
@@ -41,40 +40,18 @@ def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach
     return nearest if nearest is not None and distances[nearest] <= reach_m else None
 
 
-def grip(objects: PerceivedObjects, index: int, pose: GripperPose) -> HeldObject:
-    """The object `index`, fixed to the tool from now on."""
-    centers = [objects.sphere_centers_m[objects.sphere_object == index]]
-    radii = [objects.sphere_radii_m[objects.sphere_object == index]]
-    boxes = _boxes(objects, index)
-    if len(boxes[0]):
-        cover = cover_boxes(*boxes)
-        centers.append(cover.centers_m)
-        radii.append(cover.radii_m)
-    vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
-    middles = vertices.mean(axis=1)
-    centers.append(middles)
-    radii.append(np.linalg.norm(vertices - middles[:, None, :], axis=2).max(axis=1, initial=0.0))
-    in_world = np.concatenate(centers)
+def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldCovers | None = None) -> HeldObject:
+    """The object `index`, fixed to the tool from now on.
+
+    `covers`: made from an earlier frame of the same objects; without them they are made now, which takes longer than
+    a tick.
+    """
+    in_world, radii = (HeldCovers(objects) if covers is None else covers).spheres(objects, index)
     return HeldObject(
         index=index,
         name=objects.names[index],
         centers_in_tool_m=(in_world - pose.tool_position_m) @ pose.tool_rotation,
-        radii_m=np.concatenate(radii),
-    )
-
-
-def _boxes(objects: PerceivedObjects, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres (b, 3), rotations and half sizes (b, 3) of the object's boxes, and of those around its meshes."""
-    boxes, meshes = objects.box_object == index, objects.mesh_object == index
-    own = objects.box_centers_m[boxes], objects.box_rotations[boxes], objects.box_half_sizes_m[boxes]
-    if objects.mesh_library is None:
-        return own
-    centers, rotations, half_sizes = own
-    around = mesh_bounds(objects.mesh_library).half_sizes_m[objects.mesh_index[meshes]]
-    return (
-        np.concatenate([centers, placed_middles(objects)[meshes]]),
-        np.concatenate([rotations, objects.mesh_rotations[meshes]]),
-        np.concatenate([half_sizes, around]),
+        radii_m=radii,
     )
 
 

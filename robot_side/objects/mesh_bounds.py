@@ -45,6 +45,13 @@ def placed_middles(objects: PerceivedObjects) -> FloatArray:
     return placed
 
 
+def mesh_corners(library: "MeshLibrary") -> list[FloatArray]:
+    """Each mesh's triangles (t, 3, 3) in its own frame, in metres."""
+    tables = library.tables
+    first_triangles = tables.links.reshape(-1, 3)[tables.roots[:-1], 1]
+    return np.split(tables.triangles[:, :9].reshape(-1, 3, 3), first_triangles[1:])
+
+
 def _work_out(library: "MeshLibrary") -> MeshBounds:
     tables = library.tables
     roots = tables.roots[:-1]

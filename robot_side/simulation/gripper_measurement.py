@@ -1,4 +1,4 @@
-"""How far a simulated gripper opens, found by driving it."""
+"""How far a simulated gripper opens, found by driving it, and what its spheres leave of that."""
 
 import copy
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.simulation.gripper_cover import GripperCover, link_solids
 from robot_side.simulation.gripper_travel import (
     GripperSample,
     GripperServo,
@@ -22,6 +23,7 @@ from robot_side.simulation.scene import Scene
 _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _FARTHEST_GAP_M = 0.5
+_ALIKE_M = 1e-4
 
 
 def measure_gripper(scene: Scene) -> GripperTravel | None:
@@ -86,3 +88,35 @@ def _sweep_gripper(model: Any, scene: Scene, first: FloatArray, last: FloatArray
             )
         )
     return samples
+
+
+def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
+    """(m between the geoms that grip, the least m between their spheres), open; None without fingers."""
+    travel, model, robot = measure_gripper(scene), scene.model, scene.robot
+    if travel is None:
+        return None
+    data = mujoco.MjData(model)
+    data.qpos[:] = scene.data.qpos
+    data.qpos[robot.finger_positions] = travel.open_fingers
+    mujoco.mj_forward(model, data)
+    bodies = model.geom_bodyid[robot.gripper_geoms]
+    gaps = {
+        pair: mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None)
+        for pair in jaw_pairs(robot.gripper_geoms, bodies, robot.geom_on_finger)
+    }
+    opening_m = min(gaps.values(), key=lambda gap: abs(gap - travel.openings_m[0]))
+    kept_m = opening_m
+    for pair in (pair for pair, gap in gaps.items() if abs(gap - opening_m) < _ALIKE_M):
+        one, other = (_spheres_of(scene, cover, data, geom) for geom in pair)
+        apart = np.linalg.norm(one[0][:, None] - other[0], axis=2) - one[1][:, None] - other[1]
+        kept_m = min(kept_m, float(apart.min(initial=np.inf)))
+    return float(opening_m), max(kept_m, 0.0)
+
+
+def _spheres_of(scene: Scene, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
+    """Centres (m, 3) in the world and radii (m,) of the spheres whose centres are in a geom."""
+    link = int(scene.model.geom_bodyid[geom])
+    own = np.flatnonzero(cover.bodies == link)
+    for solid in link_solids(scene.model, [geom]):
+        own = own[solid.depth_m(cover.centers_m[own]) >= -1e-9]
+    return data.xpos[link] + cover.centers_m[own] @ data.xmat[link].reshape(3, 3).T, cover.radii_m[own]

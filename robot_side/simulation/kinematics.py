@@ -8,7 +8,7 @@ from common.errors import ConfigurationError
 from robot_side.ahead.tables import BLOCK
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.gripper.near_order import near_order
-from robot_side.gripper.spheres import cover_boxes
+from robot_side.simulation.gripper_cover import cover_gripper
 from robot_side.simulation.scene import Scene
 
 
@@ -16,7 +16,7 @@ class MujocoKinematics:
     """GripperKinematics: the gripper where the encoders say it is, in a copy of the state that nobody simulates."""
 
     def __init__(self, scene: Scene, stand_out_m: float = 0.003) -> None:
-        """Cover the boxes around the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
+        """Cover the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
 
         ConfigurationError when the robot has nothing at the tool that could touch anything.
         """
@@ -26,16 +26,14 @@ class MujocoKinematics:
             raise ConfigurationError("model: nothing at the tool can touch anything; valid: 1 or more colliding geoms")
         self._data = mujoco.MjData(model)
         self._data.qpos[:] = scene.data.qpos
-        rotations = np.array([_rotation(model.geom_quat[geom]) for geom in geoms])
         # The gripper is covered in the frames of its links, in which its geoms do not move.
-        centers = model.geom_pos[geoms] + np.einsum("kij,kj->ki", rotations, model.geom_aabb[geoms, :3])
-        cover = cover_boxes(centers, rotations, model.geom_aabb[geoms, 3:], stand_out_m)
-        bodies: IntArray = model.geom_bodyid[geoms][cover.box].astype(np.int64)
-        order = self._near_order(bodies, cover.centers_m)
-        self._bodies = bodies[order]
-        self._local_centers_m = cover.centers_m[order, :, None]
-        self._radii_m = cover.radii_m[order]
-        self._on_finger = scene.robot.geom_on_finger[cover.box[order]]
+        self.cover = cover_gripper(model, geoms, stand_out_m)
+        order = self._near_order(self.cover.bodies, self.cover.centers_m)
+        self._bodies = self.cover.bodies[order]
+        self._local_centers_m = self.cover.centers_m[order, :, None]
+        self._radii_m = self.cover.radii_m[order]
+        fingers = model.geom_bodyid[geoms[scene.robot.geom_on_finger]]
+        self._on_finger = np.isin(self._bodies, fingers)
         # Every pose shares these two.
         self._radii_m.setflags(write=False)
         self._on_finger.setflags(write=False)
@@ -67,9 +65,3 @@ class MujocoKinematics:
             sphere_radii_m=self._radii_m,
             sphere_on_finger=self._on_finger,
         )
-
-
-def _rotation(quaternion: FloatArray) -> FloatArray:
-    matrix: FloatArray = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)

@@ -1,0 +1,1 @@
+"""`feelahead bench cover`: how closely a gripper's spheres cover it, measured both ways."""

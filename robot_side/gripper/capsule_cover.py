@@ -1,0 +1,27 @@
+"""A capsule's spheres: a row along its middle line. A ball is a capsule of no length, and its own cover."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray
+
+
+def cover_capsule(
+    radius_m: float, half_length_m: float, stand_out_m: float, most: int = 2000
+) -> tuple[FloatArray, FloatArray, float]:
+    """Centres (m, 3) on the z axis, radii (m,), and how far they stand out of the points within `radius_m` of the line.
+
+    The line goes from -half_length_m to half_length_m on the z axis. The ends are as the capsule's, and between two
+    neighbours their spheres still reach its radius. More than `most` are as many, and stand out farther.
+    """
+    if half_length_m <= 0.0:
+        return np.zeros((1, 3)), np.array([radius_m]), 0.0
+    # Half the distance of two spheres of the radius r + s that meet at r is √(2 r s + s²).
+    reach_m = math.sqrt(2.0 * radius_m * stand_out_m + stand_out_m**2)
+    count = min(1 + math.ceil(half_length_m / reach_m), most)
+    half_step_m = half_length_m / (count - 1)
+    needed_m = math.sqrt(radius_m**2 + half_step_m**2) * (1.0 + 1e-12) - radius_m
+    centers = np.zeros((count, 3))
+    centers[:, 2] = half_step_m * np.arange(1 - count, count, 2)
+    return centers, np.full(count, radius_m + needed_m), needed_m

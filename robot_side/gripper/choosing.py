@@ -1,0 +1,80 @@
+"""The choice of few spheres that together contain all of many points."""
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from common.arrays import BoolArray, FloatArray, IntArray
+
+_ROWS_AT_A_TIME = 512
+
+
+def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray) -> BoolArray:
+    """(m, p): whether each sphere, centres (m, 3), radii (m,), contains each point (p, 3)."""
+    # Squared distances by one product; a few parts in 1e15 of the frame's size are nothing beside the margins.
+    inside: BoolArray = (centers_m**2).sum(axis=1)[:, None] - 2.0 * centers_m @ points_m.T + (points_m**2).sum(
+        axis=1
+    ) <= (radii_m**2)[:, None]
+    return inside
+
+
+def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray) -> csr_array:
+    """(m, p), true where an image of a sphere contains the point; `images` (g, 3, 3) turn or mirror the centres."""
+    pieces = [(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))]
+    for first in range(0, len(centers_m), _ROWS_AT_A_TIME):
+        rows = slice(first, first + _ROWS_AT_A_TIME)
+        inside = np.zeros((len(radii_m[rows]), len(points_m)), dtype=np.bool_)
+        for image in images:
+            inside |= containing(centers_m[rows] @ image.T, radii_m[rows], points_m)
+        row, column = inside.nonzero()
+        pieces.append((row + first, column))
+    row, column = (np.concatenate(several) for several in zip(*pieces, strict=True))
+    return csr_array((np.ones(len(row)), (row, column)), shape=(len(centers_m), len(points_m)))
+
+
+def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
+    """Rows of `inside` (m, p) that together have a true in every column that has one; `costs` (m,) each.
+
+    The next column is that for which the best row would bring least, as a corner is: nothing better will come for it.
+    Its best row is taken. So rows grow together from corners and edges inwards instead of leaving slivers there.
+    Rows that turn out to be in vain are left out again.
+    """
+    of_column = inside.T.tocsr()
+    bearing = np.flatnonzero(np.diff(of_column.indptr))
+    starts = of_column.indptr[bearing]
+    sizes = np.diff(inside.indptr) / costs
+    best = np.zeros(inside.shape[1])
+    if len(bearing):
+        best[bearing] = np.maximum.reduceat(sizes[of_column.indices], starts)
+    # A column that only small rows reach is worth more.
+    weights = np.divide(1.0, best, out=np.zeros_like(best), where=best > 0.0)
+    gains = inside @ weights
+    left = best > 0.0
+    chosen: list[int] = []
+    while left.any():
+        value = gains / costs
+        potential = np.maximum.reduceat(value[of_column.indices], starts)
+        potential[~left[bearing]] = np.inf
+        column = int(bearing[potential.argmin()])
+        rows = of_column.indices[of_column.indptr[column] : of_column.indptr[column + 1]]
+        row = int(rows[value[rows].argmax()])
+        chosen.append(row)
+        columns = inside.indices[inside.indptr[row] : inside.indptr[row + 1]]
+        new = columns[left[columns]]
+        left[new] = False
+        touched = of_column[new]
+        gains -= np.bincount(touched.indices, np.repeat(weights[new], np.diff(touched.indptr)), minlength=len(gains))
+    return without_vain(inside, np.array(chosen, dtype=np.int64), costs)
+
+
+def without_vain(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
+    """The rows of `chosen` less those all of whose columns other rows have; the dearest and smallest go first."""
+    times: FloatArray = np.asarray(inside[chosen].sum(axis=0), dtype=np.float64).ravel()
+    sizes = np.diff(inside.indptr)
+    kept = []
+    for row in sorted(chosen.tolist(), key=lambda row: (-costs[row], sizes[row])):
+        columns = inside.indices[inside.indptr[row] : inside.indptr[row + 1]]
+        if (times[columns] > 1.5).all():
+            times[columns] -= 1.0
+        else:
+            kept.append(row)
+    return np.array(sorted(kept), dtype=np.int64)

@@ -1,0 +1,153 @@
+"""The spheres of whatever may be held, found when the objects are first known: a tick has no time for it."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.gripper.kept_covers import kept_cover
+from robot_side.gripper.solids import Solid, convex_solid
+from robot_side.gripper.spheres import cover_boxes
+from robot_side.gripper.surface_cover import cover_surface
+from robot_side.objects.mesh_bounds import mesh_bounds, mesh_corners, placed_middles
+from robot_side.objects.perceived import PerceivedObjects, Role
+
+if TYPE_CHECKING:
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
+
+_MOST_SHAPES = 32
+"""So many meshes and things of tetrahedra are covered closely; each takes up to seconds the first time."""
+_MOST_TETRAHEDRA = 64
+_WIDEST_M = 0.2
+"""What is wider than this in every direction no gripper closes around."""
+_SAME_VOLUME = 1e-9
+_SLIVER = 1e-3
+
+_Spheres = tuple[FloatArray, FloatArray]
+"""Centres (m, 3) and radii (m,)."""
+
+
+class HeldCovers:
+    """Covers of all objects of a scene, whose shapes do not change while they move.
+
+    Balls and boxes need no search. A mesh is covered in its own frame, once for each shape; the spheres of tetrahedra
+    are kept as shares of their vertices. What is too large to grip, has too many parts or comes after 32 others has a
+    box's spheres, or a ball around each tetrahedron.
+    """
+
+    def __init__(self, objects: PerceivedObjects, stand_out_m: float = 0.003) -> None:
+        """From any frame of the objects."""
+        self._stand_out_m = stand_out_m
+        self._meshes: dict[int, _Spheres] = {}
+        self._tetrahedra: dict[str, tuple[IntArray, FloatArray, FloatArray]] = {}
+        coarse: dict[str, float] = {}
+        corners = [] if objects.mesh_library is None else mesh_corners(objects.mesh_library)
+        first = sorted(range(len(objects.names)), key=lambda index: objects.roles[index] is not Role.TARGET)
+        for index in first:
+            if objects.roles[index] is Role.SUPPORT:
+                continue
+            name, stand_outs = objects.names[index], [0.0]
+            for mesh in np.unique(objects.mesh_index[objects.mesh_object == index]).tolist():
+                if objects.mesh_library is not None and mesh not in self._meshes and self._may_search(corners[mesh]):
+                    solid = _mesh_solid(objects.mesh_library, mesh, corners[mesh])
+                    found = kept_cover(
+                        corners[mesh].tobytes() + repr(stand_out_m).encode(),
+                        lambda solid=solid: cover_surface([solid], stand_out_m, [np.eye(3)]),  # type: ignore[misc]
+                    )
+                    self._meshes[mesh] = found[:2]
+                    stand_outs.append(found[2])
+            vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
+            if 0 < len(vertices) <= _MOST_TETRAHEDRA and self._may_search(vertices):
+                solids = _tetrahedra_solids(vertices)
+                if solids:
+                    centers, radii, stand_out = cover_surface(solids, stand_out_m)
+                    self._tetrahedra[name] = (*_shares(vertices, centers), radii)
+                    stand_outs.append(stand_out)
+            if max(stand_outs) > stand_out_m * (1.0 + 1e-9):
+                coarse[name] = max(stand_outs)
+        self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
+        """Names of what was searched for and still stands out farther, with by how much (m)."""
+
+    def _may_search(self, points_m: FloatArray) -> bool:
+        few = len(self._meshes) + len(self._tetrahedra) < _MOST_SHAPES
+        return few and float(np.ptp(points_m.reshape(-1, 3), axis=0).min()) <= _WIDEST_M
+
+    def spheres(self, objects: PerceivedObjects, index: int) -> _Spheres:
+        """Centres (m, 3) in the world and radii (m,) of the object `index`, where `objects` has it."""
+        balls = objects.sphere_object == index
+        found = [(objects.sphere_centers_m[balls], objects.sphere_radii_m[balls])]
+        boxes = objects.box_object == index
+        found += self._boxes(
+            objects.box_centers_m[boxes], objects.box_rotations[boxes], objects.box_half_sizes_m[boxes]
+        )
+        meshes = objects.mesh_object == index
+        for row in np.flatnonzero(meshes).tolist():
+            if (known := self._meshes.get(int(objects.mesh_index[row]))) is not None:
+                found.append((objects.mesh_positions_m[row] + known[0] @ objects.mesh_rotations[row].T, known[1]))
+        found += self._around_meshes(objects, meshes & ~np.isin(objects.mesh_index, list(self._meshes)))
+        vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
+        if (shared := self._tetrahedra.get(objects.names[index])) is not None and len(vertices):
+            rows, shares, radii = shared
+            found.append((np.einsum("mv,mvi->mi", shares, vertices[rows]), radii))
+        else:
+            middles = vertices.mean(axis=1)
+            found.append((middles, np.linalg.norm(vertices - middles[:, None, :], axis=2).max(axis=1, initial=0.0)))
+        return np.concatenate([centers for centers, _ in found]), np.concatenate([radii for _, radii in found])
+
+    def _boxes(self, centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray) -> list[_Spheres]:
+        if not len(centers_m):
+            return []
+        cover = cover_boxes(centers_m, rotations, half_sizes_m, self._stand_out_m)
+        return [(cover.centers_m, cover.radii_m)]
+
+    def _around_meshes(self, objects: PerceivedObjects, rows: BoolArray) -> list[_Spheres]:
+        if objects.mesh_library is None or not rows.any():
+            return []
+        half_sizes = mesh_bounds(objects.mesh_library).half_sizes_m[objects.mesh_index[rows]]
+        return self._boxes(placed_middles(objects)[rows], objects.mesh_rotations[rows], half_sizes)
+
+
+def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Solid:
+    """A mesh of a library in its own frame."""
+    hull = convex_solid(np.unique(corners_m.reshape(-1, 3), axis=0))
+    if hull is not None and _fills(hull, float(library.tables.volumes[mesh])):
+        return hull
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
+
+    def depth_m(points: FloatArray) -> FloatArray:
+        turns = np.ascontiguousarray(np.broadcast_to(np.eye(3), (len(points), 3, 3)))
+        index, origin = np.full(len(points), mesh, dtype=np.int64), np.zeros((len(points), 3))
+        return -nearest_mesh_pairs(np.ascontiguousarray(points), library, index, origin, turns)[0]
+
+    return Solid(corners_m, depth_m)
+
+
+def _fills(hull: Solid, volume_m3: float) -> bool:
+    """Whether a solid of this volume is its own convex hull."""
+    a, b, c = np.moveaxis(hull.corners_m - hull.corners_m[0, 0], 1, 0)
+    around_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
+    return abs(volume_m3 - around_m3) <= _SAME_VOLUME * around_m3
+
+
+def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
+    """Tetrahedra (t, 4, 3) as one solid where they fill a convex one, else each; those without volume are left out."""
+    volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1])) / 6.0
+    whole = convex_solid(vertices_m.reshape(-1, 3))
+    if whole is None:
+        return []
+    if _fills(whole, float(volumes.sum())):
+        return [whole]
+    return [solid for vertices in vertices_m if (solid := convex_solid(vertices)) is not None]
+
+
+def _shares(vertices_m: FloatArray, centers_m: FloatArray) -> tuple[IntArray, FloatArray]:
+    """For centres (m, 3): the rows (m,) of the tetrahedra (t, 4, 3) that they are in, and their shares (m, 4)."""
+    volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1]))
+    # A sliver tells nothing of where something is.
+    rows = np.flatnonzero(volumes >= _SLIVER * volumes.max())
+    edges = np.moveaxis(vertices_m[rows, 1:] - vertices_m[rows, :1], 1, 2)
+    along = np.linalg.solve(edges, (centers_m - vertices_m[rows, :1]).transpose(0, 2, 1)).transpose(0, 2, 1)
+    shares = np.concatenate([1.0 - along.sum(axis=2, keepdims=True), along], axis=2)
+    within = shares.min(axis=2).argmax(axis=0)
+    return rows[within], shares[within, np.arange(len(centers_m))]

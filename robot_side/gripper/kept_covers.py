@@ -1,0 +1,45 @@
+"""Covers that took seconds to find, kept on disk for the next start."""
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.files.user_folders import cache_folder
+
+_Cover = tuple[FloatArray, FloatArray, float]
+"""Centres (m, 3), radii (m,), and how far they stand out."""
+
+
+def kept_cover(shape: bytes, make: Callable[[], _Cover], folder: Path | None = None) -> _Cover:
+    """What `make` gives for a `shape`, or what it gave for the same one before, by the same code.
+
+    A file that cannot be read is made anew, and a folder that cannot be written to keeps nothing.
+    """
+    name = hashlib.sha256(_code() + shape).hexdigest()[:32]
+    path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"
+    with contextlib.suppress(OSError, ValueError, EOFError):
+        rows = np.load(path, allow_pickle=False)
+        if rows.ndim == 2 and rows.shape[1] == 5 and len(rows) and np.isfinite(rows).all():
+            return rows[:, :3].copy(), rows[:, 3].copy(), float(rows[0, 4])
+    centers, radii, stand_out_m = make()
+    rows = np.column_stack([centers, radii, np.full(len(radii), stand_out_m)])
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Renamed when whole, so that another process never reads half of it.
+        part = path.with_name(f"{name}.{os.getpid()}.npy")
+        np.save(part, rows)
+        part.replace(path)
+    return centers, radii, stand_out_m
+
+
+@cache
+def _code() -> bytes:
+    """A digest of all that a cover is worked out by."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files) + np.__version__.encode()).digest()

@@ -1,0 +1,136 @@
+"""Closed shapes as what covering them takes: their surface as triangles, and how deep a point is inside."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from common.arrays import FloatArray
+
+_POINTS_AT_A_TIME = 2048
+# An open round solid stands for a polyhedron around it: farther out by this share of its least radius at most.
+_EXCESS = 0.003
+_OCTAHEDRON = 16
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed solid, or one around it."""
+
+    corners_m: FloatArray
+    """(t, 3, 3) triangles that together are its surface; the corners run anticlockwise seen from outside"""
+    depth_m: Callable[[FloatArray], FloatArray]
+    """Points (n, 3) to (n,): how far each is below this surface, or less, never more; negative outside"""
+    excess_m: float = 0.0
+    """So much farther out than the true solid, at most"""
+
+    def placed(self, rotation: FloatArray, position_m: FloatArray) -> "Solid":
+        """The same where `rotation` (3, 3) and `position_m` (3,) put its frame."""
+        return Solid(
+            self.corners_m @ rotation.T + position_m,
+            lambda points: self.depth_m((points - position_m) @ rotation),
+            self.excess_m,
+        )
+
+
+def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
+    """The convex hull of `points_m` (n, 3), which is farther out than the true solid by `excess_m` at most.
+
+    None for points in one plane, which enclose nothing.
+    """
+    try:
+        hull = ConvexHull(points_m)
+    except (QhullError, ValueError):
+        return None
+    normals, offsets = np.unique(hull.equations.round(12), axis=0)[:, :3], np.empty(0)
+    offsets = (hull.points[hull.vertices] @ normals.T).max(axis=0)
+    corners = hull.points[hull.simplices]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.sum(across * hull.equations[:, :3], axis=1) < 0.0
+    corners[inward] = corners[inward][:, ::-1]
+
+    def depth_m(points: FloatArray) -> FloatArray:
+        # A point's distance to a convex polyhedron's surface is that to the nearest of its planes.
+        pieces = range(0, len(points), _POINTS_AT_A_TIME)
+        nearest = [(offsets - points[first : first + _POINTS_AT_A_TIME] @ normals.T).min(axis=1) for first in pieces]
+        return np.concatenate([np.empty(0), *nearest])
+
+    return Solid(corners, depth_m, excess_m)
+
+
+def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
+    """About the z axis, as a prism around it; None without volume."""
+    sides = math.ceil(math.pi / math.acos(1.0 / (1.0 + _EXCESS)))
+    # A multiple of four has the cylinder's mirror planes.
+    sides += -sides % 4
+    turns = 2.0 * math.pi * (np.arange(sides) + 0.5) / sides
+    reach_m = radius_m / math.cos(math.pi / sides)
+    ring = reach_m * np.column_stack([np.cos(turns), np.sin(turns)])
+    ends = [np.column_stack([ring, np.full(sides, z)]) for z in (-half_length_m, half_length_m)]
+    return convex_solid(np.concatenate(ends), reach_m - radius_m)
+
+
+def ellipsoid(semi_axes_m: FloatArray) -> Solid | None:
+    """Along the axes, semi axes (3,), as a polyhedron around it; None without volume."""
+    directions, share = _sphere()
+    return convex_solid(directions * semi_axes_m, share * float(np.max(semi_axes_m)))
+
+
+def capsule(radius_m: float, half_length_m: float) -> Solid | None:
+    """The points within `radius_m` of a line along the z axis, as a polyhedron around it; None without volume."""
+    directions, share = _sphere()
+    ends = [radius_m * directions + [0.0, 0.0, z] for z in (-half_length_m, half_length_m)]
+    return convex_solid(np.concatenate(ends), share * radius_m)
+
+
+@cache
+def _sphere() -> tuple[FloatArray, float]:
+    """Corners (n, 3) of a polyhedron around the unit sphere, and how far they are outside."""
+    steps = range(-_OCTAHEDRON, _OCTAHEDRON + 1)
+    lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == _OCTAHEDRON]
+    directions = np.array(lattice, dtype=np.float64)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    reach = 1.0 / -float(ConvexHull(directions).equations[:, 3].max())
+    return directions * reach, reach - 1.0
+
+
+def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:
+    """Triangles (k, 3, 3) that together are `corners_m` (t, 3, 3), none with an edge above `longest_m`."""
+    done = []
+    while len(corners_m):
+        lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
+        long = lengths.max(axis=1) > longest_m
+        done.append(corners_m[~long])
+        corners_m = halved(corners_m[long])
+    return np.concatenate([np.empty((0, 3, 3)), *done])
+
+
+def halved(corners_m: FloatArray) -> FloatArray:
+    """Each triangle of (t, 3, 3) cut across its longest edge: (2 t, 3, 3)."""
+    lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
+    rows, first = np.arange(len(corners_m)), lengths.argmax(axis=1)
+    a, b, c = (corners_m[rows, (first + turn) % 3] for turn in range(3))
+    middle = 0.5 * (a + b)
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(points (p, 3), normals (p, 3)): each corner of triangles (t, 3, 3) once, with the mean of its faces' normals."""
+    across = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    units = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0.0)
+    points = corners_m.reshape(-1, 3)
+    _, first, place = np.unique(
+        (points / 1e-7).round().astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    place = place.ravel()
+    # Faces that a sharp edge divides count alike, however finely each is cut.
+    faces = np.column_stack([place, np.repeat((units * 1e3).round().astype(np.int64), 3, axis=0)])
+    different = np.unique(faces, axis=0, return_index=True)[1]
+    normals = np.zeros((len(first), 3))
+    np.add.at(normals, place[different], np.repeat(units, 3, axis=0)[different])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return points[first], np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-9)
