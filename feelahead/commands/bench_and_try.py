@@ -116,10 +116,16 @@ try_out = Menu(
             "how far from things each strength begins, and what a look ahead costs",
             "pip install 'feelahead[robot,bench]'",
         ),
+        "demo": Entry(
+            "feelahead.experiments.demo_runs",
+            "try_demo",
+            "the demo over several seeds: who grasps, lifts and places, and feels the table before touching it",
+            _BOTH_SIDES,
+        ),
         "haptics": Entry(
-            "feelahead.experiments.haptics_on_off",
+            "feelahead.experiments.haptics.command",
             "try_haptics",
-            "the same simulated person with and without haptics, over the same seeds",
+            "the same simulated person with and without haptics, where there is something to hit",
             _BOTH_SIDES,
         ),
         "faults": Entry(

@@ -9,7 +9,7 @@ from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import PersonSettings
+from operator_side.simulated_person.settings import PersonSettings
 
 NAN, INFINITY = math.nan, math.inf
 

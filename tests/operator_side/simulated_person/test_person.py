@@ -14,7 +14,8 @@ from operator_side.dualsense.simulated.trigger_model import (
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.simulated_person.person import FULL_TRIGGER_M_S, PersonSettings
+from operator_side.simulated_person.person import FULL_TRIGGER_M_S
+from operator_side.simulated_person.settings import PersonSettings
 from tests.helpers.simulated_desk import (
     CALIBRATION,
     GRASP_M,

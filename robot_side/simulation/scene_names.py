@@ -1,0 +1,5 @@
+"""The built-in scenes by name; nothing here needs MuJoCo."""
+
+from typing import Literal
+
+SceneName = Literal["table", "wall", "slot", "shelf"]
