@@ -48,8 +48,9 @@ class Placing:
         if warned:
             self._warned_last_s = now_s
             self._warned = self._warned or (now_s, target.support_gap_m)
-        if held and target.support_gap_m > LIFTED_M:
-            self._lifted, self._touched = True, False
+        if target.support_gap_m > LIFTED_M:
+            # What falls out of the fingers is not placed, however it comes to stand.
+            self._lifted, self._touched = held, False
         if self._lifted and not self._touched and target.support_gap_m <= 0.0:
             self._touched = True
             self.contact_speed_m_s = (self._before or target).sinking_m_s

@@ -14,7 +14,6 @@ model; reaction times).
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -25,8 +24,9 @@ from operator_side.dualsense.reports.output_report import WARNING_LIGHT
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.fingers import Cue, Fingers, within_unit_circle
+from operator_side.simulated_person.looking import Glance, NoNearer, SinksNoMore
 from operator_side.simulated_person.settings import PersonSettings
-from operator_side.simulated_person.submove import Submove
+from operator_side.simulated_person.submove import MoveAndWait
 
 FULL_TRIGGER_M_S = 0.25
 """What a person has learnt a fully pulled trigger to do."""
@@ -43,10 +43,9 @@ _DROPPED_S = 0.5
 """After so long without the target in the fingers they believe it."""
 _CALM_S = 0.5
 """So long after the controller's warning light they let their hands rest."""
-_NO_FURTHER_S: Final = 2.5
-_PROGRESS_M: Final = 0.003
-"""Who pulls so long, beyond the delay, without getting any nearer than that, takes it for as near as it gets."""
-_STANDS_S: Final = 0.5
+_CLEAR_M: Final = 0.01
+_CLEARS_S: Final = 3.0
+"""So far they rise before they draw back, or try to for so long."""
 _BACK_M: Final = 0.1
 """So far they draw back from what they have set down."""
 
@@ -65,18 +64,6 @@ _DOING: Final[dict[Phase, str]] = {
     "done": "done",
 }
 _REST: Final[Vector2] = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Glance:
-    """What a phase decides on."""
-
-    now_s: float
-    view: Telemetry
-    gain: float
-    """How fast to correct a seen error, in 1/s."""
-    lag_s: float
-    """How long after a motion of the hand its outcome is seen, as far as they reckon with it."""
 
 
 class SimulatedOperator:
@@ -106,13 +93,12 @@ class SimulatedOperator:
         self._since_s: float | None = None
         self._attempt = 0
         self._depth_error_m = 0.0
-        self._gently = False
+        self._gently_along = self._gently_across = False
         self._from: Vector3 = (0.0, 0.0, 0.0)
         self._gripped_height_m = 0.0
         self._holding_s = 0.0
-        self._submove: Submove | None = None
-        self._nearest_m, self._nearer_s = math.inf, 0.0
-        self._heights: deque[tuple[float, float]] = deque()
+        self._moves = MoveAndWait()
+        self._nearing, self._sinking = NoNearer(0.0), SinksNoMore()
         self._warned_s = -math.inf
 
     @property
@@ -143,19 +129,21 @@ class SimulatedOperator:
         getattr(self, f"_{self.phase}")(Glance(now_s, self._view, gain, lag_s))
 
     def _feel(self, now_s: float) -> None:
-        """Go on gently, until the next phase, from a reaction after a cue that is believed."""
+        """Go on gently, until the next phase, from a reaction after a cue: with the trigger, or with the stick."""
         self._fingers.let_pass(now_s)
         stiff = self._stiff.acted_on(now_s, self._fingers.resisted_share() > self._settings.noticeable_force)
         rumbles = self._rumble.acted_on(now_s, self._device.rumble.left > 0.0)
-        if (stiff or rumbles) and not self._gently:
-            self._gently, self._submove = True, None
+        if (stiff and not self._gently_along) or (rumbles and not self._gently_across):
+            self._moves.break_off(now_s)
+        self._gently_along |= stiff
+        self._gently_across |= rumbles
 
     def _enter(self, phase: Phase, now_s: float) -> None:
         self.phase = phase
         self._since_s = now_s
-        self._gently, self._submove = False, None
-        self._nearest_m, self._nearer_s = math.inf, now_s
-        self._heights.clear()
+        self._gently_along = self._gently_across = False
+        self._moves.forget()
+        self._nearing, self._sinking = NoNearer(now_s), SinksNoMore()
 
     def _elapsed_s(self, look: Glance) -> float:
         return look.now_s - (look.now_s if self._since_s is None else self._since_s)
@@ -191,7 +179,8 @@ class SimulatedOperator:
         depth_m = look.view.target_in_tool_m[2] + self._settings.grasp_depth_m + self._depth_error_m
         off_m = math.hypot(*across)
         aligned = off_m < self._ALIGNED_M
-        if self._submove is None and aligned and (abs(depth_m) < self._REACHED_M or self._no_further(depth_m, look)):
+        settled = self._settings.aiming == "servo" or self._moves.free(look.now_s, look.lag_s)
+        if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
             self._enter("close", look.now_s)
             return
         # Off the line a person slows down; far off, they centre first.
@@ -203,18 +192,13 @@ class SimulatedOperator:
         self._go((x, y, eagerness * look.gain * depth_m))
 
     def _single_move(self, across_m: tuple[float, ...], depth_m: float, look: Glance) -> Vector3:
-        """The velocity of the present move; between two they wait until the last one's outcome is seen."""
-        if self._submove is None or look.now_s > self._submove.began_s + self._submove.duration_s + look.lag_s:
+        """The velocity of the present move; the next one is planned once the last one's outcome is seen."""
+        if self._moves.free(look.now_s, look.lag_s):
             x, y = across_m
-            across_m_s, along_m_s = (GENTLY_M_S, GENTLY_M_S) if self._gently else (_PEAK_ACROSS_M_S, _PEAK_M_S)
-            self._submove = Submove.plan(look.now_s, (x, y, depth_m), across_m_s, along_m_s)
-        return self._submove.velocity_m_s(look.now_s)
-
-    def _no_further(self, depth_m: float, look: Glance) -> bool:
-        """Whether the target has come no nearer for long, whatever they did."""
-        if depth_m < self._nearest_m - _PROGRESS_M:
-            self._nearest_m, self._nearer_s = depth_m, look.now_s
-        return look.now_s - self._nearer_s > _NO_FURTHER_S + look.lag_s
+            across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
+            along_m_s = GENTLY_M_S if self._gently_along else _PEAK_M_S
+            self._moves.begin(look.now_s, (x, y, depth_m), across_m_s, along_m_s)
+        return self._moves.velocity_m_s(look.now_s)
 
     def _close(self, look: Glance) -> None:
         self._fingers.do(0.0, _REST, {Button.CROSS})
@@ -271,27 +255,22 @@ class SimulatedOperator:
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
-        if self._sinks_no_more(height_m, look):
+        if self._sinking.see(height_m, GENTLY_M_S, look):
             self._from = look.view.tool_position_m
             self._enter("release", look.now_s)
         left_m = height_m - self._gripped_height_m + self._depth_error_m
         x, y, z = (-min(_CARRY_M_S, max(look.gain * left_m, GENTLY_M_S)) * part for part in look.view.up_in_tool)
         self._go((x, y, z), {Button.CROSS})
 
-    def _sinks_no_more(self, height_m: float, look: Glance) -> bool:
-        """Whether it had begun to sink, and has not for a moment now."""
-        self._heights.append((look.now_s, height_m))
-        while self._heights[0][0] < look.now_s - _STANDS_S:
-            self._heights.popleft()
-        sunk_m = self._heights[0][1] - height_m
-        return self._from[2] - height_m > _PROGRESS_M and sunk_m < 0.2 * GENTLY_M_S * _STANDS_S
-
     def _release(self, look: Glance) -> None:
-        """Open; what stands stays."""
-        self._fingers.do(0.0, _REST, {Button.SQUARE})
-        if self._elapsed_s(look) > 1.0 and not look.view.holding:
+        """Open, and rise a little out of where they have pressed it down; what stands stays."""
+        risen_m = look.view.tool_position_m[2] - self._from[2]
+        if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
             self._from = look.view.tool_position_m
             self._enter("withdraw", look.now_s)
+        rises = 0.0 if look.view.holding or self._elapsed_s(look) < 0.6 else GENTLY_M_S
+        x, y, z = (rises * part for part in look.view.up_in_tool)
+        self._go((x, y, z), {Button.SQUARE})
 
     def _withdraw(self, look: Glance) -> None:
         back_m = math.dist(look.view.tool_position_m, self._from)
@@ -303,11 +282,10 @@ class SimulatedOperator:
         self._fingers.do(0.0, _REST, {Button.CROSS} if look.view.holding else set())
 
     def _go(self, velocity_m_s: Vector3, buttons: set[Button] | None = None) -> None:
-        """Pull and push what gives the tool this velocity in its own frame; its y axis points down the screen.
-
-        Once they go gently, no part of it is faster than that.
+        """Pull and push what gives the tool this velocity in its own frame, or less where they go gently; its y axis
+        points down the screen.
         """
-        most_m_s = GENTLY_M_S if self._gently else math.inf
-        x, y, z = (min(max(part, -most_m_s), most_m_s) for part in velocity_m_s)
+        across, along = (GENTLY_M_S if gently else math.inf for gently in (self._gently_across, self._gently_along))
+        x, y, z = (min(max(v, -most), most) for v, most in zip(velocity_m_s, (across, across, along), strict=True))
         stick = within_unit_circle(x / FULL_STICK_M_S, -y / FULL_STICK_M_S)
         self._fingers.do(z / FULL_TRIGGER_M_S, stick, buttons or set())

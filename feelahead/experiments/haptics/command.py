@@ -58,6 +58,8 @@ class ComparisonSettings:
     """How many pairs; the seeds are 0 to N-1."""
     duration: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 45.0
     """The limit of each trial, in virtual time."""
+    tick: Annotated[float, tyro.conf.arg(metavar="MS")] = 4.0
+    """Period of the robot side's ticks, in milliseconds; 1 is the real one, and takes more than twice the time."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
     """Trials at the same time."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
@@ -76,6 +78,8 @@ class ComparisonSettings:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 10000 seconds")
         if not 0.0 <= self.jitter <= 1000.0:
             raise ValueError(f"--jitter {self.jitter}: valid: 0 to 1000 milliseconds")
+        if not 1.0 <= self.tick <= 10.0:
+            raise ValueError(f"--tick {self.tick}: valid: 1 to 10 milliseconds")
         for name in ("scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):
@@ -109,6 +113,7 @@ def compare(settings: ComparisonSettings) -> list[Row]:
             settings.person,
             settings.duration,
             settings.link_model,
+            1e-3 * settings.tick,
         )
         for scene, delay_ms, arm, seed in keys
     ]

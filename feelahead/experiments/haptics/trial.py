@@ -12,6 +12,7 @@ from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
 from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.main import TICK_PERIOD_S
 from robot_side.objects.perceived import Role
 from robot_side.placing import Placing
 from robot_side.settings import RobotSettings
@@ -41,6 +42,8 @@ class Trial:
     person: PersonSettings
     duration_s: float
     link_model: LinkModel = "datagram"
+    tick_period_s: float = TICK_PERIOD_S
+    """Of the robot side"""
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,7 @@ class _Watch:
             scene=self.scene,
             after_robot_tick=self._look,
             other_law=_Silent if trial.arm == "off" else None,
+            tick_period_s=trial.tick_period_s,
         )
 
     def _look(self, now_s: float) -> None:
