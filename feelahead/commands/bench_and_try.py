@@ -128,6 +128,12 @@ try_out = Menu(
             "the same simulated person with and without haptics, where there is something to hit",
             _BOTH_SIDES,
         ),
+        "scenes": Entry(
+            "feelahead.experiments.scenes",
+            "try_scenes",
+            "draw the built-in scenes from above and from the side",
+            "pip install 'feelahead[robot,bench]'",
+        ),
         "faults": Entry(
             "feelahead.experiments.faults.table",
             "try_faults",
