@@ -14,7 +14,7 @@ from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
 from robot_side.operators.safety import SafetySettings
-from robot_side.simulation.scene_names import SceneName
+from robot_side.simulation.built_in_scenes import SceneName
 
 
 def _require(name: str, value: float, low: float, high: float) -> None:

@@ -10,6 +10,7 @@ from itertools import product
 from typing import Annotated
 
 import tyro
+from rich.box import MARKDOWN
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -21,7 +22,7 @@ from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.settings import require_young_loop
 from feelahead.experiments.haptics.trial import Result, Trial, run_trial
 from operator_side.simulated_person.settings import PersonSettings
-from robot_side.simulation.scene_names import SceneName
+from robot_side.simulation.built_in_scenes import SceneName
 
 _PROGRAM = "feelahead try demo"
 
@@ -58,7 +59,7 @@ class DemoRunsSettings:
 
 def table(link: str, results: Sequence[Result]) -> Table:
     """A row for each seed, and how many did it."""
-    shown = Table(title=Text(f"link: {link or 'none'}"))
+    shown = Table(title=Text(f"link: {link or 'none'}"), box=MARKDOWN)
     for heading in (
         *("seed", "grasped", "lifted, mm", "placed", "felt before touch, s", "mm", "touched at, mm/s", "tilt, °"),
         *("hits", "finished, s"),

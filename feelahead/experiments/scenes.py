@@ -13,8 +13,8 @@ import tyro
 
 from common.arrays import FloatArray
 from common.command.command_line import parse_settings
+from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.scene import Scene, load_scene
-from robot_side.simulation.scene_names import SceneName
 
 _GRASP_M: Final = 0.02
 _VIEWS: Final = (("from above", 0, 1), ("from the side", 0, 2))

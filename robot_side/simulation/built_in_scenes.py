@@ -1,11 +1,11 @@
 """The built-in arm's scenes: what stands around the target, and what of it is drawn from the seed."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
-from robot_side.simulation.scene_names import SceneName
+SceneName = Literal["table", "wall", "slot", "shelf"]
 
 _TIPS_BEYOND_TARGET_M: Final = 0.035
 """The fingertips end so far beyond the target's centre when that lies 20 mm towards the palm, where a person grasps."""

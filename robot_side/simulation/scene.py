@@ -15,11 +15,10 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.objects.perceived import Role
 from robot_side.objects.roles import assign_roles
-from robot_side.simulation.built_in_scenes import furnish
+from robot_side.simulation.built_in_scenes import SceneName, furnish
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.simulation.robot_model import RobotModel, can_touch, find_robot
-from robot_side.simulation.scene_names import SceneName
 
 _LOG = logging.getLogger(__name__)
 _ASSETS = Path(__file__).parent / "assets"

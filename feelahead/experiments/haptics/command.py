@@ -16,6 +16,7 @@ from statistics import median
 from typing import Annotated
 
 import tyro
+from rich.box import MARKDOWN
 from rich.console import Console
 from rich.table import Table
 
@@ -26,7 +27,7 @@ from feelahead.approaches.progress import progress
 from feelahead.experiments.haptics.statistics import exact_interval, mcnemar_p, mean_difference_interval, restricted
 from feelahead.experiments.haptics.trial import Arm, Result, Trial, run_trial
 from operator_side.simulated_person.settings import PersonSettings
-from robot_side.simulation.scene_names import SceneName
+from robot_side.simulation.built_in_scenes import SceneName
 
 _PROGRAM = "feelahead try haptics"
 ARMS: tuple[Arm, ...] = ("off", "mechanical", "reacting")
@@ -129,7 +130,8 @@ def tables(settings: ComparisonSettings, rows: Sequence[Row]) -> list[Table]:
     """One for each scene and delay, a row for each arm."""
     made = []
     for scene, delay_ms in product(settings.scenes, settings.delays):
-        table = Table(title=f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs")
+        # As Markdown, for docs/measurements.md.
+        table = Table(title=f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs", box=MARKDOWN)
         for heading in (
             *("haptics", "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"),
             *("felt first", "finished, s", "longer by [95 %]"),

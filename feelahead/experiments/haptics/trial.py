@@ -16,9 +16,9 @@ from robot_side.main import TICK_PERIOD_S
 from robot_side.objects.perceived import Role
 from robot_side.placing import Placing
 from robot_side.settings import RobotSettings
+from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import load_scene
-from robot_side.simulation.scene_names import SceneName
 from robot_side.simulation.true_contact import TrueContact
 
 Arm = Literal["off", "mechanical", "reacting"]

@@ -16,7 +16,7 @@ from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
-from robot_side.simulation.scene_names import SceneName
+from robot_side.simulation.built_in_scenes import SceneName
 from tests.helpers.repository import ROOT
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}

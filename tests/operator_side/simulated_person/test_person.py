@@ -201,7 +201,7 @@ def test_what_sinks_no_more_stands_and_is_let_go_and_left() -> None:
     assert desk.watch(at_height(0.335, holding=False), 0.5)[-1].l2_n > 0.0
     desk.until("done", armed(tool_position_m=(0.33, 0.0, 0.335)), 0.5)
     for hands in desk.watch(armed(tool_position_m=(0.33, 0.0, 0.335)), 1.0):
-        assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), {Button.L1})
+        assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
 
 
 def test_without_a_target_nobody_seems_to_advance() -> None:
