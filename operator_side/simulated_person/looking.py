@@ -8,7 +8,7 @@ from typing import Final
 from common.protocol.messages import Telemetry
 
 _NO_FURTHER_S: Final = 2.5
-PROGRESS_M: Final = 0.003
+_PROGRESS_M: Final = 0.003
 """Less than this is no motion to the eye."""
 _STANDS_S: Final = 0.5
 
@@ -33,7 +33,7 @@ class NoNearer:
 
     def see(self, way_m: float, look: Glance) -> bool:
         """Take in the way that seems left."""
-        if way_m < self._nearest_m - PROGRESS_M:
+        if way_m < self._nearest_m - _PROGRESS_M:
             self._nearest_m, self._nearer_s = way_m, look.now_s
         return look.now_s - self._nearer_s > _NO_FURTHER_S + look.lag_s
 
@@ -43,13 +43,14 @@ class SinksNoMore:
 
     def __init__(self) -> None:
         self._heights: deque[tuple[float, float]] = deque()
-        self._highest_m = -math.inf
+        self._sank = False
 
     def see(self, height_m: float, slowest_m_s: float, look: Glance) -> bool:
         """Take in the height; nothing sinks more slowly than at `slowest_m_s` before it stands."""
-        self._highest_m = max(self._highest_m, height_m)
         self._heights.append((look.now_s, height_m))
         while self._heights[0][0] < look.now_s - _STANDS_S:
             self._heights.popleft()
-        sunk_m = self._heights[0][1] - height_m
-        return self._highest_m - height_m > PROGRESS_M and sunk_m < 0.2 * slowest_m_s * _STANDS_S
+        share = (self._heights[0][1] - height_m) / (slowest_m_s * _STANDS_S)
+        # What sags a little before it is lowered has not begun to.
+        self._sank |= share > 0.5
+        return self._sank and share < 0.2

@@ -184,7 +184,7 @@ def try_haptics(arguments: Sequence[str]) -> int:
     rows = compare(settings)
     if settings.csv is not None:
         write_rows(settings.csv, rows)
-    console = Console(width=150 if not sys.stdout.isatty() else None)
+    console = Console(width=160 if not sys.stdout.isatty() else None)
     for table in tables(settings, rows):
         console.print(table)
     return 0

@@ -187,6 +187,13 @@ def test_who_does_not_believe_what_rumbles_lowers_on() -> None:
     assert stick_speed_m_s(desk.hands[-1]) == pytest.approx(0.05, abs=1e-6)
 
 
+def test_what_sags_before_it_is_lowered_does_not_stand_yet() -> None:
+    desk = carried()
+    sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
+    desk.watch(at_height(UP_AT_M - 0.004), 1.0)
+    assert desk.person.phase == "lower"
+
+
 def test_what_sinks_no_more_stands_and_is_let_go_and_left() -> None:
     desk = carried()
     sinks(desk, UP_AT_M, 0.32, 0.05)
