@@ -51,7 +51,7 @@ class DemoSettings(RunOptions):
     """What stands around the target. table: a cluttered table. wall: a wall 10 to 60 mm behind it. slot: two posts on
     the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front edge has to be reached over. The
     last three are drawn from the seed."""
-    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 25.0
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
     """How long to run from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
