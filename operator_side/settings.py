@@ -10,7 +10,7 @@ from common.command.run_options import RunOptions
 from common.protocol.messages import Compensation
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.simulated_person.person import PersonSettings
+from operator_side.simulated_person.settings import PersonSettings
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from common.arrays import FloatArray
 from common.statistics import RunningStatistics
 from robot_side.ahead.law import Sensed
 from robot_side.objects.perceived import Role
+from robot_side.placing import Placing
 
 if TYPE_CHECKING:
     from robot_side.simulation.ground_truth import Truth
@@ -40,6 +41,9 @@ class RunFigures:
         self._grasped_s: float | None = None
         self._rest_height_m: float | None = None
         self._lifted_m = 0.0
+        self._placing = Placing()
+        self._held = False
+        self._warned = False
 
     def tick(self, sensed: Sensed, tool_speed_m_s: float, *, armed: bool = True) -> None:
         """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
@@ -50,6 +54,7 @@ class RunFigures:
         self._overlap.add(sensed.overlap_m3)
         self._l2.add(sensed.l2.stiffness if armed else 0.0)
         self._r2.add(sensed.r2.stiffness if armed else 0.0)
+        self._warned = max(sensed.rumble, sensed.l2.stiffness, sensed.r2.stiffness) > 0.0
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""
@@ -60,9 +65,12 @@ class RunFigures:
                 self._contacts[name] = self._contacts.get(name, 0) + 1
                 self._obstacle_contacts += roles[name] is Role.OBSTACLE
             self._touched_s[name] = now_s
+        if truth.target is not None:
+            self._placing.observe(truth.target, self._held, self._warned, now_s)
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
         """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
+        self._held = held
         if armed and self._armed_s is None:
             self._armed_s = now_s
         if held and self._grasped_s is None:
@@ -97,6 +105,7 @@ class RunFigures:
             "task": {
                 "time_to_grasp_s": grasp_s,
                 "lifted_mm": 1e3 * self._lifted_m,
+                "placing": self._placing.summary(self._armed_s),
                 "obstacle_contacts": self._obstacle_contacts,
                 "contacts_by_object": dict(sorted(self._contacts.items())),
                 "min_obstacle_distance_mm": _scaled(self._min_obstacle_distance_m, 1e3),

@@ -65,8 +65,11 @@ class Loopback:
         person: Callable[[SimulatedDualSense], Person] | None = None,
         after_robot_tick: Callable[[float], None] | None = None,
         other_law: Callable[[Law], Law] | None = None,
+        tick_period_s: float = TICK_PERIOD_S,
     ) -> None:
         """`scene`: instead of the one that the settings name; `person`: instead of the scripted one.
+
+        tick_period_s: of the robot side; the physics keeps its own steps, and its fields come each 10 ms at most.
 
         other_law: makes another law of the one that the settings name.
         after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
@@ -102,6 +105,7 @@ class Loopback:
             )
         )
         self._after_robot_tick = after_robot_tick
+        self._tick_period_s = tick_period_s
         self.tick_time = RunningStatistics(settings.robot.seed)
         there, back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(there.profile("to_robot"))
@@ -119,7 +123,7 @@ class Loopback:
             if due_s >= self._motions * MOTION_PERIOD_S:
                 self._motions += 1
                 self._operator_tick(due_s)
-            if due_s >= self._ticks * TICK_PERIOD_S:
+            if due_s >= self._ticks * self._tick_period_s:
                 self._ticks += 1
                 self._robot_tick(due_s)
             self._deliver(due_s)
@@ -138,7 +142,7 @@ class Loopback:
         return merged
 
     def _next_event(self) -> float:
-        dues = [self._ticks * TICK_PERIOD_S, self._motions * MOTION_PERIOD_S]
+        dues = [self._ticks * self._tick_period_s, self._motions * MOTION_PERIOD_S]
         dues += [due for line in (self._to_robot, *self._to_operator.values()) if (due := line.next_due()) is not None]
         # A message that was due at once, in the middle of an instant, must not turn the clock back.
         return max(min(dues), self.clock.now())

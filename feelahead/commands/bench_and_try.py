@@ -122,11 +122,23 @@ try_out = Menu(
             "how far from things each strength begins, and what a look ahead costs",
             "pip install 'feelahead[robot,bench]'",
         ),
-        "haptics": Entry(
-            "feelahead.experiments.haptics_on_off",
-            "try_haptics",
-            "the same simulated person with and without haptics, over the same seeds",
+        "demo": Entry(
+            "feelahead.experiments.demo_runs",
+            "try_demo",
+            "the demo over several seeds: who grasps, lifts and places, and feels the table before touching it",
             _BOTH_SIDES,
+        ),
+        "haptics": Entry(
+            "feelahead.experiments.haptics.command",
+            "try_haptics",
+            "the same simulated person with and without haptics, where there is something to hit",
+            _BOTH_SIDES,
+        ),
+        "scenes": Entry(
+            "feelahead.experiments.scenes",
+            "try_scenes",
+            "draw the built-in scenes from above and from the side",
+            "pip install 'feelahead[robot,bench]'",
         ),
         "faults": Entry(
             "feelahead.experiments.faults.table",

@@ -42,12 +42,16 @@ class DemoSettings(RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
     The person arms the arm, pulls R2 to advance towards the target, feels the trigger stiffen as things come
-    near, grasps the target and lifts it. Nothing is needed but this machine.
+    near, grasps the target, lifts it, and sets it down again. Nothing is needed but this machine.
 
     Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
     """
 
-    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 20.0
+    scene: Literal["table", "wall", "slot", "shelf"] = "table"
+    """What stands around the target. table: a cluttered table. wall: a wall 10 to 60 mm behind it. slot: two posts on
+    the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front edge has to be reached over. The
+    last three are drawn from the seed."""
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
     """How long to run from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
@@ -69,6 +73,11 @@ class DemoSettings(RunOptions):
     """More settings for the robot side: see feelahead-robot --help."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """More settings for the operator side: see feelahead-operator --help."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.scene != "table" and self.model is not None:
+            raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
 
 
 def demo(arguments: Sequence[str]) -> int:
@@ -147,7 +156,7 @@ def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Pa
     arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     if settings.robot_config is not None:
         arguments.append(f"--config={settings.robot_config}")
-    for name in ("model", "site", "probability", "law"):
+    for name in ("scene", "model", "site", "probability", "law"):
         if name in given:
             arguments.append(f"--{name}={getattr(settings, name)}")
     return arguments
@@ -243,9 +252,22 @@ def _report(summary: dict[str, Any]) -> list[str]:
     ]
     task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
     grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
+    placing = task["placing"]
     return [
         f"delay: {', '.join(shown) or 'unknown'}",
         f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
         f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
-        f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm; contacts with obstacles: {task['obstacle_contacts']}",
+        f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
+        f"contacts with obstacles: {task['obstacle_contacts']}",
     ]
+
+
+def _placed(placing: Mapping[str, Any]) -> str:
+    """What came of setting it down."""
+    if not placing["placed"]:
+        return "not placed"
+    felt = "not felt before it was touched"
+    if placing["felt_before_s"] is not None:
+        felt = f"felt {placing['felt_before_s']:.1f} s and {placing['felt_before_mm']:.0f} mm before it was touched"
+    how = f"placed after {placing['time_s']:.1f} s at {placing['contact_speed_mm_s']:.0f} mm/s"
+    return f"{how}; what it stands on was {felt}"

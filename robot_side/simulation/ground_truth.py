@@ -1,14 +1,31 @@
 """What is true of the simulated world, for summaries and tests alone."""
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.arrays import IntArray
+from common.arrays import FloatArray, IntArray
 from robot_side.objects.perceived import Role
 from robot_side.simulation.scene import Scene
+
+_FARTHEST_SUPPORT_M: Final = 1.0
+
+
+@dataclass(frozen=True)
+class TargetTruth:
+    """Where the target really is."""
+
+    position_m: FloatArray
+    """(3,) of its body"""
+    support_gap_m: float
+    """To the nearest support, negative inside it; at most 1 m"""
+    sinking_m_s: float
+    """Downwards"""
+    tilt_rad: float
+    """Between what was upwards at the start and upwards"""
 
 
 @dataclass(frozen=True)
@@ -22,6 +39,8 @@ class Truth:
     """The same over obstacles alone."""
     contacts: frozenset[tuple[str, str]]
     """(gripper geom, object) now in contact, supports included"""
+    target: TargetTruth | None = None
+    """None without a target"""
 
 
 class GroundTruth:
@@ -34,6 +53,8 @@ class GroundTruth:
         model = scene.model
         self._gripper = {int(geom): model.geom(geom).name or f"geom{geom}" for geom in scene.robot.gripper_geoms}
         self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
+        # What points upwards at the start, in each body's own frame.
+        self._up: FloatArray = scene.data.xmat[:, 6:].copy()
 
     def observe(self) -> Truth:
         """The distances and contacts at the simulation's present state."""
@@ -46,6 +67,28 @@ class GroundTruth:
             min_distance_m=to_any if to_any < self._farthest_m else None,
             min_obstacle_distance_m=to_obstacles if to_obstacles < self._farthest_m else None,
             contacts=self._contacts(),
+            target=self.target(),
+        )
+
+    def target(self) -> TargetTruth | None:
+        """Where the target really is at the present state; None without one."""
+        roles, model, data = self._scene.roles, self._scene.model, self._scene.data
+        mine = [geom for geom, name in self._object_of.items() if roles[name] is Role.TARGET]
+        if not mine:
+            return None
+        supports = [geom for geom, name in self._object_of.items() if roles[name] is Role.SUPPORT]
+        gap_m = least_distance(
+            model, data, np.array(mine, dtype=np.int64), np.array(supports, dtype=np.int64), _FARTHEST_SUPPORT_M
+        )
+        body = int(model.geom_bodyid[mine[0]])
+        twist: FloatArray = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        upright = float(data.xmat[body].reshape(3, 3)[2] @ self._up[body])
+        return TargetTruth(
+            position_m=data.xpos[body].copy(),
+            support_gap_m=gap_m,
+            sinking_m_s=-float(twist[5]),
+            tilt_rad=math.acos(min(max(upright, -1.0), 1.0)),
         )
 
     def _distance(self, object_geoms: list[int], farthest_m: float) -> float:

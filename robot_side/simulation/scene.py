@@ -15,6 +15,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.objects.perceived import Role
 from robot_side.objects.roles import assign_roles
+from robot_side.simulation.built_in_scenes import SceneName, furnish
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.simulation.robot_model import RobotModel, can_touch, find_robot
@@ -63,11 +64,15 @@ class Scene:
 
 
 def load_scene(
-    model_path: Path | None = None, site: str | None = None, roles: Mapping[str, Role] | None = None
+    model_path: Path | None = None,
+    site: str | None = None,
+    roles: Mapping[str, Role] | None = None,
+    name: SceneName = "table",
+    seed: int = 0,
 ) -> Scene:
     """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
 
-    A file with nothing but a robot and planes gets the built-in table and its objects in front of the robot.
+    A file with nothing but a robot and planes gets the built-in scene `name`, as drawn from `seed`, in front of it.
     The arm starts at the keyframe `home`, else the first keyframe, else the middle of its joints' ranges.
     `roles` overrides what the objects' names tell. ConfigurationError, one line, for what cannot be used.
     """
@@ -87,7 +92,9 @@ def load_scene(
             while any(model.key(key).name == start_key for key in range(model.nkey)):
                 start_key += "_"
             spec.add_key(name=start_key, qpos=start)
-            _attach_table(spec, model, robot, start)
+            surroundings = _read(_ASSETS / f"{name}_scene.xml")
+            furnish(surroundings, name, seed)
+            _attach(surroundings, spec, model, robot, start)
             model = _compile(spec)
             robot = find_robot(model, site)
             start = model.key(start_key).qpos
@@ -171,8 +178,8 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
     return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
 
 
-def _attach_table(spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
-    """Put the built-in table under the tool's start, at the height of the robot's base and the way the tool is."""
+def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
+    """Put the table scene under the tool's start, at the height of the robot's base and the way the tool is."""
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)
@@ -180,7 +187,6 @@ def _attach_table(spec: Any, model: Any, robot: RobotModel, start: FloatArray) -
     ahead = tool[:2] - base[:2]
     # A tool straight above the base has no side of its own.
     yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
-    table = _read(_ASSETS / "table_scene.xml")
     home_x, home_y, _ = table.site("tool_home").pos
     if model.geom_type[model.geom_type == GeomKind.PLANE].size:
         table.delete(table.geom("floor"))

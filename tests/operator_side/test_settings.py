@@ -9,7 +9,7 @@ from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import PersonSettings
+from operator_side.simulated_person.settings import PersonSettings
 
 NAN, INFINITY = math.nan, math.inf
 
@@ -23,6 +23,12 @@ NAN, INFINITY = math.nan, math.inf
         (PersonSettings, "grasp_depth_m", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "lift_m", (-0.1, 10.0, NAN, INFINITY)),
         (PersonSettings, "attempts", (0, -1)),
+        (PersonSettings, "carry_m", (-0.1, 10.0, NAN)),
+        (PersonSettings, "depth_error_mean_m", (-1.1, 1.1, NAN)),
+        (PersonSettings, "touch_reaction_s", (0.0, -0.1, 10.0, NAN)),
+        (PersonSettings, "touch_reaction_sd_s", (-0.1, 10.0, NAN)),
+        (PersonSettings, "trust", (-0.1, 1.1, NAN)),
+        (PersonSettings, "noticeable_force", (-0.1, 1.1, NAN)),
         (TriggerTravel, "dead_zone", (-0.1, 0.98, 1.5, NAN)),
         (TriggerTravel, "saturation", (0.05, 0.0, 1.1, NAN)),
         (StickRest, "dead_zone", (-0.1, 1.0, NAN)),

@@ -62,7 +62,7 @@ def played(delay_ms: int, haptics: bool, compensation: Compensation) -> Episode:
     link = f"delay {delay_ms}ms 10ms distribution normal" if delay_ms else ""
     run, moments = loopback(link, haptics=haptics, compensation=compensation), []
     # By then the target is lifted, or without haptics, where only the way there counts, approached.
-    end_s = (11.0 if delay_ms else 8.5) if haptics else 4.5
+    end_s = (15.0 if delay_ms else 8.5) if haptics else 4.5
     while run.clock.now() < end_s:
         run.run_until(run.clock.now() + LOOK_S)
         assert isinstance(run.person, SimulatedOperator)

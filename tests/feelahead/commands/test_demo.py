@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -15,6 +16,7 @@ from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
+from robot_side.simulation.built_in_scenes import SceneName
 from tests.helpers.repository import ROOT
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
@@ -50,6 +52,36 @@ def test_the_demos_own_file_counts_as_said(tmp_path: Path) -> None:
     robot, operator = passed_on("--config", str(config))
     assert {"--link=delay 5ms", "--law=paper"} <= set(robot)
     assert {"--no-haptics", "--compensation=robot"} <= set(operator)
+
+
+@pytest.mark.parametrize("scene", get_args(SceneName))
+def test_the_robot_side_is_told_the_scene(scene: str) -> None:
+    robot, operator = passed_on("--scene", scene)
+    assert parse_settings(RobotSettings, "robot", robot).scene == scene
+    assert not [flag for flag in operator if flag.startswith("--scene")]
+
+
+def test_the_demo_offers_every_scene_and_says_what_each_is(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        demo(["--help"])
+    said = capsys.readouterr().out
+    assert all(f"{scene}:" in said for scene in get_args(SceneName))
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--scene", "attic"], "--scene"),
+        (["--scene", "wall", "--model", "arm.xml", "--site", "tool"], "--scene wall with --model: valid: one of them"),
+    ],
+)
+def test_a_scene_that_cannot_be_is_bad_input_in_one_line(arguments: list[str], complaint: str) -> None:
+    with start(*arguments) as process:
+        said, complained = process.communicate(timeout=600)
+    assert (process.returncode, said) == (2, "")
+    assert complaint in complained
+    assert complained.count("\n") == 1
 
 
 @pytest.mark.parametrize("law", ["swept", "paper"])

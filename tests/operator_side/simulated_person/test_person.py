@@ -1,22 +1,26 @@
 """The scripted person alone: hand-made views of a robot that is not there, and what the hands do."""
 
+import dataclasses
 import math
 
 import msgspec
 import pytest
 
-from common.protocol.messages import Vector3
-from operator_side.dualsense.effects.official import Feedback
+from common.protocol.messages import Telemetry, Vector3
+from operator_side.dualsense.effects.official import Feedback, Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport
+from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport, Rumble
 from operator_side.dualsense.simulated.trigger_model import (
     NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
-from operator_side.simulated_person.person import FULL_TRIGGER_M_S, PersonSettings
+from operator_side.simulated_person.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
+from operator_side.simulated_person.settings import PersonSettings
 from tests.helpers.simulated_desk import (
     CALIBRATION,
+    CLEAR_SIGHTED,
+    FRAME_S,
     GRASP_M,
     TICK_S,
     VIEW,
@@ -94,12 +98,117 @@ def test_the_task_goes_from_waiting_to_lifting() -> None:
     desk.until("lift", armed(holding=True), 1.0)
     desk.watch(armed(holding=True), 1.0)
     assert desk.person.phase == "lift"
-    risen = armed(holding=True, tool_position_m=(0.5, 0.0, 0.41))
-    desk.until("done", risen, 0.5)
-    for hands in desk.watch(risen, 2.0):
-        assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
-        assert hands.buttons == {Button.L1, Button.CROSS}
-        assert hands.phase == "done"
+    desk.until("carry", armed(holding=True, tool_position_m=(0.5, 0.0, 0.41)), 0.5)
+    desk.until("lower", armed(holding=True, tool_position_m=(0.44, 0.0, 0.41)), 0.5)
+
+
+UP_AT_M = 0.41
+"""Where a thing that was gripped with the tool at 0.3 m is carried."""
+
+
+def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
+    """Up to where the person begins to lower what they hold."""
+    desk = Desk(settings)
+    desk.arm()
+    desk.until("lift", armed(holding=True), 3.0)
+    desk.until("carry", armed(holding=True, tool_position_m=(0.5, 0.0, UP_AT_M)), 1.0)
+    desk.until("lower", armed(holding=True, tool_position_m=(0.44, 0.0, UP_AT_M)), 1.0)
+    return desk
+
+
+def at_height(height_m: float, *, holding: bool = True) -> Telemetry:
+    return armed(holding=holding, tool_position_m=(0.44, 0.0, height_m))
+
+
+def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
+    """The screen shows the tool sinking."""
+    height_m = from_m
+    while height_m > to_m:
+        desk.watch(at_height(height_m), FRAME_S)
+        height_m -= speed_m_s * FRAME_S
+
+
+def stick_speed_m_s(hands: Hands) -> float:
+    """Downwards"""
+    return -FULL_STICK_M_S * CALIBRATION.left_stick.deflection(hands.left)[1]
+
+
+def test_they_carry_it_back_level_and_no_farther_than_they_meant() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.until("lift", armed(holding=True), 3.0)
+    up = armed(holding=True, tool_position_m=(0.5, 0.0, UP_AT_M))
+    desk.until("carry", up, 1.0)
+    back = desk.watch(up, 0.5)[-1]
+    assert back.l2_n > 0.0
+    assert (back.r2_n, back.left) == (0.0, (0.0, 0.0))
+    assert Button.CROSS in back.buttons
+    desk.watch(armed(holding=True, tool_position_m=(0.46, 0.0, UP_AT_M)), 1.0)
+    assert desk.person.phase == "carry"
+    slower = desk.hands[-1]
+    assert 0.0 < slower.l2_n < back.l2_n
+
+
+def test_a_tool_that_points_down_has_no_back_to_carry_to() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.until("lift", armed(holding=True, up_in_tool=(0.0, 0.0, -1.0)), 3.0)
+    up = armed(holding=True, up_in_tool=(0.0, 0.0, -1.0), tool_position_m=(0.5, 0.0, UP_AT_M))
+    desk.until("lower", up, 1.0)
+    assert desk.watch(up, 0.3)[-1].r2_n > 0.0
+
+
+def test_they_set_it_down_gently_where_they_took_it_from() -> None:
+    desk = carried()
+    assert stick_speed_m_s(desk.watch(at_height(UP_AT_M), 0.5)[-1]) == pytest.approx(0.05, abs=1e-6)
+    sinks(desk, UP_AT_M, 0.3, 0.05)
+    assert stick_speed_m_s(desk.hands[-1]) == pytest.approx(GENTLY_M_S, abs=0.002)
+    assert desk.person.phase == "lower"
+
+
+def test_what_rumbles_is_lowered_gently_a_reaction_later_and_until_it_stands() -> None:
+    desk = carried()
+    sinks(desk, UP_AT_M, 0.38, 0.05)
+    desk.tell(OutputReport(rumble=Rumble(left=0.25)))
+    felt_s = desk.now_s
+    sinks(desk, 0.38, 0.35, 0.05)
+    eased_s = next(h.now_s for h in desk.hands if h.now_s >= felt_s and stick_speed_m_s(h) < 1.01 * GENTLY_M_S)
+    assert 0.15 < eased_s - felt_s < 0.5
+    # It stays gentle, as what was felt is still there.
+    desk.tell(OutputReport(rumble=Rumble()))
+    assert stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S
+
+
+def test_who_does_not_believe_what_rumbles_lowers_on() -> None:
+    desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=0.0))
+    sinks(desk, UP_AT_M, 0.4, 0.05)
+    desk.tell(OutputReport(rumble=Rumble(left=1.0)))
+    sinks(desk, 0.4, 0.37, 0.05)
+    assert stick_speed_m_s(desk.hands[-1]) == pytest.approx(0.05, abs=1e-6)
+
+
+def test_what_sags_before_it_is_lowered_does_not_stand_yet() -> None:
+    desk = carried()
+    sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
+    desk.watch(at_height(UP_AT_M - 0.004), 1.0)
+    assert desk.person.phase == "lower"
+
+
+def test_what_sinks_no_more_stands_and_is_let_go_and_left() -> None:
+    desk = carried()
+    sinks(desk, UP_AT_M, 0.32, 0.05)
+    assert desk.person.phase == "lower"
+    desk.until("release", at_height(0.32), 1.0)
+    opening = desk.watch(at_height(0.32), 0.5)
+    assert all(hands.buttons == {Button.L1, Button.SQUARE} for hands in opening[1:])
+    # Out of where they have pressed it down, before they draw back.
+    rising = desk.watch(at_height(0.32, holding=False), 1.0)[-1]
+    assert (rising.phase, stick_speed_m_s(rising) < 0.0) == ("release", True)
+    desk.until("withdraw", at_height(0.335, holding=False), 0.5)
+    assert desk.watch(at_height(0.335, holding=False), 0.5)[-1].l2_n > 0.0
+    desk.until("done", armed(tool_position_m=(0.33, 0.0, 0.335)), 0.5)
+    for hands in desk.watch(armed(tool_position_m=(0.33, 0.0, 0.335)), 1.0):
+        assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
 
 
 def test_without_a_target_nobody_seems_to_advance() -> None:
@@ -291,26 +400,58 @@ def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
 # Feeling
 
 
+UNMOVED = dataclasses.replace(CLEAR_SIGHTED, trust=0.0)
+"""Feels mechanics alone: believes no cue."""
 STIFF = Feedback(0, 8)
 TOWARDS = armed((0.0, 0.0, 0.06))
 MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
 
 
 def test_a_trigger_that_stiffens_yields_less_to_the_same_finger_at_once() -> None:
-    desk = Desk()
+    desk = Desk(UNMOVED)
     desk.arm()
-    desk.watch(TOWARDS, 2.0)
+    desk.watch(TOWARDS, 1.0)
     force_n, free = desk.hands[-1].r2_n, desk.device.travel[1]
     assert force_n == pytest.approx(habitual_force_n(MEANT), abs=0.02)
     desk.resist(STIFF)
     desk.watch(TOWARDS, 0.2)
     assert desk.device.travel[1] < 0.5 * free
     # However long it resists, they push no harder.
-    assert {hands.r2_n for hands in desk.watch(TOWARDS, 4.0)} == {force_n}
+    assert {hands.r2_n for hands in desk.watch(TOWARDS, 1.0)} == {force_n}
+
+
+@pytest.mark.parametrize(("strength", "eases"), [(0, False), (1, True), (8, True)])
+def test_who_believes_a_stiffer_trigger_eases_off_a_reaction_later(strength: int, eases: bool) -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(TOWARDS, 1.0)
+    force_n, felt_s = desk.hands[-1].r2_n, desk.now_s
+    desk.resist(Feedback(0, strength) if strength else Off())
+    eased = [hands.now_s for hands in desk.watch(TOWARDS, 0.6) if hands.r2_n < force_n]
+    assert bool(eased) is eases
+    if eased:
+        assert 0.15 < eased[0] - felt_s < 0.5
+        assert desk.hands[-1].r2_n == pytest.approx(habitual_force_n(GENTLY_M_S / FULL_TRIGGER_M_S))
+
+
+def test_what_resists_less_than_can_be_noticed_is_not() -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, noticeable_force=0.5))
+    desk.arm()
+    desk.watch(TOWARDS, 1.0)
+    force_n = desk.hands[-1].r2_n
+    desk.resist(Feedback(0, 1))
+    assert desk.watch(TOWARDS, 1.0)[-1].r2_n == force_n
+
+
+def test_a_target_that_comes_no_nearer_is_taken_for_as_near_as_it_gets() -> None:
+    desk = Desk(UNMOVED)
+    desk.arm()
+    desk.resist(STIFF)
+    assert 2.5 < desk.until("close", armed((0.0, 0.0, 0.03)), 4.0) < 3.5
 
 
 def test_a_zone_that_stiffens_stops_the_finger_where_it_begins() -> None:
-    desk = Desk()
+    desk = Desk(UNMOVED)
     desk.arm()
     desk.resist(Feedback(3, 8))
     desk.watch(armed((0.0, 0.0, 0.3)), 2.0)
@@ -318,7 +459,7 @@ def test_a_zone_that_stiffens_stops_the_finger_where_it_begins() -> None:
 
 
 def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands() -> None:
-    desk = Desk(PersonSettings(attempts=2), seed=3)
+    desk = Desk(PersonSettings(attempts=2, trust=0.0), seed=3)
     desk.arm()
     for number in range(60):
         desk.resist(Feedback(0, number % 9), Feedback(0, number % 5))
@@ -345,7 +486,30 @@ def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it(
     assert all(pulled[pulled.index(True) :])
 
 
+# Moving and waiting
+
+
+def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_the_delay() -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, aiming="move-and-wait"))
+    desk.arm(armed((0.0, 0.0, 0.2)))
+    delay_s, seen = 0.4, desk.watch(armed((0.0, 0.0, 0.2)), 6.0, 0.4)
+    pulled = [hands.r2_n > 0.0 for hands in seen]
+    first, ends = pulled.index(True), pulled.index(False, pulled.index(True))
+    again = pulled.index(True, ends)
+    assert (again - ends) * TICK_S == pytest.approx(delay_s + 0.25, abs=0.1)
+    # The way of a minimum-jerk move, by what was meant and not by where a finger with its own time constant is.
+    meant = [habitual_travel(hands.r2_n) * FULL_TRIGGER_M_S * TICK_S for hands in seen[first:ends]]
+    assert sum(meant) == pytest.approx(0.2 + GRASP_M, rel=0.02)
+
+
 # Chance
+
+
+def habitual_travel(force_n: float) -> float:
+    """What a free trigger's calibrated travel is at that force."""
+    return (
+        0.0 if force_n == 0.0 else CALIBRATION.r2.travel((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N / SENSED_TRAVEL)
+    )
 
 
 def depth_pulls(seed: int) -> list[Hands]:

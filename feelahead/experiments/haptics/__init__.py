@@ -1,0 +1,1 @@
+"""The same simulated person with and without haptics, in scenes with something to hit."""

@@ -1,0 +1,176 @@
+"""One trial: a scripted person reaches, grasps, lifts and places in one scene, over one link, in virtual time."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from common.emulation.clauses import LinkModel
+from common.protocol.uniform_field import uniform_field
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from operator_side.dualsense.simulated.trigger_model import zone_of
+from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.person import SimulatedOperator
+from operator_side.simulated_person.settings import PersonSettings
+from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.main import TICK_PERIOD_S
+from robot_side.objects.perceived import Role
+from robot_side.placing import Placing
+from robot_side.settings import RobotSettings
+from robot_side.simulation.built_in_scenes import SceneName
+from robot_side.simulation.ground_truth import GroundTruth
+from robot_side.simulation.scene import load_scene
+from robot_side.simulation.true_contact import TrueContact
+
+Arm = Literal["off", "mechanical", "reacting"]
+"""off: nothing is felt. mechanical: triggers stiffen, and whoever pulls them takes no notice. reacting: they do."""
+_SAME_CONTACT_S: Final = 0.1
+"""A contact with a thing that comes back within this time is the same one."""
+_LOOK_S: Final = 0.05
+_TRUTH_S: Final = 0.01
+_SETTLES_S: Final = 0.3
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is done; all else being equal, two that differ in `arm` alone are a pair."""
+
+    scene: SceneName
+    link: str
+    arm: Arm
+    seed: int
+    """Of the scene, the errors of camera and encoders, the link and the person."""
+    person: PersonSettings
+    duration_s: float
+    link_model: LinkModel = "datagram"
+    tick_period_s: float = TICK_PERIOD_S
+    """Of the robot side"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of it."""
+
+    hits: int
+    """Contacts of the gripper with anything but the target, and of what it holds with obstacles"""
+    hit_first: str | None
+    fastest_hit_mm_s: float | None
+    grasped: bool
+    lifted_mm: float
+    placed: bool
+    finished_s: float | None
+    """From arming until it is placed and the hand has drawn back; None where that did not happen in time."""
+    placing_speed_mm_s: float | None
+    felt_before_s: float | None
+    """How long before it touched what it stands on, rumble or a stiff trigger was in the hand without a break."""
+    felt_before_mm: float | None
+    tilt_deg: float | None
+
+
+class _Silent:
+    """Stands in for a law that nobody feels, and works out nothing."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Nothing ahead."""
+        del situation, now_s
+        free = uniform_field(0)
+        return Sensed(l2=free, r2=free, speed_m_s=0.0, horizon_m=0.0, rumble=0.0, enlargement_m=0.0, overlap_m3=0.0)
+
+    def summary(self) -> dict[str, int]:
+        """No work at all."""
+        return self._law.summary()
+
+
+class _Watch:
+    """What truly happens, tick by tick."""
+
+    def __init__(self, trial: Trial) -> None:
+        self.hits = 0
+        self.hit_first: str | None = None
+        self.fastest_m_s: float | None = None
+        self.placing = Placing()
+        self.scene = load_scene(name=trial.scene, seed=trial.seed)
+        self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
+        self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
+        self._hit_s: dict[str, float] = {}
+        self._next_s = -math.inf
+        self.loopback = Loopback(
+            LoopbackSettings(
+                RobotSettings(link=trial.link, link_model=trial.link_model, seed=trial.seed, scene=trial.scene),
+                OperatorSettings(
+                    link=trial.link,
+                    link_model=trial.link_model,
+                    seed=trial.seed,
+                    haptics=trial.arm != "off",
+                    person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
+                ),
+            ),
+            scene=self.scene,
+            after_robot_tick=self._look,
+            other_law=_Silent if trial.arm == "off" else None,
+            tick_period_s=trial.tick_period_s,
+        )
+
+    def _look(self, now_s: float) -> None:
+        held, roles = self.loopback.robot.held, self.scene.roles
+        onset = self._contact.update(held)
+        if onset is not None and roles[onset.thing] is not Role.TARGET:
+            # What is held, and set down on a support, is where it should be.
+            where_it_should_be = onset.gripper_part not in self._parts and roles[onset.thing] is Role.SUPPORT
+            if not where_it_should_be:
+                self._hit(onset.thing, onset.closing_speed_m_s, now_s)
+        if now_s >= self._next_s - 1e-9:
+            self._next_s = now_s + _TRUTH_S
+            if (target := self._truth.target()) is not None:
+                is_target = held is not None and roles[held] is Role.TARGET
+                self.placing.observe(target, is_target, self._felt(), now_s)
+
+    def _hit(self, thing: str, speed_m_s: float, now_s: float) -> None:
+        if now_s - self._hit_s.get(thing, -math.inf) > _SAME_CONTACT_S:
+            self.hits += 1
+            self.hit_first = self.hit_first or thing
+        self._hit_s[thing] = now_s
+        self.fastest_m_s = max(speed_m_s, self.fastest_m_s or 0.0)
+
+    def _felt(self) -> bool:
+        """Whether a finger meets an effect, or the controller shakes."""
+        device = self.loopback.device
+        stiff = any(
+            travel > 0.0 and effect.zone_strengths[zone_of(travel)] > 0
+            for effect, travel in zip(device.effects, device.travel, strict=True)
+        )
+        return stiff or device.rumble.left > 0.0
+
+
+def run_trial(trial: Trial) -> Result:
+    """Run it until the person is done, or for its duration from the start; the same trial gives the same result."""
+    watch = _Watch(trial)
+    loopback, person = watch.loopback, watch.loopback.person
+    assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
+    armed_s = done_s = None
+    while loopback.clock.now() < trial.duration_s and done_s is None:
+        loopback.run_until(min(loopback.clock.now() + _LOOK_S, trial.duration_s))
+        if armed_s is None and loopback.robot.session.safety.state == "armed":
+            armed_s = loopback.clock.now()
+        if person.phase == "done":
+            done_s = loopback.clock.now()
+    # What was let go may still fall.
+    loopback.run_until(loopback.clock.now() + _SETTLES_S)
+    task = loopback.summary()["task"]
+    placing = watch.placing.summary(armed_s)
+    finished = placing["placed"] and done_s is not None and armed_s is not None
+    return Result(
+        hits=watch.hits,
+        hit_first=watch.hit_first,
+        fastest_hit_mm_s=None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
+        grasped=task["time_to_grasp_s"] is not None,
+        lifted_mm=task["lifted_mm"],
+        placed=placing["placed"],
+        finished_s=done_s - armed_s if finished and done_s is not None and armed_s is not None else None,
+        placing_speed_mm_s=placing["contact_speed_mm_s"],
+        felt_before_s=placing["felt_before_s"],
+        felt_before_mm=placing["felt_before_mm"],
+        tilt_deg=placing["tilt_deg"],
+    )
