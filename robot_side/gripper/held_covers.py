@@ -20,7 +20,7 @@ _MOST_SHAPES = 32
 _MOST_TETRAHEDRA = 64
 _WIDEST_M = 0.2
 """What is wider than this in every direction no gripper closes around."""
-_SAME_VOLUME = 1e-9
+_SAME_VOLUME = 1e-6
 _SLIVER = 1e-3
 
 _Spheres = tuple[FloatArray, FloatArray]
