@@ -30,11 +30,12 @@ SITE: Final = "tool"
 AHEAD: Final = (
     *("wall", "plate", "ball", "post", "rod_2mm", "rod_5mm", "rod_10mm"),
     *("wall_45", "slot", "shelf_edge", "moving", "fleeing", "place_held", "u_mesh", "mug"),
+    "terrain_ahead",
 )
 """Scenes in which a pull that goes on ends in a contact."""
 PASSED: Final = (
     *("wall_beside", "table_1_box", "table_2_boxes", "table_12_tetrahedra", "table_mesh"),
-    *("cluttered", "empty"),
+    *("cluttered", "terrain", "empty"),
 )
 """Scenes in which it does not: what is felt there is a false alarm."""
 ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}

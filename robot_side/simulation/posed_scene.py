@@ -1,7 +1,10 @@
 """The true gripper among the true objects, put where one likes: for experiments that look at a motion afterwards."""
 
+from typing import Final
+
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects
@@ -10,6 +13,7 @@ from robot_side.simulation.scene import Scene
 from robot_side.simulation.true_contact import free_way
 
 _LEAST_STEP_M = 0.001
+STANDS: Final[FloatArray] = np.zeros(3)
 
 
 class PosedScene:
@@ -48,19 +52,33 @@ class PosedScene:
         self._data.geom_xpos[self._gripper] = self._at_rest_m
         return way_m
 
-    def stays_clear(self, ahead_m: float, margin_m: float) -> bool:
-        """Whether the gripper, moved by up to `ahead_m` along its approach axis, stays `margin_m` off everything."""
-        axis, moved_m, clear = self.approach_axis(), 0.0, True
+    def stays_clear(
+        self, ahead_m: float, margin_m: float, across_m: FloatArray = STANDS, turned_rad: FloatArray = STANDS
+    ) -> bool:
+        """Whether the gripper stays `margin_m` off everything, on a way of `ahead_m` along its approach axis.
+
+        Meanwhile it drifts by `across_m` (3,), and turns evenly about the tool by a rotation vector `turned_rad` (3,).
+        """
+        data, gripper = self._data, self._gripper
+        tool_m, axis = data.site_xpos[self.scene.robot.site].copy(), self.approach_axis()
+        lever, turns = self._at_rest_m - tool_m, data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
+        turned = float(np.linalg.norm(turned_rad))
+        # No part of the gripper goes farther than this.
+        farthest_m = ahead_m + float(np.linalg.norm(across_m)) + turned * (float(np.abs(lever).max()) * 2.0 + ahead_m)
+        share, clear = 0.0, True
         while True:
-            gap_m = self.gap_m(margin_m + ahead_m + _LEAST_STEP_M)
+            gap_m = self.gap_m(margin_m + farthest_m + _LEAST_STEP_M)
             if gap_m < margin_m:
                 clear = False
                 break
-            if moved_m >= ahead_m:
+            if share >= 1.0 or farthest_m == 0.0:
                 break
-            moved_m = min(moved_m + max(gap_m - margin_m, _LEAST_STEP_M), ahead_m)
-            self._data.geom_xpos[self._gripper] = self._at_rest_m + moved_m * axis
-        self._data.geom_xpos[self._gripper] = self._at_rest_m
+            share = min(share + max(gap_m - margin_m, _LEAST_STEP_M) / farthest_m, 1.0)
+            half, whole = (Rotation.from_rotvec(part * share * turned_rad).as_matrix() for part in (0.5, 1.0))
+            moved_m = share * (ahead_m * (half @ axis) + across_m)
+            data.geom_xpos[gripper] = tool_m + moved_m + lever @ whole.T
+            data.geom_xmat[gripper] = (whole @ turns).reshape(-1, 9)
+        data.geom_xpos[gripper], data.geom_xmat[gripper] = self._at_rest_m, turns.reshape(-1, 9)
         return clear
 
     def perceived(self, errors_m: FloatArray) -> PerceivedObjects:

@@ -18,8 +18,8 @@ LINKS: Final = {
 """Each way."""
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
 """Scenes that start from another home pose than `empty`: where their approaches are recorded."""
-_NOT_STILL = ("moving", "place_held")
-"""Left to `try approach`: things that move by themselves, or with the gripper."""
+_NOT_STILL = ("moving", "fleeing", "place_held", "terrain_ahead")
+"""Left to `try approach`: things that move by themselves, or with the gripper, and what MuJoCo knows no distance to."""
 STILL_AHEAD: Final = tuple(name for name in AHEAD if name not in _NOT_STILL)
 
 
@@ -42,13 +42,22 @@ class Cell:
     camera_mm: float = 3.0
     encoder_factor: float = 1.0
     """How much worse than the settings' own the encoders are."""
+    speed_m_s: float = 0.0
+    """Of the objects, along the approach: below 0 they come nearer."""
+
+    @property
+    def shown(self) -> str:
+        """The scene, and how it moves."""
+        if self.speed_m_s == 0.0:
+            return self.scene
+        return f"{self.scene} {'fleeing' if self.speed_m_s > 0.0 else 'coming'} {1e3 * abs(self.speed_m_s):g} mm/s"
 
     @property
     def key(self) -> str:
         """What names it in tables, and for --only."""
         return "/".join(
             (
-                self.scene,
+                self.shown,
                 self.motion.pull,
                 self.motion.link,
                 f"camera {self.camera_mm:g} mm",
@@ -82,11 +91,21 @@ class Plan:
 
 
 def full_plan(laws: tuple[Law, ...]) -> Plan:
-    """Every scene with a steady pull over four links, every pull over two, and one factor at a time from there on."""
+    """Every scene with a steady pull over four links, every pull over two, and one factor at a time from there on.
+
+    Drift and turning in more scenes, and things that come nearer or go away.
+    """
     cells: dict[str, Cell] = {}
 
-    def add(pull: PullKind, link: str, scene: str, camera_mm: float = 3.0, encoder_factor: float = 1.0) -> None:
-        cell = Cell(Motion(pull, link, HOMES.get(scene, "empty")), scene, camera_mm, encoder_factor)
+    def add(
+        pull: PullKind,
+        link: str,
+        scene: str,
+        camera_mm: float = 3.0,
+        encoder_factor: float = 1.0,
+        speed_m_s: float = 0.0,
+    ) -> None:
+        cell = Cell(Motion(pull, link, HOMES.get(scene, "empty")), scene, camera_mm, encoder_factor, speed_m_s)
         cells.setdefault(cell.key, cell)
 
     for link in LINKS:
@@ -98,6 +117,15 @@ def full_plan(laws: tuple[Law, ...]) -> Plan:
         for link in ("50 ms", "200 ms"):
             for scene in ("wall", "post", "rod_5mm", "wall_beside", "table_1_box", "cluttered"):
                 add(pull, link, scene)
+    for link in ("50 ms", "200 ms"):
+        for scene in ("plate", "ball", "slot", "u_mesh", "mug"):
+            add("drift", link, scene)
+            add("yaw", link, scene)
+        add("drift", link, "edge")
+        add("yaw", link, "turn")
+        for scene in ("wall", "ball"):
+            for speed_m_s in (-0.06, 0.03):
+                add("bell", link, scene, speed_m_s=speed_m_s)
     for camera_mm in (1.0, 6.0):
         for link in ("50 ms", "200 ms"):
             add("bell", link, "wall", camera_mm)

@@ -22,16 +22,31 @@ class Collision:
     """One place of the objects."""
 
     shift_m: FloatArray
-    """(3,) from where the scene has them"""
+    """(3,) from where the scene has them, when the pull begins"""
     touch_s: float
     """When the true gripper would touch, if the pull went on"""
     last_release_s: float | None
     """The last moment, on the operator side, at which letting go avoids it; None where no release does."""
+    speed_m_s: float = 0.0
+    """Of the objects, along the approach axis as the pull begins: below 0 they come nearer."""
+
+    def shift_at(self, replay: Replay, time_s: float) -> FloatArray:
+        """Where the objects stand (3,) at `time_s`, from where the scene has them."""
+        return shifted(self.shift_m, replay, self.speed_m_s, time_s)
 
 
-def place(replay: Replay, posed: PosedScene, generator: np.random.Generator) -> Collision | None:
+def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float) -> FloatArray:
+    """`shift_m` (3,), and what objects of that speed have covered since the pull began."""
+    moved: FloatArray = shift_m + speed_m_s * max(time_s - replay.record.began_s, 0.0) * replay.axis
+    return moved
+
+
+def place(
+    replay: Replay, posed: PosedScene, generator: np.random.Generator, speed_m_s: float = 0.0
+) -> Collision | None:
     """Draw a place of the objects in which the approach collides, at an even chance for each part of the way.
 
+    The place lies where the tool gets, which drift and turning take aside. speed_m_s: see Collision.
     None where that was not found after 40 draws, or the approach goes nowhere.
     """
     record = replay.record
@@ -42,53 +57,60 @@ def place(replay: Replay, posed: PosedScene, generator: np.random.Generator) -> 
         return None
     across = np.linalg.svd(replay.axis[None, :])[2][1:]
     for _ in range(_TRIES):
-        ahead_m = float(generator.uniform(_LEAST_START_GAP_M, farthest_m)) - home_way_m
-        shift_m = ahead_m * replay.axis + generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
+        row = int(np.argmax(replay.along_m >= float(generator.uniform(_LEAST_START_GAP_M, farthest_m))))
+        aside = generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
+        shift_m = replay.moved_m[row] - home_way_m * replay.axis + aside
         posed.put(*_pose(replay, record.began_s), shift_m)
         if posed.gap_m() < _LEAST_START_GAP_M:
             continue
-        touch_s = first_touch_s(replay, posed, shift_m)
+        touch_s = first_touch_s(replay, posed, shift_m, speed_m_s)
         if touch_s is not None:
-            return Collision(shift_m, touch_s, last_release_s(replay, posed, shift_m, touch_s))
+            last_s = last_release_s(replay, posed, shift_m, touch_s, speed_m_s)
+            return Collision(shift_m, touch_s, last_s, speed_m_s)
     return None
 
 
-def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray) -> float | None:
+def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_m_s: float = 0.0) -> float | None:
     """When the true gripper first touches the objects moved by `shift_m` (3,); None within the record."""
     time_s = replay.record.began_s
     while time_s <= replay.end_s:
-        posed.put(*_pose(replay, time_s), shift_m)
+        posed.put(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
         gap_m = posed.gap_m()
         if gap_m <= 0.0:
             return time_s
-        time_s += max(gap_m / _FASTEST_M_S, _LEAST_STEP_S)
+        time_s += max(gap_m / (_FASTEST_M_S + abs(speed_m_s)), _LEAST_STEP_S)
     return None
 
 
-def last_release_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float) -> float | None:
+def last_release_s(
+    replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, speed_m_s: float = 0.0
+) -> float | None:
     """The last moment at which letting go avoids the contact, to 2 ms; None where no release since the pull began does.
 
     How far a released arm gets never falls with the moment of release, as no pull here moves back.
     """
     early_s, late_s = replay.record.began_s, touch_s
-    if not avoids(replay, posed, shift_m, touch_s, early_s):
+    if not avoids(replay, posed, shift_m, touch_s, early_s, speed_m_s):
         return None
     while late_s - early_s > _LEAST_STEP_S:
         middle_s = 0.5 * (early_s + late_s)
-        if avoids(replay, posed, shift_m, touch_s, middle_s):
+        if avoids(replay, posed, shift_m, touch_s, middle_s, speed_m_s):
             early_s = middle_s
         else:
             late_s = middle_s
     return early_s
 
 
-def avoids(replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float) -> bool:
-    """Whether letting go at `released_s` leaves a gap."""
+def avoids(
+    replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float, speed_m_s: float = 0.0
+) -> bool:
+    """Whether letting go at `released_s` leaves a gap when the arm rests."""
     stopped = replay.stopped_joints(released_s)
     if stopped is None or stopped[0] >= touch_s:
         return False
-    _, fingers = _pose(replay, stopped[0])
-    posed.put(stopped[1], fingers, shift_m)
+    arrives_s, rests_s, joints_rad = stopped
+    _, fingers = _pose(replay, arrives_s)
+    posed.put(joints_rad, fingers, shifted(shift_m, replay, speed_m_s, rests_s))
     return posed.gap_m() > 0.0
 
 

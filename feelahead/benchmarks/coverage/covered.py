@@ -9,6 +9,7 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S, REACTION_S
+from feelahead.benchmarks.coverage.collisions import shifted
 from feelahead.benchmarks.coverage.laws import Draw, FieldLaw
 from feelahead.benchmarks.coverage.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
@@ -25,6 +26,8 @@ CLEAR_M: Final = 0.015
 ALARM_STEP_S: Final = 0.02
 _LATE_STEP_S: Final = 0.01
 _R2 = 1
+_ASIDE = 1e-3
+"""Less than this, in metres and radians, is no motion aside."""
 _TRAVEL = TriggerTravel()
 
 
@@ -89,7 +92,8 @@ def false_alarms(
     """Judge every 20 ms from the pull's beginning until `until_s`, before the contact if there is one.
 
     An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear: what is under way,
-    then the zone's speed for 0.3 s, then braking.
+    then the zone's speed for 0.3 s, then braking. It must do so whether drift, turning and the objects' own motion go
+    on meanwhile, by half, or end.
     """
     replay = draw.replay
     record = replay.record
@@ -105,11 +109,26 @@ def false_alarms(
         if strengths[number, zone] >= ALARM_STRENGTH:
             time_s = float(times[number])
             joints, _ = replay.joints_at(time_s)
-            posed.put(joints, record.finger_positions[record.pose_row(time_s)], shift_m)
+            there_m = shifted(shift_m, replay, draw.speed_m_s, time_s)
+            posed.put(joints, record.finger_positions[record.pose_row(time_s)], there_m)
             margin_m = statistical_distance_m(draw, time_s, probability) + CLEAR_M
-            alarmed[number] = posed.stays_clear(stopping_path_m(replay, time_s, zone), margin_m)
+            alarmed[number] = _stays_clear(draw, posed, time_s, zone, margin_m)
     starts = int(np.count_nonzero(alarmed & ~np.concatenate([[False], alarmed[:-1]])))
     return Alarms(starts, ALARM_STEP_S * float(alarmed.sum()), ALARM_STEP_S * float(pulled.sum()))
+
+
+def _stays_clear(draw: Draw, posed: PosedScene, time_s: float, zone: int, margin_m: float) -> bool:
+    """Whether all stopping paths do, from where `posed` stands."""
+    replay = draw.replay
+    ahead_m = stopping_path_m(replay, time_s, zone)
+    speed = zone_speed_m_s(zone)
+    arrives_s = min(replay.record.arrives_s(time_s), replay.end_s)
+    lasts_s = arrives_s - time_s + HORIZON_S + speed / replay.deceleration_m_s2(time_s)
+    drift, turning = replay.aside(time_s)
+    across_m, turned_rad = (drift - draw.speed_m_s * replay.axis) * lasts_s, turning * lasts_s
+    moves = float(np.linalg.norm(across_m)) + float(np.linalg.norm(turned_rad)) > _ASIDE
+    shares = (0.0, 0.5, 1.0) if moves else (0.0,)
+    return all(posed.stays_clear(ahead_m, margin_m, share * across_m, share * turned_rad) for share in shares)
 
 
 def stopping_path_m(replay: Replay, time_s: float, zone: int) -> float:

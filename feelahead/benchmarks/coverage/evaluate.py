@@ -102,7 +102,7 @@ class _Staged:
         sd_m = 1e-3 * cell.camera_mm
         errors_m = CameraError(names, 0.0, sd_m, 0.0, _seed(record.seed, number)).next_frame()
         self.posed.put(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
-        return Draw(self.replay, self.posed.perceived(errors_m), sd_m)
+        return Draw(self.replay, self.posed.perceived(errors_m), sd_m, cell.speed_m_s)
 
 
 def evaluate(
@@ -134,7 +134,7 @@ def _stage(cell: Cell, replay: Replay, places: int) -> _Staged:
     if cell.scene in PASSED:
         return _Staged(replay, posed, (), 0)
     generator = np.random.default_rng([replay.record.seed, 0x71ACE])
-    found = [place(replay, posed, generator) for _ in range(places)]
+    found = [place(replay, posed, generator, cell.speed_m_s) for _ in range(places)]
     return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
 
 
@@ -207,7 +207,7 @@ def _row(
     draws = sum(counts.draws)
     return Row(
         cell=cell.key,
-        scene=cell.scene,
+        scene=cell.shown,
         pull=cell.motion.pull,
         link=cell.motion.link,
         camera_mm=cell.camera_mm,

@@ -1,6 +1,7 @@
 """What each law puts on the triggers' zones at given moments of a recorded approach."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final, Protocol
 
@@ -27,16 +28,41 @@ from robot_side.objects.perceived import PerceivedObjects
 from robot_side.simulation.joint_reference import MotionLimits
 
 _TRAVEL: Final = TriggerTravel()
+_FRAME_S: Final = 1.0 / 30.0
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One approach to objects that stand still, as a camera with one draw of its error perceives them."""
+    """One approach to objects, as a camera with one draw of its error perceives them."""
 
     replay: Replay
     objects: PerceivedObjects
+    """When the pull begins"""
     camera_sd_m: float
     """What the robot side believes of the camera, which is the truth here."""
+    speed_m_s: float = 0.0
+    """Of the objects, along the approach axis as the pull begins"""
+
+    def objects_at(self, time_s: float) -> PerceivedObjects:
+        """The newest frame of a camera at `time_s`; the same one for objects that stand still."""
+        if self.speed_m_s == 0.0:
+            return self.objects
+        since_s = math.floor(max(time_s - self.replay.record.began_s, 0.0) / _FRAME_S) * _FRAME_S
+        return _moved(self.objects, self.speed_m_s * self.replay.axis, since_s)
+
+
+def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
+    """All objects with this velocity (3,), which the camera knows, and where it has brought them."""
+    way_m = velocity_m_s * after_s
+    return replace(
+        objects,
+        sphere_centers_m=objects.sphere_centers_m + way_m,
+        box_centers_m=objects.box_centers_m + way_m,
+        tetrahedron_vertices_m=objects.tetrahedron_vertices_m + way_m,
+        half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ way_m,
+        mesh_positions_m=objects.mesh_positions_m + way_m,
+        velocities_m_s=np.tile(velocity_m_s, (len(objects.names), 1)),
+    )
 
 
 class FieldLaw(Protocol):
@@ -106,7 +132,7 @@ class Pipeline:
         return Situation(
             pose=replay.estimated[row],
             joint_velocities_rad_s=record.joint_velocities_rad_s[row],
-            objects=draw.objects,
+            objects=draw.objects_at(float(record.pose_time_s[row])),
             loop_age_s=float(record.loop_age_s[row]),
             loop_age_known=True,
             compensation=compensation_of(self.law),

@@ -6,11 +6,12 @@ from functools import cached_property
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.approaches.recording import RecordedApproach
+from feelahead.approaches.recording import POSE_S, TICK_S, RecordedApproach
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
 from operator_side.feel.commands_under_way import CommandsUnderWay
 from operator_side.hands.travel_calibration import TriggerTravel
+from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -47,8 +48,10 @@ class Replay:
         start_m = true[record.pose_row(record.began_s)].tool_position_m
         self.axis = axis
         """(3,) the approach axis when the pull begins, in the world frame"""
-        self.along_m: FloatArray = np.array([(pose.tool_position_m - start_m) @ axis for pose in true])
-        """(k,) how far the true tool has got along that axis since the pull began"""
+        self.moved_m: FloatArray = np.array([pose.tool_position_m - start_m for pose in true])
+        """(k, 3) where the true tool has got since the pull began, in the world frame"""
+        self.along_m: FloatArray = self.moved_m @ axis
+        """(k,) how far along that axis"""
         self.approach_speed_m_s: FloatArray = np.array(
             [
                 pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ record.joint_velocities_rad_s[row])
@@ -82,21 +85,31 @@ class Replay:
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
-        """The gripper where noisy encoders put it, for each row of the poses."""
+        """The gripper where noisy encoders, read every millisecond, put it, for each row of the poses."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
-        return [self._pose(row, encoder.read(joints)) for row, joints in enumerate(self.record.joint_positions_rad)]
+        estimate, found = JointEstimate(), []
+        for row, until_s in enumerate(self.record.pose_time_s.tolist()):
+            for time_s in until_s - TICK_S * np.arange(round(POSE_S / TICK_S))[::-1]:
+                joints_rad, velocities_rad_s = self.joints_at(float(time_s))
+                state = self._state(row, float(time_s), encoder.read(joints_rad), velocities_rad_s)
+                estimated = estimate.update(state)
+            found.append(self._kinematics.pose(estimated))
+        return found
 
     def _pose(self, row: int, joints_rad: FloatArray) -> GripperPose:
         record = self.record
-        state = ArmState(
-            time_s=float(record.pose_time_s[row]),
+        time_s = float(record.pose_time_s[row])
+        return self._kinematics.pose(self._state(row, time_s, joints_rad, record.joint_velocities_rad_s[row]))
+
+    def _state(self, row: int, time_s: float, joints_rad: FloatArray, velocities_rad_s: FloatArray) -> ArmState:
+        return ArmState(
+            time_s=time_s,
             joint_positions_rad=joints_rad,
-            joint_velocities_rad_s=record.joint_velocities_rad_s[row],
-            finger_positions=record.finger_positions[row],
+            joint_velocities_rad_s=velocities_rad_s,
+            finger_positions=self.record.finger_positions[row],
             gripper_opening_m=0.0,
             gripper_holding=False,
         )
-        return self._kinematics.pose(state)
 
     def joints_at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
         """True joint positions and velocities (n,) at `time_s`, between the rows of the poses."""
@@ -110,8 +123,8 @@ class Replay:
             (1.0 - part) * velocities[row] + part * velocities[row + 1],
         )
 
-    def stopped_joints(self, released_s: float) -> tuple[float, FloatArray] | None:
-        """When a release at `released_s` on the operator side reaches the arm, and the joints (n,) where it rests then.
+    def stopped_joints(self, released_s: float) -> tuple[float, float, FloatArray] | None:
+        """When a release at `released_s` on the operator side reaches the arm; when, and with which joints, that rests.
 
         None where that is beyond the record. All joints slow down in proportion (`JointReference`), so that the arm
         goes on along its present joint velocity.
@@ -122,7 +135,15 @@ class Replay:
         joints_rad, velocities_rad_s = self.joints_at(arrives_s)
         braking_s = float(np.abs(velocities_rad_s).max()) / MotionLimits().acceleration_rad_s2
         travel = float(self.record.travel[self.record.tick_row(released_s), 1])
-        return arrives_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
+        rests_s = arrives_s + FINGER_TIME_CONSTANT_S + braking_s
+        return arrives_s, rests_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
+
+    def aside(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+        """The true tool's velocity (3,) across its approach axis, and its turning (3,), at `time_s`; world frame."""
+        row = self.record.pose_row(time_s)
+        twist = self._jacobians[row] @ self.record.joint_velocities_rad_s[row]
+        axis = self._axes[row]
+        return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
 
     def under_way_m(self, time_s: float) -> float:
         """How far the true tool still goes along the axis until the command that is sent at `time_s` arrives."""

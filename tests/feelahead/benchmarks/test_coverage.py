@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
 from common.reaction import HORIZON_S
-from feelahead.approaches.frozen import AHEAD, PASSED
+from feelahead.approaches.frozen import AHEAD, ASIDE, PASSED
 from feelahead.approaches.laws import Law
 from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage import bench, closed_loop
@@ -102,6 +102,31 @@ def test_whoever_lets_go_at_once_always_avoids_it() -> None:
     assert last_s is not None
     # 30 mm from the start, a command that takes 200 ms has to be taken back before it arrives.
     assert replay.record.began_s <= last_s < replay.record.began_s + 0.15
+
+
+@pytest.mark.parametrize("speed_m_s", [-0.06, 0.05])
+def test_what_moves_is_touched_where_it_is_by_then(speed_m_s: float) -> None:
+    replay, posed, draw = staged("wall", ahead_m=-0.1)
+    shift_m = -0.1 * replay.axis
+    still_s, touch_s = (first_touch_s(replay, posed, shift_m, speed) for speed in (0.0, speed_m_s))
+    assert still_s is not None
+    assert touch_s is not None
+    assert (touch_s < still_s) is (speed_m_s < 0.0)
+    since_s = touch_s - replay.record.began_s
+    along_m = np.interp(touch_s, replay.record.pose_time_s, replay.along_m)
+    assert along_m == pytest.approx(0.22 + speed_m_s * since_s, abs=0.001)
+    last_s = last_release_s(replay, posed, shift_m, touch_s, speed_m_s)
+    assert last_s is not None
+    # Whoever lets go must stand before it is there.
+    assert (touch_s - last_s > still_s - (last_release_s(replay, posed, shift_m, still_s) or 0.0)) is (speed_m_s < 0.0)
+    moving = replace(draw, speed_m_s=speed_m_s)
+    then = moving.objects_at(replay.record.began_s + 1.0)
+    np.testing.assert_allclose(
+        then.box_centers_m - draw.objects.box_centers_m, [speed_m_s * replay.axis], atol=0.034 * abs(speed_m_s)
+    )
+    assert then.velocities_m_s is not None
+    np.testing.assert_allclose(then.velocities_m_s, [speed_m_s * replay.axis])
+    assert draw.objects_at(replay.record.began_s + 1.0) is draw.objects
 
 
 def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
@@ -197,7 +222,8 @@ def test_checks_see_every_scene_link_and_pull(monkeypatch: pytest.MonkeyPatch) -
 def test_the_plans() -> None:
     full = full_plan(("swept",))
     names = {cell.scene for cell in full.cells}
-    assert names == {*AHEAD, *PASSED} - {"moving", "place_held"}
+    assert names == {*AHEAD, *ASIDE, *PASSED} - {"moving", "fleeing", "place_held", "terrain_ahead"}
+    assert {cell.speed_m_s for cell in full.cells} == {0.0, -0.06, 0.03}
     assert {cell.motion.link for cell in full.cells} == set(LINKS)
     assert {cell.camera_mm for cell in full.cells} == {1.0, 3.0, 6.0}
     assert len({cell.key for cell in full.cells}) == len(full.cells)

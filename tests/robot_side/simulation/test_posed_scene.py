@@ -125,6 +125,22 @@ def test_clear_at_the_end_is_not_clear_on_the_way() -> None:
     assert not scene.at().stays_clear(0.9, 0.001)
 
 
+def test_a_drift_towards_a_wall_beside_is_not_clear_and_one_away_is(beside: Posed) -> None:
+    for across_m, clear in ((-0.02, True), (0.02, True), (0.026, False), (-0.026, True)):
+        assert beside.at().stays_clear(0.35, 0.0, np.array([0.0, across_m, 0.0])) is clear
+    # It is as far off in the end, but for the rotation about the way, as along its own axis.
+    assert not beside.at().stays_clear(0.35, 0.006, np.array([0.0, 0.02, 0.0]))
+
+
+def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
+    """About the tool's point, which goes on where it points: towards a wall beside, by half the angle at first."""
+    for turned, clear in ((0.4, False), (-0.4, True), (0.02, True)):
+        assert beside.at().stays_clear(0.2, 0.0, turned_rad=np.array([0.0, 0.0, turned])) is clear
+    before = wall.at().gap_m()
+    assert wall.at().stays_clear(0.3, 0.0, turned_rad=np.array([0.0, 0.5, 0.3]))
+    assert wall.posed.gap_m() == before
+
+
 def test_looking_ahead_leaves_the_gripper_where_it_is(wall: Posed) -> None:
     put = wall.at()
     before = put.gap_m()
