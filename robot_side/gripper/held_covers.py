@@ -22,6 +22,7 @@ _WIDEST_M = 0.2
 """What is wider than this in every direction no gripper closes around."""
 _SAME_VOLUME = 1e-6
 _SLIVER = 1e-3
+_DIGITS = 9
 
 _Spheres = tuple[FloatArray, FloatArray]
 """Centres (m, 3) and radii (m,)."""
@@ -58,9 +59,14 @@ class HeldCovers:
                     stand_outs.append(found[2])
             vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
             if 0 < len(vertices) <= _MOST_TETRAHEDRA and self._may_search(vertices):
+                # Wherever it stands: rounded, so that it is found again.
+                vertices = (vertices - vertices[0, 0]).round(_DIGITS)
                 solids = _tetrahedra_solids(vertices)
                 if solids:
-                    centers, radii, stand_out = cover_surface(solids, stand_out_m)
+                    centers, radii, stand_out = kept_cover(
+                        vertices.tobytes() + repr(stand_out_m).encode(),
+                        lambda solids=solids: cover_surface(solids, stand_out_m),  # type: ignore[misc]
+                    )
                     self._tetrahedra[name] = (*_shares(vertices, centers), radii)
                     stand_outs.append(stand_out)
             if max(stand_outs) > stand_out_m * (1.0 + 1e-9):

@@ -13,7 +13,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from feelahead.approaches.approach import Approach
-from feelahead.approaches.frozen import AHEAD, frozen_hash
+from feelahead.approaches.frozen import AHEAD, ASIDE, frozen_hash
 from feelahead.approaches.laws import LAWS, Law
 from feelahead.approaches.outcome import End, Outcome, Trace
 from feelahead.approaches.pictures import LAW_COLOURS
@@ -84,7 +84,7 @@ def test_one_run_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
     arguments = "--force 2.5 --site grip --strongest-effect 3 --link-model stream --law paper --probability 0.9"
-    more = "--duration 4 --seed 7 --grip --spoil swapped"
+    more = "--duration 4 --seed 7 --grip --spoil swapped --stick 0.5 -0.5 --turn 0 1 --assist speed --camera-mm 1"
     assert tried("--model", WALL, "--link", "delay 5ms", *arguments.split(), *more.split()) == 0
     assert runs.asked == [
         Approach(
@@ -100,6 +100,10 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
             seed=7,
             grip=True,
             spoil="swapped",
+            stick=(0.5, -0.5),
+            turn=(0.0, 1.0),
+            assist="speed",
+            camera_sd_m=0.001,
         )
     ]
 
@@ -133,7 +137,9 @@ def test_who_reckons_with_the_delay_doubles_the_law_that_leaves_the_choice(
 
 def test_without_a_model_it_is_every_frozen_scene_that_is_ahead(runs: MadeUp) -> None:
     assert tried() == 0
-    assert [one.model.stem for one in runs.asked] == list(AHEAD)
+    assert [one.model.stem for one in runs.asked] == [*AHEAD, *ASIDE]
+    aside = {one.model.stem: (one.stick, one.turn) for one in runs.asked if (one.stick, one.turn) != ((0, 0), (0, 0))}
+    assert aside == ASIDE
     assert [one.model.stem for one in runs.asked if one.grip] == ["place_held"]
 
 
