@@ -14,6 +14,9 @@ _LEAST_STEP_S = 0.002
 _LEAST_START_GAP_M = 0.015
 _ACROSS_M = 0.01
 """Things are put up to so far from where the scene has them, to each side and up or down."""
+_FARTHEST_M = 1.0
+_ALONG_M = 0.1
+"""And so far along the approach, where nothing is straight ahead."""
 _TRIES = 40
 
 
@@ -51,7 +54,7 @@ def place(
     """
     record = replay.record
     posed.put(*_pose(replay, record.began_s), np.zeros(3))
-    home_way_m = posed.way_m(1.0)
+    home_way_m = posed.way_m(_FARTHEST_M)
     farthest_m = float(np.interp(replay.end_s, record.pose_time_s, replay.along_m))
     if farthest_m <= _LEAST_START_GAP_M:
         return None
@@ -59,7 +62,11 @@ def place(
     for _ in range(_TRIES):
         row = int(np.argmax(replay.along_m >= float(generator.uniform(_LEAST_START_GAP_M, farthest_m))))
         aside = generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
-        shift_m = replay.moved_m[row] - home_way_m * replay.axis + aside
+        if home_way_m < _FARTHEST_M:
+            shift_m = replay.moved_m[row] - home_way_m * replay.axis + aside
+        else:
+            # Nothing is straight ahead: drift or turning lead to where things stand.
+            shift_m = generator.uniform(-_ALONG_M, _ALONG_M) * replay.axis + aside
         posed.put(*_pose(replay, record.began_s), shift_m)
         if posed.gap_m() < _LEAST_START_GAP_M:
             continue
