@@ -21,8 +21,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.settings import RobotSettings
 from robot_side.simulation.arm import MujocoArm
-from robot_side.simulation.camera import MujocoCamera
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError, MujocoCamera
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.gripper_cover import GripperCover
 from robot_side.simulation.ground_truth import GroundTruth

@@ -18,7 +18,7 @@ from feelahead.benchmarks.coverage.laws import Draw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.settings import CameraSettings, EncoderSettings
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
 

@@ -19,7 +19,7 @@ from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import Draw, FieldLaw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
 from robot_side.settings import EncoderSettings
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import Scene, load_scene
 

@@ -1,5 +1,7 @@
 """What becomes of a lane's sums: bounds, exact answers where nothing is cut, and which pairs need precise forms."""
 
+import math
+
 from robot_side.compiled.kernel import inlined
 from robot_side.overlap.closed_forms.solid import Overlap, sphere_area, sphere_volume
 
@@ -55,7 +57,9 @@ def settle(
     # The error of a solid smaller than the sphere is smaller, too.
     tiny = TINY * whole * min(extent, radius)
     doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | strained
-    sane = farthest <= FARTHEST_CORNER * radius
+    # What overflowed on the way is no number, and compares as neither more nor less.
+    number = volume + gradient[0] + gradient[1] + gradient[2]
+    sane = (farthest <= FARTHEST_CORNER * radius) & (abs(number) < math.inf)
     unsettled = 1.0 if doubtful else 0.0
     unsettled = 0.0 if apart else unsettled
     settled = (

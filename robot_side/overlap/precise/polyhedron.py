@@ -65,6 +65,9 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     """
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
+    if _is_inside(features, solid, radius):
+        # So small a solid may be that directions and angles of it are no numbers any more.
+        return whole_solid(solid_volume)
     reached, number = screened(features, solid, radius)
     if reached != ANYTHING:
         _measure_lone(features, solid, radius, reached, number)
@@ -88,6 +91,16 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     # A corner or edge within the ball has some volume there, if too thin for its faces to be told apart.
     thin = most if reached in (CORNER, EDGE) else 0.0
     return _below_noise(local, summed, most, thin, radius)
+
+
+@inlined
+def _is_inside(features: FloatArray, solid: np.int64, radius: float) -> bool:
+    """Whether the ball contains all corners, by more than rounding."""
+    farthest_2 = 0.0
+    for corner in range(CORNERS[solid]):
+        x, y, z = features[POINTS + corner, 0, 0], features[POINTS + corner, 1, 0], features[POINTS + corner, 2, 0]
+        farthest_2 = max(farthest_2, x * x + y * y + z * z)
+    return bool(farthest_2 < (1.0 - 1e-9) * radius * radius)
 
 
 @inlined

@@ -23,7 +23,7 @@ from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_e
 from robot_side.simulation.scene import load_scene
 from tests.helpers.repository import DATA
 
-HASH = "fb1b6eb5bdb5"
+HASH = "40caf34b6180"
 WHAT_A_CHANGE_MEANS = (
     "a frozen scene, force or limit is another one: no figure measured with the former hash may be compared with one"
     " measured from now on. Take the change back, or give it a scene of its own; if it must be, measure everything anew"

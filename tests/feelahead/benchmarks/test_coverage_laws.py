@@ -30,7 +30,7 @@ from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError
 from robot_side.simulation.joint_reference import MotionLimits
 from tests.feelahead.benchmarks.recorded_pulls import SEED, approaching, staged
 

@@ -230,3 +230,14 @@ def test_gradients_are_finite_differences(seed: int) -> None:
         differences = [*(volumes[:3] - volumes[3:6]), volumes[6] - volumes[7]]
         # A corner or an edge at the sphere's surface lets the derivative turn within one step.
         np.testing.assert_allclose(np.array(differences) / (2 * step), [*gradient, area], rtol=0.0, atol=2e-4)
+
+
+def test_a_tetrahedron_that_is_nothing_beside_its_sphere_is_whole() -> None:
+    """Found by hypothesis: products of such lengths overflow and vanish on the way."""
+    least = 6.13479543e-122
+    vertices = np.full((4, 3), least)
+    vertices[0, 0], vertices[1, 1], vertices[2, 2] = 0.0, 1.43633914e-60, 1.0
+    volume, gradient, area = sphere_tetrahedron(np.zeros(3), 2.787593149816328e42, vertices, gradient=True)
+    assert 0.0 < volume < 1e-180
+    assert (gradient == 0.0).all()
+    assert area == 0.0

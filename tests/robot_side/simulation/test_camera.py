@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.simulation.camera import MujocoCamera
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError, MujocoCamera
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import SHAPES, STONE, planar_arm
 

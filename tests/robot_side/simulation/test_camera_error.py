@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from robot_side.simulation.camera_error import CameraError
+from robot_side.simulation.camera import CameraError
 
 
 def test_the_lasting_error_has_the_mean_and_deviation_asked_for_with_the_papers_sign() -> None:

@@ -65,6 +65,9 @@ SCENES = {
         "left_box left_ball right_box right_tetrahedron board_above box_below ball_below box_behind", None
     ),
     "empty": Expected("box", None),
+    "fleeing": Expected("mover", Hit(120, "fingertip", "mover")),
+    "edge": Expected("left_block right_block", None),
+    "turn": Expected("left_post right_post", None),
     "terrain": Expected("terrain", None),
     "terrain_ahead": Expected("terrain", Hit(320, "fingertip", "terrain")),
 }
