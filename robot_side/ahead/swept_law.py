@@ -88,9 +88,15 @@ class SweptLaw:
 
     def _look_where_due(self, situation: Situation, velocity: FloatArray, now_s: float) -> None:
         """Look where that is due longest, and elsewhere only where it is overdue. velocity (3,): of the tool."""
-        if self._sideways is None or now_s - self._sideways[0] >= FIELD_PERIOD_S - 1e-9:
-            self._sideways = self._measure(situation, velocity, now_s)
-        _, sideways, moments = self._sideways
+        last = self._sideways
+        # What is gripped or let go changes which spheres there are.
+        if (
+            last is None
+            or now_s - last[0] >= FIELD_PERIOD_S - 1e-9
+            or last[1].own_m_s.shape != situation.pose.sphere_centers_m.shape
+        ):
+            last = self._sideways = self._measure(situation, velocity, now_s)
+        _, sideways, moments = last
         if situation.lateral == (0.0, 0.0):
             self._places.pop("stick", None)
         ages_s: dict[tuple[Side, int], float] = {}
