@@ -128,7 +128,7 @@ def _meet_block(
                 ramp.least = min(math.pi * size * least_depth * least_depth, 0.5 * scene.object_volumes[thing])
                 ramp.touchable = standing in (TOUCHABLE, TARGET)
                 ramp.expected = inflated - min(search.sigma[i, 1], inflated)
-                ramp.before = early + (inflated if bare else 0.0)
+                ramp.bare, ramp.early, ramp.before = bare, early, early + (inflated if bare else 0.0)
             # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
             if not touching:
                 break

@@ -148,12 +148,12 @@ def _enter(
     for k in range(begin, end):
         ramp = ramps[k]
         start = load(spheres, ramp.sphere)
-        _enter_ramp(ramp, pairs, start, along, reach, placed, tables)
+        _enter_ramp(ramp, pairs, start, along, reach + ramp.early, placed, tables)
         # The uninflated sphere, which comes next, counts only beside one that overlaps already.
-        if ramp.start == math.inf or (ramp.before > 0.0 and ramps[k - 1].start > 0.0):
+        if ramp.start == math.inf or (ramp.bare and ramps[k - 1].start > 0.0):
             ramp.state = DONE
         else:
-            _bound_rise(ramp, pairs, start, along, reach, margin, placed, tables)
+            _bound_rise(ramp, pairs, start, along, reach + ramp.early, margin, placed, tables)
 
 
 @compiled(*_ARGUMENTS)
@@ -192,5 +192,5 @@ def _look_again(
             if pair.entry <= last and pair.again <= last:
                 place = placed.rows[pair.row]
                 start = add(load(spheres, ramp.sphere), scale(last, along))
-                left = _sweep(placed, place, start, along, ramp.radius, reach - last)
+                left = _sweep(placed, place, start, along, ramp.radius, reach + ramp.early - last)
                 pair.again = last + next_touch(tables, placed.meshes[place], left)

@@ -33,7 +33,9 @@ RAMP: Final = np.dtype(
         ("nodes", np.int64),
         ("touchable", np.int64),
         ("radius", np.float64),
+        ("bare", np.int64),
         ("before", np.float64),
+        ("early", np.float64),
         ("expected", np.float64),
         ("start", np.float64),
         ("free", np.float64),
@@ -48,11 +50,11 @@ RAMP: Final = np.dtype(
         ("push", np.float64, (3,)),
     ]
 )
-"""One ramp. radius: of the sphere, inflated. before: how much earlier it counts: by the object's coming
-nearer, and D_σ for a sphere that is not inflated.
-expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this way. free: d; NaN while not known. floor: V(0).
-lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise add to the slope at the last node. most: by so
-much the overlap rises at most; infinite where nobody has worked that out."""
+"""One ramp. radius: of the sphere, inflated unless it is bare. early: by how much sooner it counts as its object comes
+nearer; before: by that, and by D_σ for a bare sphere. expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this
+way. free: d; NaN while not known. floor: V(0). lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise
+add to the slope at the last node. most: by so much the overlap rises at most; infinite where nobody has worked that
+out."""
 
 PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("again", np.float64)])
 """A primitive's row in the scene, and the way at which the ramp's sphere begins to enter it: NaN for a mesh until that

@@ -10,9 +10,11 @@ from common.reaction import HORIZON_S
 from robot_side.ahead.sideways import SPACING_M, FingerMotion, Sideways
 from robot_side.ahead.swept_law import FIELD_PERIOD_S
 from robot_side.objects.perceived import PerceivedObjects
+from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import RADIUS_M, ball_pose
 from tests.helpers.ahead.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
+from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene
 
 LOOP_S = 0.1
@@ -169,3 +171,27 @@ def test_a_turned_gripper_keeps_its_shape_and_looks_where_it_points() -> None:
     np.testing.assert_allclose(moved.tool_rotation[:, 2], [np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
     in_tool = [(one.sphere_centers_m - one.tool_position_m) @ one.tool_rotation for one in (pose, moved)]
     np.testing.assert_allclose(in_tool[0], in_tool[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("speed_m_s", [1e-15, 0.05])
+def test_a_mesh_that_moves_is_felt_like_a_box_that_does(speed_m_s: float) -> None:
+    """Measured velocities are hardly ever exactly 0."""
+    wall = (
+        Scene()
+        .add()
+        .mesh(Mesh(CUBE_CORNERS * [0.5, 0.5, 0.05], CUBE_TRIANGLES), [0.0, 0.0, RADIUS_M + 0.12 + 0.05])
+        .objects()
+    )
+    meshed = replace(wall, velocities_m_s=np.array([[0.0, 0.0, -speed_m_s]]))
+    boxed = moving_wall(0.12, [0.0, 0.0, -speed_m_s])
+    as_mesh, as_box = (first_ways(objects, [0.0] * 3, [0.0] * 3)[1] for objects in (meshed, boxed))
+    np.testing.assert_allclose(as_mesh, as_box, atol=1e-4)
+    far_m = FULL_SPEED_M_S * STOPPING_S + 0.15
+    beyond = (
+        Scene()
+        .add()
+        .mesh(Mesh(CUBE_CORNERS * [0.5, 0.5, 0.05], CUBE_TRIANGLES), [0.0, 0.0, RADIUS_M + far_m + 0.05])
+        .objects()
+    )
+    fast = replace(beyond, velocities_m_s=np.array([[0.0, 0.0, -0.4]]))
+    assert first_ways(fast, [0.0] * 3, [0.0] * 3)[1][7] == pytest.approx(far_m - 0.4 * STOPPING_S, abs=0.012)
