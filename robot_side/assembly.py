@@ -78,7 +78,7 @@ def build_robot_side(
         ),
     )
     # Before the first tick, as a search for spheres takes far longer than one.
-    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m)
+    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
     law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(

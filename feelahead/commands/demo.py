@@ -55,6 +55,8 @@ class DemoSettings(RunOptions):
     """How long to run from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    assist: Literal["none", "speed"] = "none"
+    """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength is due."""
     law: Literal["swept", "paper"] = "swept"
     """How what is ahead is felt: in time to let go, along each trigger; or by the paper's plain law."""
     compensation: Compensation = "operator"
@@ -156,7 +158,7 @@ def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Pa
     arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     if settings.robot_config is not None:
         arguments.append(f"--config={settings.robot_config}")
-    for name in ("scene", "model", "site", "probability", "law"):
+    for name in ("scene", "model", "site", "probability", "assist", "law"):
         if name in given:
             arguments.append(f"--{name}={getattr(settings, name)}")
     return arguments

@@ -26,7 +26,7 @@ _FLOOR_M: Final = -0.1
 class ScenesSettings:
     """Pictures of the built-in scenes: the gripper at its start, and dashed where it grasps."""
 
-    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("docs/scenes")
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path()
     """One PNG for each scene goes there."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Whose wall, posts or shelf are drawn."""

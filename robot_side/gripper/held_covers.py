@@ -1,5 +1,6 @@
 """The spheres of whatever may be held, found when the objects are first known: a tick has no time for it."""
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,8 +37,8 @@ class HeldCovers:
     box's spheres, or a ball around each tetrahedron.
     """
 
-    def __init__(self, objects: PerceivedObjects, stand_out_m: float = 0.003) -> None:
-        """From any frame of the objects."""
+    def __init__(self, objects: PerceivedObjects, stand_out_m: float = 0.003, fixed: Collection[str] = ()) -> None:
+        """From any frame of the objects. fixed: names of what nobody lifts, which is not searched for."""
         self._stand_out_m = stand_out_m
         self._meshes: dict[int, _Spheres] = {}
         self._tetrahedra: dict[str, tuple[IntArray, FloatArray, FloatArray]] = {}
@@ -45,7 +46,7 @@ class HeldCovers:
         corners = [] if objects.mesh_library is None else mesh_corners(objects.mesh_library)
         first = sorted(range(len(objects.names)), key=lambda index: objects.roles[index] is not Role.TARGET)
         for index in first:
-            if objects.roles[index] is Role.SUPPORT:
+            if objects.roles[index] is Role.SUPPORT or objects.names[index] in fixed:
                 continue
             name, stand_outs = objects.names[index], [0.0]
             for mesh in np.unique(objects.mesh_index[objects.mesh_object == index]).tolist():

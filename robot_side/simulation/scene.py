@@ -48,6 +48,14 @@ class Scene:
     """What MuJoCo had to say about the model."""
 
     @property
+    def fixed(self) -> frozenset[str]:
+        """Names of the objects that no joint lets move."""
+        bodies = self.model.geom_bodyid
+        return frozenset(
+            thing.name for thing in self.objects if not self.model.body_weldid[bodies[list(thing.geoms)]].any()
+        )
+
+    @property
     def approximated(self) -> tuple[str, ...]:
         """Names of the objects that are perceived larger than they are."""
         return self.primitives.approximated
@@ -102,7 +110,11 @@ def load_scene(
         raise ConfigurationError(f"model: timestep = {model.opt.timestep}; valid: above 0 s, such as 0.002")
     data = mujoco.MjData(model)
     data.qpos[:] = start
+    data.qvel[:] = _start_velocities(model, robot)
     mujoco.mj_forward(model, data)
+    for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
+        stray = model.geom(int(geom)).name or f"geom{geom}"
+        raise ConfigurationError(f"model: {stray!r} stands at {data.geom_xpos[geom]}; valid: finite positions")
     objects, shared_names = _objects(model, robot)
     return Scene(
         model=model,
@@ -159,6 +171,19 @@ def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str
     limited = np.isfinite(robot.lower_rad)
     start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
     return start, "the middle of the joints' ranges, as there is no keyframe (to choose: a keyframe named 'home')"
+
+
+def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
+    """qvel (nv,) of the keyframe that the arm starts from, for what is not the robot: that starts at rest."""
+    keyframes = [model.key(key).name for key in range(model.nkey)]
+    if not keyframes:
+        return np.zeros(model.nv)
+    chosen = keyframes.index("home") if "home" in keyframes else 0
+    velocities: FloatArray = model.key_qvel[chosen].copy()
+    if not np.isfinite(velocities).all():
+        raise ConfigurationError(f"model: keyframe {keyframes[chosen]!r} holds NaN or infinity; valid: finite qvel")
+    velocities[model.body_rootid[model.dof_bodyid] == robot.root_body] = 0.0
+    return velocities
 
 
 def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:

@@ -74,9 +74,9 @@ class ApproachSettings:
     grip: bool = False
     """Close the gripper on what stands between its fingers first."""
     stick: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
-    """Deflection, 0 to 1, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
+    """Deflection, at most 1 long, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
     turn: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
-    """Deflection, 0 to 1, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
+    """Deflection, at most 1 long, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
     assist: Assist = "none"
     """speed: the robot side caps the speed along the triggers itself."""
     camera_mm: Annotated[float, tyro.conf.arg(metavar="MM")] = 3.0

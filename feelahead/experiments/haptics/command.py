@@ -22,6 +22,7 @@ from rich.table import Table
 
 from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
+from common.files.output_file import require_output_file
 from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
 from feelahead.experiments.haptics.statistics import exact_interval, mcnemar_p, mean_difference_interval, restricted
@@ -81,6 +82,7 @@ class ComparisonSettings:
             raise ValueError(f"--jitter {self.jitter}: valid: 0 to 1000 milliseconds")
         if not 1.0 <= self.tick <= 10.0:
             raise ValueError(f"--tick {self.tick}: valid: 1 to 10 milliseconds")
+        require_output_file("--csv", self.csv)
         for name in ("scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):
