@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 MARGIN_M = 0.012
 """m: over this way before the one at which full strength is due, strength grows."""
-LEAST_DEPTH_M = 0.0004
-"""What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.4 mm)². Noise in the encoders turns a way
+LEAST_DEPTH_M = 0.0005
+"""What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.5 mm)². Noise in the encoders turns a way
 aside by less."""
 _MOST_ROUNDS = 1000
 

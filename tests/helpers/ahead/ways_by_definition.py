@@ -22,7 +22,7 @@ class Definition:
     direction: FloatArray
     reach_m: float
     margin_m: float = 0.012
-    least_depth_m: float = 0.0004
+    least_depth_m: float = 0.0005
 
     def ways(
         self,

@@ -107,12 +107,12 @@ def test_a_wall_that_leans_into_the_way_is_full_before_it_is_touched(degrees: in
 
 
 def test_a_graze_is_felt_by_its_share_of_the_least_volume() -> None:
-    """A hair through a fingertip's sphere is less than a slice of 0.4 mm of it; so is a hair's breadth of an edge."""
+    """A hair through a fingertip's sphere is less than a slice of 0.5 mm of it; so is a hair's breadth of an edge."""
     radius_m = RADIUS_M + INFLATED_M
     least_m3 = np.pi * radius_m * LEAST_DEPTH_M**2
     ways = ways_of(ball_pose(), thing("0.4 mm rod", radius_m + FREE_M), along(AHEAD, INFLATED_M))
     most_m3 = 0.16e-6 * 2.0 * radius_m
-    assert np.isfinite(ways).sum() == int(8.0 * most_m3 / least_m3 + 0.5) == 5
+    assert np.isfinite(ways).sum() == int(8.0 * most_m3 / least_m3 + 0.5) == 3
     assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
     edge = Scene().add().box([radius_m - 0.00005 + 0.05, 0.0, 0.1], [0.05, 0.1, 0.05]).objects()
     assert np.isinf(ways_of(ball_pose(), edge, along(AHEAD, INFLATED_M))).all()
