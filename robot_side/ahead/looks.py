@@ -37,7 +37,8 @@ class _Looks:
     """What was seen along one side from one place lately, the newest last; there is always one."""
 
     def __init__(self, first: Seen) -> None:
-        self._kept = [first]
+        self._kept: list[Seen] = []
+        self.add(first)
 
     @property
     def newest(self) -> Seen:
@@ -52,11 +53,15 @@ class _Looks:
             if seen.at_s - one.at_s < STEADY_S and one.direction @ seen.direction > _SAME_DIRECTION
         ]
         self._kept.append(seen)
+        # Put together here, as the ways are asked for in every tick.
+        self._ways_m = np.array([(one.field.fast_m, one.field.slow_m) for one in self._kept])
+        self._directions = np.array([one.direction for one in self._kept])
+        self._began_m = np.array([one.direction @ one.tool_m for one in self._kept])
 
     def ways_m(self, tool_m: FloatArray) -> FloatArray:
         """The shortest fast and slow ways (2, 8) from where the tool is now."""
-        ways = [np.array([one.field.fast_m, one.field.slow_m]) - one.moved_m(tool_m) for one in self._kept]
-        shortest: FloatArray = np.min(ways, axis=0)
+        moved_m = self._directions @ tool_m - self._began_m
+        shortest: FloatArray = (self._ways_m - moved_m[:, None, None]).min(axis=0)
         return shortest
 
 
