@@ -18,8 +18,9 @@ class MotionLimits:
     acceleration_rad_s2: float = 8.0
     deceleration_rad_s2: float = 12.0
     """How fast the reference stops when a command has run out."""
-    windup_rad: float = 0.02
-    """How far the reference may run ahead of a joint that something holds back."""
+    windup_rad: float = 0.005
+    """How far the reference may run ahead of a joint that something holds back: the built-in arm's large joints press
+    with 20 N m then, some 30 N at the tool, and hardly spring when that gives way."""
 
     def __post_init__(self) -> None:
         for name in ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "windup_rad"):
@@ -94,7 +95,7 @@ class JointReference:
         velocity = np.clip(self.velocity_rad_s + change, to_lower, to_upper)
         self.acceleration_rad_s2 = (velocity - self.velocity_rad_s) / step_s
         self.velocity_rad_s = velocity
-        moved = np.clip(position + self.velocity_rad_s * step_s, self._lower_rad, self._upper_rad)
-        self.position_rad = np.clip(
-            moved, measured_position_rad - limits.windup_rad, measured_position_rad + limits.windup_rad
-        )
+        way = velocity * step_s
+        moved = np.clip(position + way, self._lower_rad, self._upper_rad)
+        lead = limits.windup_rad + np.abs(way)
+        self.position_rad = np.clip(moved, measured_position_rad - lead, measured_position_rad + lead)
