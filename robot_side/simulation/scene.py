@@ -13,6 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from common.files.input_file import require_input_file
 from robot_side.objects.perceived import Role
 from robot_side.objects.roles import assign_roles
 from robot_side.simulation.built_in_scenes import SceneName, furnish
@@ -135,8 +136,10 @@ def _log_warning(message: str) -> None:
 
 
 def _read(model_path: Path) -> Any:
-    if not model_path.is_file():
-        raise ConfigurationError(f"model: there is no file {str(model_path)!r}; valid: an MJCF file")
+    try:
+        require_input_file("--model", model_path, "an MJCF file")
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
     try:
         return mujoco.MjSpec.from_file(str(model_path))
     except (ValueError, mujoco.FatalError) as error:

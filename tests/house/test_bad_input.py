@@ -59,6 +59,7 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (ROBOT, ["--bind", "udp://127.0.0.1:5555"], "udp://127.0.0.1:5555", "tcp://HOST:PORT"),
         (ROBOT, ["--bind", "tcp://0.0.0.0:5555"], "0.0.0.0", "--insecure"),
         (ROBOT, ["--model", "missing.xml", "--site", "tip"], "missing.xml", "MJCF"),
+        (ROBOT, ["--model", "/", "--site", "tip"], "--model /: is a directory", "MJCF"),
         (ROBOT, ["--site", "tip"], "--site", "--model"),
         (ROBOT, ["--camera.sd-m", "-1"], "-1", "0"),
         (ROBOT, ["--duration", "-3"], "-3", "above 0"),
