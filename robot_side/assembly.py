@@ -61,7 +61,7 @@ def build_robot_side(
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    scene = scene or load_scene(settings.model, settings.site, settings.roles, settings.scene, settings.seed)
+    scene = scene or load_scene(settings.model, settings.site, settings.roles, settings.scene or "table", settings.seed)
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()

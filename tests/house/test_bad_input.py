@@ -60,6 +60,8 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (ROBOT, ["--bind", "tcp://0.0.0.0:5555"], "0.0.0.0", "--insecure"),
         (ROBOT, ["--model", "missing.xml", "--site", "tip"], "missing.xml", "MJCF"),
         (ROBOT, ["--model", "/", "--site", "tip"], "--model /: is a directory", "MJCF"),
+        (ROBOT, ["--scene", "table", "--model", "x.xml", "--site", "tip"], "--scene table with --model", "one of them"),
+        (DEMO, ["--scene", "table", "--model", "x.xml", "--site", "tip"], "--scene table with --model", "one of them"),
         (ROBOT, ["--site", "tip"], "--site", "--model"),
         (ROBOT, ["--camera.sd-m", "-1"], "-1", "0"),
         (ROBOT, ["--duration", "-3"], "-3", "above 0"),
