@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 
+_SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
 
@@ -52,21 +54,24 @@ def build_robot_side(
     watch: Callable[[Arm], Arm] | None = None,
     scene: Scene | None = None,
     other_law: Callable[[Law], Law] | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> RobotSide:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
     that the settings name, so that the caller can look at it. `other_law`: makes another law of the settings' own.
+    `announce`: told once, in one line, what takes long.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    scene = scene or load_scene(settings.model, settings.site, settings.roles, settings.scene, settings.seed)
+    scene = scene or load_scene(settings.model, settings.site, settings.roles, settings.scene or "table", settings.seed)
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
     arm = MujocoArm(scene, encoder, limits)
-    kinematics = MujocoKinematics(scene, settings.cover_m)
+    searching = None if announce is None else cache(lambda: announce(_SEARCHING))
+    kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     camera = MujocoCamera(
         scene,
         CameraError(
@@ -78,7 +83,7 @@ def build_robot_side(
         ),
     )
     # Before the first tick, as a search for spheres takes far longer than one.
-    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed)
+    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed, searching)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
     law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(

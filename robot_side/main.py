@@ -54,7 +54,7 @@ def command(arguments: Sequence[str]) -> int:
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
     ):
-        core = build_robot_side(settings, secrets.randbits(53), clock_domain())
+        core = build_robot_side(settings, secrets.randbits(53), clock_domain(), announce=status.note)
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))

@@ -86,10 +86,10 @@ class RobotSettings(RunOptions):
     keyframe, else in the middle of its joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
-    scene: SceneName = "table"
-    """What the built-in arm stands before. table: a cluttered table. wall: a wall 10 to 60 mm behind the target. slot:
-    two posts on the way, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to reach over. The
-    last three are drawn from the seed."""
+    scene: SceneName | None = None
+    """What the built-in arm stands before. table: a cluttered table, unless given. wall: a wall 10 to 60 mm behind the
+    target. slot: two posts on the way, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to
+    reach over. The last three are drawn from the seed."""
     law: LawName = "swept"
     """How what is ahead is felt. swept: in time to let go, along each trigger. paper: the paper's plain law, to compare
     with."""
@@ -116,7 +116,7 @@ class RobotSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.scene != "table" and self.model is not None:
+        if self.scene is not None and self.model is not None:
             raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
         _require("cover_m", self.cover_m, 0.0005, 0.05)
         if self.keys is not None and self.insecure:

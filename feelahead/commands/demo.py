@@ -47,10 +47,10 @@ class DemoSettings(RunOptions):
     Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
     """
 
-    scene: Literal["table", "wall", "slot", "shelf"] = "table"
-    """What stands around the target. table: a cluttered table. wall: a wall 10 to 60 mm behind it. slot: two posts on
-    the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front edge has to be reached over. The
-    last three are drawn from the seed."""
+    scene: Literal["table", "wall", "slot", "shelf"] | None = None
+    """What stands around the built-in arm's target. table: a cluttered table, unless given. wall: a wall 10 to 60 mm
+    behind it. slot: two posts on the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front
+    edge has to be reached over. The last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
     """How long to run from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
@@ -78,7 +78,7 @@ class DemoSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.scene != "table" and self.model is not None:
+        if self.scene is not None and self.model is not None:
             raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
 
 

@@ -15,8 +15,9 @@ from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 
 SPACING_M: Final = 0.015
-"""No sphere gets farther between two places that are looked from: less than an inflated fingertip's sphere is wide."""
-LEAST_M: Final = 0.003
+"""No sphere gets farther between two places that are looked from, less than an inflated fingertip's sphere is wide. Of
+who gets beyond the most places times this, places are farther apart."""
+_LEAST_M: Final = 0.003
 """Who gets no farther than this is looked at where it is."""
 _MOST_PLACES: Final = 8
 _NOISE_M_S: Final = 0.015
@@ -55,7 +56,7 @@ class Sideways:
         None for what is not finite, either: whoever looks refuses that.
         """
         farthest_m = self.farthest_m(pose, until_s, ahead_m)
-        moves = farthest_m >= LEAST_M and math.isfinite(farthest_m)
+        moves = farthest_m >= _LEAST_M and math.isfinite(farthest_m)
         count = min(math.ceil(farthest_m / SPACING_M), _MOST_PLACES) if moves else 0
         return tuple(until_s * (number + 1) / count for number in range(count))
 

@@ -1,6 +1,6 @@
 """The spheres of whatever may be held, found when the objects are first known: a tick has no time for it."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,8 +37,17 @@ class HeldCovers:
     box's spheres, or a ball around each tetrahedron.
     """
 
-    def __init__(self, objects: PerceivedObjects, stand_out_m: float = 0.003, fixed: Collection[str] = ()) -> None:
-        """From any frame of the objects. fixed: names of what nobody lifts, which is not searched for."""
+    def __init__(
+        self,
+        objects: PerceivedObjects,
+        stand_out_m: float = 0.003,
+        fixed: Collection[str] = (),
+        searching: Callable[[], None] | None = None,
+    ) -> None:
+        """From any frame of the objects. fixed: names of what nobody lifts, which is not searched for.
+
+        searching: called before each search, but not for what was found in an earlier run.
+        """
         self._stand_out_m = stand_out_m
         self._meshes: dict[int, _Spheres] = {}
         self._tetrahedra: dict[str, tuple[IntArray, FloatArray, FloatArray]] = {}
@@ -55,6 +64,7 @@ class HeldCovers:
                     found = kept_cover(
                         corners[mesh].tobytes() + repr(stand_out_m).encode(),
                         lambda solid=solid: cover_surface([solid], stand_out_m, [np.eye(3)]),  # type: ignore[misc]
+                        searching=searching,
                     )
                     self._meshes[mesh] = found[:2]
                     stand_outs.append(found[2])
@@ -67,6 +77,7 @@ class HeldCovers:
                     centers, radii, stand_out = kept_cover(
                         vertices.tobytes() + repr(stand_out_m).encode(),
                         lambda solids=solids: cover_surface(solids, stand_out_m),  # type: ignore[misc]
+                        searching=searching,
                     )
                     self._tetrahedra[name] = (*_shares(vertices, centers), radii)
                     stand_outs.append(stand_out)

@@ -16,10 +16,16 @@ _Cover = tuple[FloatArray, FloatArray, float]
 """Centres (m, 3), radii (m,), and how far they stand out."""
 
 
-def kept_cover(shape: bytes, make: Callable[[], _Cover], folder: Path | None = None) -> _Cover:
+def kept_cover(
+    shape: bytes,
+    make: Callable[[], _Cover],
+    folder: Path | None = None,
+    searching: Callable[[], None] | None = None,
+) -> _Cover:
     """What `make` gives for a `shape`, or what it gave for the same one before, by the same code.
 
-    A file that cannot be read is made anew, and a folder that cannot be written to keeps nothing.
+    A file that cannot be read is made anew, and a folder that cannot be written to keeps nothing. `searching` is called
+    before `make`, so that a person learns what they wait for.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
     path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"
@@ -27,6 +33,8 @@ def kept_cover(shape: bytes, make: Callable[[], _Cover], folder: Path | None = N
         rows = np.load(path, allow_pickle=False)
         if rows.ndim == 2 and rows.shape[1] == 5 and len(rows) and np.isfinite(rows).all():
             return rows[:, :3].copy(), rows[:, 3].copy(), float(rows[0, 4])
+    if searching is not None:
+        searching()
     centers, radii, stand_out_m = make()
     rows = np.column_stack([centers, radii, np.full(len(radii), stand_out_m)])
     with contextlib.suppress(OSError):

@@ -1,6 +1,6 @@
 """The spheres that cover a simulated gripper: its geoms as they collide, in the frames of their links."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -48,11 +48,14 @@ class _Part:
     """A mesh's vertices (v, 3)"""
 
 
-def cover_gripper(model: Any, geoms: IntArray, stand_out_m: float = 0.003) -> GripperCover:
+def cover_gripper(
+    model: Any, geoms: IntArray, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None
+) -> GripperCover:
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
     A mesh counts as its convex hull, which is what collides. No sphere stands out of its link's geoms by more than
     `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
+    searching: called before each search, but not for what was found before.
     """
     centers, radii, bodies, stand_outs = [], [], [], []
     # Sorted, as a set has no order of its own.
@@ -62,7 +65,7 @@ def cover_gripper(model: Any, geoms: IntArray, stand_out_m: float = 0.003) -> Gr
         first = Rotation.from_quat(model.geom_quat[of_body[0]], scalar_first=True)
         origin = model.geom_pos[of_body[0]]
         parts = tuple(_part(model, geom, first, origin) for geom in of_body)
-        found, found_radii, stand_out = _cover_link(parts, stand_out_m)
+        found, found_radii, stand_out = _cover_link(parts, stand_out_m, searching)
         centers.append(first.apply(found) + origin)
         radii.append(found_radii)
         bodies.append(np.full(len(found_radii), body, dtype=np.int64))
@@ -89,7 +92,9 @@ def _box_corners(box: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def _cover_link(parts: tuple[_Part, ...], stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
+def _cover_link(
+    parts: tuple[_Part, ...], stand_out_m: float, searching: Callable[[], None] | None
+) -> tuple[FloatArray, FloatArray, float]:
     rotations = [Rotation.from_quat(part.quaternion).as_matrix() for part in parts]
     positions = [np.array(part.position_m) for part in parts]
     solids = [] if all(part.kind in _WITH_ROWS for part in parts) else [_solid(part) for part in parts]
@@ -99,7 +104,11 @@ def _cover_link(parts: tuple[_Part, ...], stand_out_m: float) -> tuple[FloatArra
             for solid, rotation, position in zip(solids, rotations, positions, strict=True)
             if solid is not None
         ]
-        return kept_cover(repr((parts, stand_out_m)).encode(), lambda: cover_surface(placed, stand_out_m, rotations))
+        return kept_cover(
+            repr((parts, stand_out_m)).encode(),
+            lambda: cover_surface(placed, stand_out_m, rotations),
+            searching=searching,
+        )
     centers, radii, stand_outs = [], [], []
     for part, rotation, position in zip(parts, rotations, positions, strict=True):
         found, found_radii, stand_out = _with_rows(part, stand_out_m)

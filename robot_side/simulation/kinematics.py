@@ -1,5 +1,7 @@
 """Where encoder readings put the gripper (eq. 4)."""
 
+from collections.abc import Callable
+
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
@@ -15,9 +17,10 @@ from robot_side.simulation.scene import Scene
 class MujocoKinematics:
     """GripperKinematics: the gripper where the encoders say it is, in a copy of the state that nobody simulates."""
 
-    def __init__(self, scene: Scene, stand_out_m: float = 0.003) -> None:
+    def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
         """Cover the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
 
+        searching: called before each search for these, but not for what was found before.
         ConfigurationError when the robot has nothing at the tool that could touch anything.
         """
         self._model, self._robot = scene.model, scene.robot
@@ -27,7 +30,7 @@ class MujocoKinematics:
         self._data = mujoco.MjData(model)
         self._data.qpos[:] = scene.data.qpos
         # The gripper is covered in the frames of its links, in which its geoms do not move.
-        self.cover = cover_gripper(model, geoms, stand_out_m)
+        self.cover = cover_gripper(model, geoms, stand_out_m, searching)
         order = self._near_order(self.cover.bodies, self.cover.centers_m)
         self._bodies = self.cover.bodies[order]
         self._local_centers_m = self.cover.centers_m[order, :, None]

@@ -13,6 +13,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from common.files.input_file import require_input_file
 from robot_side.objects.perceived import Role
 from robot_side.objects.roles import assign_roles
 from robot_side.simulation.built_in_scenes import SceneName, furnish
@@ -135,8 +136,10 @@ def _log_warning(message: str) -> None:
 
 
 def _read(model_path: Path) -> Any:
-    if not model_path.is_file():
-        raise ConfigurationError(f"model: there is no file {str(model_path)!r}; valid: an MJCF file")
+    try:
+        require_input_file("--model", model_path, "an MJCF file")
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
     try:
         return mujoco.MjSpec.from_file(str(model_path))
     except (ValueError, mujoco.FatalError) as error:
@@ -154,19 +157,23 @@ def _unusable(error: Exception) -> ConfigurationError:
     return ConfigurationError(f"model: {' '.join(str(error).split())}; valid: an MJCF file that MuJoCo compiles")
 
 
-def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
-    """qpos (nq,) of the keyframe `home`, else of the first one, else the middle of the ranges; and which, in words."""
+def _start_key(model: Any) -> int | None:
+    """Which keyframe the arm starts from: `home`, else the first one; None where there is none."""
     keyframes = [model.key(key).name for key in range(model.nkey)]
+    if not keyframes:
+        return None
+    return keyframes.index("home") if "home" in keyframes else 0
+
+
+def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
+    """qpos (nq,) of the keyframe that the arm starts from, else the middle of the ranges; and which, in words."""
     start: FloatArray
-    if keyframes:
-        home = "home" in keyframes
-        chosen = keyframes.index("home") if home else 0
-        start = model.key_qpos[chosen].copy()
-        if not np.isfinite(start).all():
-            raise ConfigurationError(f"model: keyframe {keyframes[chosen]!r} holds NaN or infinity; valid: finite qpos")
-        if home:
+    key = _start_key(model)
+    if key is not None:
+        start, name = _finite(model, key, "qpos"), model.key(key).name
+        if name == "home":
             return start, "the keyframe 'home'"
-        return start, f"the first keyframe, {keyframes[0]!r} (a keyframe named 'home' would come before it)"
+        return start, f"the first keyframe, {name!r} (a keyframe named 'home' would come before it)"
     start = model.qpos0.copy()
     limited = np.isfinite(robot.lower_rad)
     start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
@@ -175,15 +182,20 @@ def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str
 
 def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
     """qvel (nv,) of the keyframe that the arm starts from, for what is not the robot: that starts at rest."""
-    keyframes = [model.key(key).name for key in range(model.nkey)]
-    if not keyframes:
+    key = _start_key(model)
+    if key is None:
         return np.zeros(model.nv)
-    chosen = keyframes.index("home") if "home" in keyframes else 0
-    velocities: FloatArray = model.key_qvel[chosen].copy()
-    if not np.isfinite(velocities).all():
-        raise ConfigurationError(f"model: keyframe {keyframes[chosen]!r} holds NaN or infinity; valid: finite qvel")
+    velocities = _finite(model, key, "qvel")
     velocities[model.body_rootid[model.dof_bodyid] == robot.root_body] = 0.0
     return velocities
+
+
+def _finite(model: Any, key: int, part: str) -> FloatArray:
+    """A copy of a keyframe's `part`, qpos or qvel; ConfigurationError where it is not finite."""
+    values: FloatArray = getattr(model, f"key_{part}")[key].copy()
+    if not np.isfinite(values).all():
+        raise ConfigurationError(f"model: keyframe {model.key(key).name!r} holds NaN or infinity; valid: finite {part}")
+    return values
 
 
 def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:

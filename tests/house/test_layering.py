@@ -47,8 +47,8 @@ ARROWS = """
         robot_side/overlap/precise
     robot_side/gripper: common common/files robot_side/ahead robot_side/arm robot_side/objects
         robot_side/overlap/meshes
-    robot_side/simulation: common robot_side/ahead robot_side/arm robot_side/enlargement robot_side/gripper
-        robot_side/objects robot_side/overlap/meshes
+    robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
+        robot_side/gripper robot_side/objects robot_side/overlap/meshes
     robot_side: common common/command common/emulation common/protocol common/realtime common/sockets common/timing
         robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper robot_side/objects
         robot_side/operators robot_side/simulation

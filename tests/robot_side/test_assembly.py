@@ -114,3 +114,29 @@ def test_a_person_is_told_what_is_there() -> None:
     assert notes[0].startswith("starts at ")
     assert notes[1].startswith("objects: target: ")
     assert not any(NOT_MEASURED in note for note in notes)
+
+
+ROUND_PALM = ('name="palm" type="box"', 'name="palm" type="ellipsoid"')
+CAN = '<body name="can" pos="0.9 0 0.3"><freejoint/><geom type="cylinder" size="0.02 0.03"/></body>'
+BOX = '<body name="carton" pos="0.9 0 0.3"><freejoint/><geom type="box" size="0.02 0.03 0.04"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("palm", "world", "searches"),
+    [(ROUND_PALM, BOX, True), (("", ""), CAN, True), (ROUND_PALM, CAN, True), (("", ""), BOX, False)],
+    ids=["gripper", "object", "both", "neither"],
+)
+def test_a_search_for_spheres_is_announced_once_and_only_at_the_first_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, palm: tuple[str, str], world: str, searches: bool
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    model = planar_arm(tmp_path, world=world)
+    model.write_text(model.read_text().replace(*palm))
+    said: list[list[str]] = [[], []]
+    for told in said:
+        build_robot_side(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
+    first, again = said
+    assert [line.partition(",")[0] for line in first] == (
+        ["searching for spheres that cover gripper and objects"] if searches else []
+    )
+    assert again == []

@@ -1,7 +1,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -11,6 +11,7 @@ from robot_side.assembly import build_robot_side
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
+from robot_side.simulation.built_in_scenes import SceneName
 
 NAN, INFINITY = math.nan, math.inf
 
@@ -77,6 +78,14 @@ def test_model_and_site_come_together() -> None:
         build_robot_side(RobotSettings(model=Path("arm.xml")), 1, "")
     with pytest.raises(ValueError, match="--site is given without --model; valid: both, or neither"):
         build_robot_side(RobotSettings(site="tool"), 1, "")
+
+
+@pytest.mark.parametrize("scene", get_args(SceneName))
+def test_no_scene_is_asked_for_with_a_model_not_even_the_usual_one(tmp_path: Path, scene: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(f'scene = "{scene}"')
+    with pytest.raises(ConfigurationError, match=f"--scene {scene} with --model: valid: one of them"):
+        parse_settings(RobotSettings, "robot", ["--config", str(path), "--model", "arm.xml", "--site", "tool"])
 
 
 def test_one_of_them_may_stand_in_the_file_and_the_other_on_the_command_line(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import tyro
 from rich.console import Console
 
 from common.command.command_line import parse_settings
+from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file
 from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.progress import progress
@@ -54,8 +55,7 @@ class CoverSettings:
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
         for model in self.model:
-            if not model.is_file():
-                raise ValueError(f"--model {model}: there is no such file; valid: an MJCF file")
+            require_input_file("--model", model, "an MJCF file")
         require_output_file("--csv", self.csv)
         require_output_file("--picture", self.picture, PICTURES)
 

@@ -14,6 +14,7 @@ from rich.progress import Progress
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
+from common.files.input_file import require_input_file
 from feelahead.benchmarks.overlap.accuracy import draw_samples, measure_accuracy
 from feelahead.benchmarks.overlap.classes import MAKERS, frozen_classes
 from feelahead.benchmarks.overlap.distances import measure_distances
@@ -76,8 +77,8 @@ class OverlapBenchSettings:
                 raise ValueError(f"--{name} {value}: valid: {least} to {most}")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
-        if self.peer_header is not None and not self.peer_header.is_file():
-            raise ValueError(f"--peer-header {self.peer_header}: no such file; valid: overlap.hpp, from: {SDIST}")
+        if self.peer_header is not None:
+            require_input_file("--peer-header", self.peer_header, f"overlap.hpp, from: {SDIST}")
         for name in ("csv", "write_docs"):
             path: Path | None = getattr(self, name)
             if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):

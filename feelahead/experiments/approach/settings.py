@@ -10,6 +10,7 @@ import tyro
 
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
+from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file
 from common.protocol.messages import Compensation, Vector2
 from feelahead.approaches.approach import Approach
@@ -119,8 +120,7 @@ class ApproachSettings:
 
     def _require_files(self) -> None:
         for model in self.model:
-            if not model.is_file():
-                raise ValueError(f"--model {model}: there is no such file; valid: an MJCF file")
+            require_input_file("--model", model, "an MJCF file")
         require_output_file("--summary", self.summary)
         require_output_file("--picture", self.picture, PICTURES)
 

@@ -8,6 +8,7 @@ the arm's own measurement; {"stop", "why", "after"}: when the robot side disarme
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -51,10 +52,16 @@ class Watch:
         self._ticked_s = 0.0
         self._told_at_pause = 0
 
-    def build(self, settings: RobotSettings, epoch: int, clock_domain: str) -> RobotSide:
+    def build(
+        self, settings: RobotSettings, epoch: int, clock_domain: str, *, announce: Callable[[str], None]
+    ) -> RobotSide:
         """As robot_side.assembly's, watched."""
         self._core = core = build_robot_side(
-            settings, epoch, clock_domain, lambda arm: _ToldArm(arm, settings.safety.gap_s, self)
+            settings,
+            epoch,
+            clock_domain,
+            lambda arm: _ToldArm(arm, settings.safety.gap_s, self),
+            announce=announce,
         )
         receive = core.session.safety.receive
 

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from common.command.command_line import parse_settings
+from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file
 from feelahead.approaches.frozen import SITE, frozen_hash, frozen_scene
 from feelahead.approaches.pictures import PICTURES
@@ -61,8 +62,7 @@ class FieldSettings:
         if not 1 <= self.looks <= 100_000:
             raise ValueError(f"--looks {self.looks}: valid: 1 to 100000")
         for model in self.model:
-            if not model.is_file():
-                raise ValueError(f"--model {model}: there is no such file; valid: an MJCF file")
+            require_input_file("--model", model, "an MJCF file")
         require_output_file("--summary", self.summary)
         require_output_file("--picture", self.picture, PICTURES)
 

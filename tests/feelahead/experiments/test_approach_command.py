@@ -401,7 +401,8 @@ def no_runs(monkeypatch: pytest.MonkeyPatch) -> Iterator[MadeUp]:
         (["--picture", "no/such/folder/out.png"], "no/such/folder", "a file's path"),
         (["--picture", "out.xyz"], "out.xyz", "png"),
         (["--config", "no_such.toml"], "no_such.toml", "cannot be read"),
-        (["--model", WALL, "no_such.xml"], "no_such.xml", "MJCF"),
+        (["--model", WALL, "no_such.xml"], "no_such.xml: there is no such file", "MJCF"),
+        (["--model", WALL, str(DATA)], f"--model {DATA}: is a directory", "MJCF"),
         (["--forse", "3"], "--forse", "--help"),
     ],
 )

@@ -163,6 +163,15 @@ def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
         assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
 
 
+def test_there_are_no_more_than_eight_places_however_far_apart_they_are() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0]], [RADIUS_M])
+    for until_s, count in ((1.19, 8), (3.0, 8), (1.04, 7)):
+        sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.zeros(3), np.zeros((1, 3)))
+        moments = sideways.moments(pose, until_s)
+        assert len(moments) == count
+        np.testing.assert_allclose(np.diff(moments), until_s / count)
+
+
 def test_a_turned_gripper_keeps_its_shape_and_looks_where_it_points() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.02, 0.1]], [RADIUS_M, RADIUS_M])
     sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.5, 0.0]), np.zeros((2, 3)))

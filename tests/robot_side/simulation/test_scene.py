@@ -203,9 +203,9 @@ def one_line(error: pytest.ExceptionInfo[ConfigurationError]) -> str:
 def test_what_cannot_be_loaded_is_told_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as error:
         load_scene(tmp_path / "none.xml", "tcp")
-    assert "there is no file" in one_line(error)
+    assert "there is no such file" in one_line(error)
     assert "none.xml" in one_line(error)
-    with pytest.raises(ConfigurationError, match="there is no file"):
+    with pytest.raises(ConfigurationError, match=r"--model .*: is a directory; valid: an MJCF file"):
         load_scene(tmp_path, "tcp")
     for text in ("<mujoco", "<robots/>", "<mujoco><worldbody><geom size='x'/></worldbody></mujoco>", ""):
         (tmp_path / "bad.xml").write_text(text)
