@@ -9,6 +9,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.objects.perceived import Role
+from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.scene import Scene
 
 _FARTHEST_SUPPORT_M: Final = 1.0
@@ -118,6 +119,17 @@ def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, fart
         first, second = np.unravel_index(pair, bound.shape)
         if bound[first, second] >= nearest:
             break
-        distance = mujoco.mj_geomDistance(model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0), None)
-        nearest = min(nearest, float(distance))
+        distance = geom_distance(model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0))
+        nearest = min(nearest, distance)
     return nearest
+
+
+def geom_distance(
+    model: Any, data: Any, mine: int, other: int, farthest_m: float, ends: FloatArray | None = None
+) -> float:
+    """The signed distance between two geoms, at most `farthest_m`; its `ends` (6,) are not known of a height field."""
+    found = mujoco.mj_geomDistance(model, data, mine, other, farthest_m, ends)
+    # Of a height field MuJoCo sees the first 50 prisms within that distance, which need not be the nearest.
+    while model.geom_type[other] == GeomKind.HFIELD and 0.0 < found < farthest_m:
+        farthest_m, found = found, mujoco.mj_geomDistance(model, data, mine, other, found, ends)
+    return float(found)

@@ -9,7 +9,8 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.simulation.ground_truth import least_distance
+from robot_side.simulation.ground_truth import geom_distance, least_distance
+from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.scene import Scene
 
 _TOUCHING_M = 1e-5
@@ -152,11 +153,12 @@ def free_way(
         step_m = farthest_m - moved_m
         for first in mine:
             for second in theirs:
-                gap_m = mujoco.mj_geomDistance(model, data, int(first), int(second), farthest_m, ends)
+                gap_m = geom_distance(model, data, int(first), int(second), farthest_m, ends)
                 if gap_m <= _TOUCHING_M:
                     return moved_m
                 # Convex geoms are apart by a slab of this width, through which they come at this part of the way.
-                towards = (ends[3:] - ends[:3]) @ direction / gap_m if gap_m < farthest_m else 1.0
+                convex = model.geom_type[second] != GeomKind.HFIELD
+                towards = float((ends[3:] - ends[:3]) @ direction) / gap_m if convex and gap_m < farthest_m else 1.0
                 if towards * step_m > gap_m:
                     step_m = gap_m / towards
         moved_m += step_m

@@ -76,6 +76,17 @@ def test_it_begins_with_the_speed_of_the_report(speed_m_s: float, free: int) -> 
     assert bench.r2 == (0,) * free + (8,) * (10 - free)
 
 
+@pytest.mark.parametrize(("told_m_s", "stiff"), [(None, True), (0.25, True), (0.0, False)])
+def test_a_command_does_what_the_robot_says_that_it_does(told_m_s: float | None, stiff: bool) -> None:
+    bench = Driving()
+    bench.drive(0.1)
+    bench.echo_s = bench.now_s
+    bench.now_s += 0.15  # The newest command that the robot had is the last one.
+    bench.feel_field(bench.report(told_m_s=told_m_s))
+    assert (bench.r2 != FREE) == stiff
+    assert bench.without_history == 0
+
+
 @pytest.mark.parametrize("button", [Button.SQUARE, Button.CIRCLE])
 def test_without_the_run_button_nothing_is_under_way(button: Button) -> None:
     bench = Driving()

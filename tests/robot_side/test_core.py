@@ -1,11 +1,14 @@
 """The robot side as its peers see it, with the simulated arm in virtual time."""
 
+from dataclasses import replace
+
+import msgspec
 import numpy as np
 import pytest
 
 from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.session_bench import Bench
+from feelahead.experiments.faults.session_bench import Bench, Operator
 from robot_side.ahead.law import Law, LawName, Sensed, Situation
 from robot_side.gripper.held_object import grip
 from robot_side.objects.perceived import Role
@@ -160,6 +163,55 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
     assert felt.r2.fast_m[7] < 1.0
     assert felt.l2.fast_m[0] == felt.horizon_m
     assert felt.rumble == 0.0
+
+
+def told_m_s(operator: Operator) -> float:
+    """What the newest command gets, as last heard."""
+    told = operator.felt[-1].told_m_s
+    assert told is not None
+    return told
+
+
+def test_an_operator_hears_what_its_command_gets_and_0_where_it_gets_nothing(bench: Bench) -> None:
+    operator = bench.join(2)
+    bench.drive(0.1, operator, r2=0.4)
+    assert told_m_s(operator) == 0.0  # not armed
+    bench.cruise(operator, 0.1)
+    assert told_m_s(operator) == pytest.approx(0.1, rel=0.01)
+    bench.drive(0.02, operator, l2=0.4)
+    assert told_m_s(operator) == pytest.approx(-0.1, rel=0.01)
+    bench.drive(0.02, operator, r2=0.4, run=False)
+    assert told_m_s(operator) == 0.0
+    bench.drive(0.02, operator, r2=0.4)
+    assert told_m_s(operator) > 0.0
+    bench.drive(0.02, operator, r2=0.4, emergency_stop=True)
+    assert told_m_s(operator) == 0.0
+
+
+def test_an_operator_hears_that_its_commands_are_discarded(bench: Bench) -> None:
+    operator = bench.join(2)
+    bench.cruise(operator, 0.1)
+    for _ in range(30):
+        bench.tick(4)
+        late = msgspec.structs.replace(operator.link.stamp(bench.now_s), sent_s=bench.now_s - 0.3)
+        bench.send(operator, header=late, r2=0.4)
+    assert bench.robot.session.safety.discarded_by_age == 30
+    assert told_m_s(operator) == 0.0
+
+
+def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
+    operator = bench.join(2)
+    bench.cruise(operator, 0.1)
+    free = told_m_s(operator)
+    limits = bench.robot._limits
+    assert limits.lower_rad is not None
+    here, ends = bench.arm.state(bench.now_s).joint_positions_rad, limits.lower_rad.copy()
+    ends[2] = here[2]  # The elbow, which stretches as the tool advances.
+    bench.robot._limits = replace(limits, lower_rad=ends)
+    bench.drive(0.01, operator, r2=0.4)
+    assert told_m_s(operator) < 0.9 * free
+    bench.drive(0.01, operator, l2=0.4)
+    assert told_m_s(operator) == pytest.approx(-free, rel=0.01)
 
 
 def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench, listening: Listening) -> None:

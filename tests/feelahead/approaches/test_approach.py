@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from feelahead.approaches.approach import Approach, robot_settings, run_approach
+from feelahead.approaches.approach import Approach, PullRun, robot_settings, run_approach
+from feelahead.approaches.frozen import ASIDE
 from feelahead.approaches.laws import Law
 from feelahead.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
 from feelahead.approaches.pulls import Hands
@@ -139,6 +140,15 @@ def test_a_margin_stops_it_so_far_off() -> None:
 
 
 @approaches
+def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> None:
+    assisted, alone = (ended(force_n=5.0, assist=assist, duration_s=3.5) for assist in ("speed", "none"))
+    assert (assisted.end, assisted.contact_with) == ("stopped", None)
+    assert assisted.least_gap_mm > 5.0
+    assert (alone.end, alone.contact_with) == ("contact", "wall")
+    assert alone.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
+
+
+@approaches
 def test_full_is_full_from_the_first_moment_on() -> None:
     outcome = ended(law="full", duration_s=0.5)
     assert outcome.end == "undecided"
@@ -197,6 +207,48 @@ def test_what_is_gripped_counts_as_gripper() -> None:
     assert (outcome.end, outcome.contact_with) == ("contact", "table")
     assert outcome.contact_speed_mm_s == pytest.approx(250.0, abs=3.0)
     assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
+
+
+# Onto what a straight pull passes, what goes away, and what rises
+
+
+@approaches
+@pytest.mark.parametrize(
+    ("scene", "thing", "link", "stops_in_s"),
+    [
+        ("edge", "right_block", "", 4.0),
+        ("turn", "right_post", "", 4.5),
+        ("fleeing", "mover", "", 8.0),
+        ("terrain_ahead", "terrain", FAR, 4.5),
+    ],
+)
+def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_effect_touches_slowly(
+    scene: str, thing: str, link: str, stops_in_s: float
+) -> None:
+    stick, turn = ASIDE.get(scene, ((0.0, 0.0), (0.0, 0.0)))
+    light, strong = (
+        ended(scene, force_n, stick=stick, turn=turn, link=link, duration_s=stops_in_s) for force_n in (2.0, 3.0)
+    )
+    assert (light.end, light.contact_with) == ("stopped", None)
+    assert 5.0 < light.least_gap_mm < 25.0
+    assert (strong.end, strong.contact_with) == ("contact", thing)
+    assert strong.contact_speed_mm_s is not None
+    assert strong.contact_speed_mm_s <= 40.0
+
+
+@approaches
+@pytest.mark.parametrize(("stick", "turn", "moved_mm", "turned_rad"), [(1.0, 0.0, 150.0, 0.0), (0.0, 1.0, 0.0, 0.75)])
+def test_a_stick_to_the_right_leads_there_for_a_second_and_a_half(
+    stick: float, turn: float, moved_mm: float, turned_rad: float
+) -> None:
+    run = PullRun(Approach(DATA / "empty.xml", 0.0, stick=(stick, 0.0), turn=(turn, 0.0)))
+    began_s, start_m = run.arm(), run.tool_position_m
+    for _ in run.go_on(began_s + 2.5):
+        pass
+    # Its right is the world's -y, as it looks along x.
+    np.testing.assert_allclose(1e3 * (run.tool_position_m - start_m), [0.0, -moved_mm, 0.0], atol=5.0)
+    ahead = [math.cos(turned_rad), -math.sin(turned_rad), 0.0]
+    np.testing.assert_allclose(run.truth.approach()[0], ahead, atol=0.02)
 
 
 # Not onto it

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.protocol.messages import Vector2
 from feelahead.approaches.pulls import PULL_KINDS, Hands, Pull, PullKind, constant_force, force_for, make_pull
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -162,20 +163,39 @@ def test_a_random_pull_wanders_over_the_whole_travel_without_jumping() -> None:
         assert 5 <= crossings <= 120
 
 
+def deflections(hands: Hands) -> dict[str, Vector2]:
+    """How far each stick counts as deflected."""
+    device, calibration = SimulatedDualSense(), TravelCalibration()
+    device.set_sticks(hands.left_stick, hands.right_stick)
+    report = device.read(0.0)
+    assert report is not None
+    state = parse_input_report(report)
+    return {
+        "left_stick": calibration.left_stick.deflection(state.left_stick),
+        "right_stick": calibration.right_stick.deflection(state.right_stick),
+    }
+
+
+@pytest.mark.parametrize("wanted", [(0.5, 0.0), (-0.6, 0.8), (0.0, -0.05)])
+def test_sticks_count_as_far_as_said_for_a_second_and_a_half(wanted: Vector2) -> None:
+    for name, pull in (
+        ("left_stick", constant_force(2.5, wanted)),
+        ("right_stick", constant_force(2.5, (0, 0), wanted)),
+    ):
+        for time_s in (0.0, 1.49):
+            found = deflections(pull(time_s))
+            assert found.pop(name) == pytest.approx(wanted, abs=0.01)
+            assert list(found.values()) == [(0.0, 0.0)]
+        assert pull(0.0).r2_n == 2.5
+        assert pull(1.5) == pull(100.0) == Hands(r2_n=2.5)
+
+
 @pytest.mark.parametrize(("kind", "which"), [("drift", "left_stick"), ("yaw", "right_stick")])
 def test_drift_and_yaw_deflect_one_stick_to_the_full(kind: PullKind, which: str) -> None:
     sides = set()
     for seed in SEEDS:
         pull = make_pull(kind, seed)
-        device = SimulatedDualSense()
-        device.set_sticks(pull(1.0).left_stick, pull(1.0).right_stick)
-        report = device.read(0.0)
-        assert report is not None
-        state, calibration = parse_input_report(report), TravelCalibration()
-        felt = {
-            "left_stick": calibration.left_stick.deflection(state.left_stick),
-            "right_stick": calibration.right_stick.deflection(state.right_stick),
-        }
+        felt = deflections(pull(1.0))
         across, up = felt.pop(which)
         assert abs(across) == pytest.approx(1.0, abs=0.01)
         assert up == pytest.approx(0.0, abs=0.01)

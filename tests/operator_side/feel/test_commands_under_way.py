@@ -31,8 +31,9 @@ def displacement(
     echo_held_s: float = 0.0,
     speed_m_s: float = 0.0,
     acceleration_m_s2: float = 3.0,
+    told_m_s: float | None = None,
 ) -> Displacement:
-    found = commands.displacement(now_s, echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, acceleration_m_s2)
+    found = commands.displacement(now_s, echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, acceleration_m_s2, told_m_s)
     assert found is not None
     return found
 
@@ -135,6 +136,27 @@ def test_what_was_sent_until_the_echo_counts_no_more_and_what_came_after_counts(
     assert seen.way_m == pytest.approx(FULL_M_S**2 / (2.0 * 3.0))
     unseen = displacement(commands, 0.2, 0.08, 0.0, FULL_M_S)
     assert unseen.way_m == pytest.approx(FULL_M_S * 0.02 + FULL_M_S**2 / (2.0 * 3.0))
+
+
+@given(COMMANDS, SPEED, TRAVEL, st.data())
+def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_asked_for(
+    travels: list[float], speed: float, gives: float, data: st.DataObject
+) -> None:
+    echo = data.draw(st.integers(0, len(travels) - 1))
+    moment = len(travels) * PERIOD_S, echo * PERIOD_S, 0.001, speed
+    found = displacement(sent_every(travels), *moment, told_m_s=gives * FULL_M_S)
+    travels[echo] = gives
+    assert found == pytest.approx(displacement(sent_every(travels), *moment), abs=1e-12)
+
+
+def test_a_command_that_the_robot_gives_nothing_moves_nothing_and_the_next_one_does() -> None:
+    # The arm follows at once: full travel for 0.1 s, half of it for 0.2 s.
+    commands = CommandsUnderWay()
+    commands.sent(0.0, 1.0)
+    commands.sent(0.1, 0.5)
+    for told_m_s, way_m in ((None, 0.05), (0.0, 0.025), (0.1, 0.035)):
+        found = displacement(commands, 0.3, 0.0, acceleration_m_s2=math.inf, told_m_s=told_m_s)
+        assert found == pytest.approx((way_m, 0.5 * FULL_M_S))
 
 
 def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:

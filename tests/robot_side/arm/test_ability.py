@@ -56,6 +56,21 @@ def test_a_joint_at_its_speed_limit_slows_the_tool_and_says_so() -> None:
     assert not able.within_reach
 
 
+def test_a_joint_at_its_end_goes_no_farther_and_may_go_back() -> None:
+    lower, upper = np.array([-1.0, -1.0, -np.inf]), np.array([1.0, 1.0, np.inf])
+    limits = JointLimits(np.ones(3), np.ones(3), lower, upper)
+    at_ends = np.array([-1.0, 1.0, 100.0])
+    for asked, expected in (([-0.3, 0.3, 0.3], [0.0, 0.0, 0.3]), ([0.3, -0.3, -0.3], [0.3, -0.3, -0.3])):
+        velocities = np.array(asked)
+        np.testing.assert_array_equal(limits.given(velocities, at_ends), expected)
+        np.testing.assert_array_equal(velocities, asked)  # not changed itself
+    outwards = np.array([-0.3, 0.3, 0.3])
+    # By readings that are noisy it is at its end 2 mrad before.
+    np.testing.assert_array_equal(limits.given(outwards, np.array([-0.9981, 0.9981, 0.0])), [0.0, 0.0, 0.3])
+    np.testing.assert_array_equal(limits.given(outwards, np.array([-0.9979, 0.9979, 0.0])), outwards)
+    np.testing.assert_array_equal(JointLimits(np.ones(3), np.ones(3)).given(outwards, at_ends), outwards)
+
+
 def test_where_the_arm_cannot_go_nothing_is_0_or_divided_by_it() -> None:
     stuck = np.diag([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])
     able = ability(pose_with(stuck), FREE, AHEAD, 0.25)

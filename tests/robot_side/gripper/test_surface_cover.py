@@ -16,7 +16,7 @@ from tests.helpers.perceived_scenes import random_rotation
 STAND_OUT_M = 0.003
 SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
 size = st.floats(0.004, 0.03)
-few = settings(derandomize=True, deadline=None, max_examples=2)
+few, several = (settings(derandomize=True, deadline=None, max_examples=count) for count in (4, 10))
 
 
 def points_on(solid: Solid, random: np.random.Generator, count: int = 20_000) -> FloatArray:
@@ -69,7 +69,7 @@ def test_a_capsule_that_is_searched_for(radius: float, half: float) -> None:
     check([solid], depth_m)
 
 
-@few
+@several
 @given(axes=st.tuples(size, size, size))
 def test_an_ellipsoid(axes: tuple[float, float, float]) -> None:
     solid = ellipsoid(np.array(axes))
@@ -84,7 +84,7 @@ def test_an_ellipsoid(axes: tuple[float, float, float]) -> None:
     assert (radii - depths).max() <= STAND_OUT_M + spacing_m
 
 
-@few
+@several
 @given(seed=st.integers(0, 10_000))
 def test_the_convex_hull_of_points(seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 
 from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
+from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import SHAPES, STONE, planar_arm
+from tests.helpers.repository import DATA
 
 
 @pytest.fixture
@@ -85,6 +88,20 @@ def test_a_frame_lasts_until_the_next_is_due(built_in: Scene) -> None:
     # After a pause there is one new frame, not all those that were missed.
     late = camera.perceive(9.0)
     assert camera.perceive(9.001) is late
+
+
+@pytest.mark.parametrize(("name", "speed_m_s"), [("moving", -0.06), ("fleeing", 0.03), ("wall", 0.0)])
+def test_how_fast_a_thing_moves_is_seen_after_a_while(name: str, speed_m_s: float) -> None:
+    scene = load_scene(DATA / f"{name}.xml", "tool")
+    # What stays wrong of its position makes nothing of its velocity.
+    arm, camera = MujocoArm(scene, Encoder()), MujocoCamera(scene, CameraError(tuple(scene.roles), 0.01, 0.003, seed=1))
+    arm.state(0.0)
+    np.testing.assert_array_equal(camera.perceive(0.0).velocities_m_s, np.zeros((1, 3)))
+    for tick in range(1, 21):
+        arm.state(0.01 * tick)
+        found = camera.perceive(0.01 * tick).velocities_m_s
+    assert found is not None
+    np.testing.assert_allclose(found, [[speed_m_s, 0.0, 0.0]], atol=0.002)
 
 
 def test_a_role_changes_from_the_next_frame_on(built_in: Scene) -> None:

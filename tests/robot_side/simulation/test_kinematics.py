@@ -115,6 +115,19 @@ def test_no_sphere_stands_out_of_the_gripper_by_more_than_3_mm() -> None:
     assert (pose.sphere_radii_m - depths).max() <= 0.003 + 1e-8
 
 
+@pytest.mark.parametrize("closing_s", [0.0, 0.3])
+def test_the_gap_between_the_fingers_is_kept_free_but_for_3_mm_on_either_side(closing_s: float) -> None:
+    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
+    state = driver.grip(1.0, closing_s) if closing_s else driver.wait(PERIOD_S)
+    pose = driver.pose(state)
+    fingers = pose.sphere_on_finger
+    # They close along x of the tool.
+    aside = (pose.sphere_centers_m[fingers] - pose.tool_position_m) @ pose.tool_rotation[:, 0]
+    free_m = 2.0 * (np.abs(aside) - pose.sphere_radii_m[fingers]).min()
+    assert free_m == pytest.approx(state.gripper_opening_m - 2 * 0.003, abs=5e-4)
+    assert free_m > 0.03
+
+
 def test_a_coarser_cover_has_fewer_spheres() -> None:
     driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
     state = driver.wait(PERIOD_S)

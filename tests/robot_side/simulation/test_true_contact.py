@@ -238,6 +238,14 @@ def test_along_the_approach_an_inclined_wall_is_farther_than_it_is_near() -> Non
     assert truth.gap_m(None) == pytest.approx(WAY_M * math.cos(math.pi / 4.0), abs=1e-3)
 
 
+@pytest.mark.parametrize("gone_m", [0.0, 0.2, 0.31])
+def test_the_way_to_a_hill_of_a_height_field_is_not_passed_over(gone_m: float) -> None:
+    truth = Script.load("terrain_ahead").go(gone_m).truth
+    # Lower ground is nearer than the hill.
+    assert truth.gap_m(None) < WAY_M - gone_m
+    assert truth.way_left_m(AHEAD, None) == pytest.approx(WAY_M - gone_m, abs=1e-4)
+
+
 def test_away_from_everything_the_way_is_as_long_as_one_looks() -> None:
     truth = Script.load("wall").truth
     assert truth.way_left_m(-AHEAD, None) == 1.0
