@@ -9,11 +9,12 @@ from rich.console import Console
 
 from common.command.command_line import parse_settings
 from feelahead.approaches.frozen import frozen_hash
+from feelahead.approaches.kept import Kept
 from feelahead.approaches.progress import progress
 from feelahead.benchmarks.coverage.evaluate import Row
 from feelahead.benchmarks.coverage.settings import CoverageSettings
 from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table
-from feelahead.benchmarks.coverage.work import Kept, Piece, do, pieces
+from feelahead.benchmarks.coverage.work import Piece, do, pieces
 
 _PROGRAM = "feelahead bench coverage"
 
@@ -56,5 +57,5 @@ def _work(todo: list[Piece], kept: Kept, workers: int) -> None:
     """Do what is left."""
     with progress("coverage", sum(piece.weight for piece in todo)) as advance:
         for piece, records in do(todo, workers):
-            kept.keep(piece, records)
+            kept.keep(piece.name, records)
             advance(piece.weight)

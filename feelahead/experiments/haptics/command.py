@@ -9,7 +9,7 @@ a claim about people.
 import csv
 import sys
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import asdict, astuple, dataclass, field, fields
 from itertools import product
 from pathlib import Path
 from statistics import median
@@ -23,6 +23,7 @@ from rich.table import Table
 from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
 from common.files.output_file import require_output_file
+from feelahead.approaches.kept import Kept
 from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
 from feelahead.experiments.haptics.statistics import exact_interval, mcnemar_p, mean_difference_interval, restricted
@@ -64,6 +65,8 @@ class ComparisonSettings:
     """Period of the robot side's ticks, in milliseconds; 1 is the real one, and takes more than twice the time."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 2
     """Trials at the same time."""
+    resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
+    """Write each trial there as soon as it is done, and leave out what is there already."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Write every trial's figures there."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -82,6 +85,7 @@ class ComparisonSettings:
             raise ValueError(f"--jitter {self.jitter}: valid: 0 to 1000 milliseconds")
         if not 1.0 <= self.tick <= 10.0:
             raise ValueError(f"--tick {self.tick}: valid: 1 to 10 milliseconds")
+        require_output_file("--resume", self.resume)
         require_output_file("--csv", self.csv)
         for name in ("scenes", "delays"):
             values = getattr(self, name)
@@ -105,8 +109,12 @@ class Row:
 
 
 def compare(settings: ComparisonSettings) -> list[Row]:
-    """Every trial, in the order of scenes, delays, arms and seeds."""
+    """Every trial, in the order of scenes, delays, arms and seeds; all others before another seed is begun."""
     keys = list(product(settings.scenes, settings.delays, ARMS, range(settings.seeds)))
+    names = {key: "{}/{:g} ms/{}/{}".format(*key) for key in keys}
+    same = ("jitter", "link_model", "duration", "tick", "person")
+    kept = Kept(settings.resume, {"trials": {name: asdict(settings)[name] for name in same}})
+    todo = sorted((key for key in keys if names[key] not in kept.done), key=lambda key: key[-1])
     trials = [
         Trial(
             scene,
@@ -118,14 +126,16 @@ def compare(settings: ComparisonSettings) -> list[Row]:
             settings.link_model,
             1e-3 * settings.tick,
         )
-        for scene, delay_ms, arm, seed in keys
+        for scene, delay_ms, arm, seed in todo
     ]
-    rows: list[Row | None] = [None] * len(keys)
-    with progress("trials", float(len(keys))) as advance:
-        for place, result in in_processes(run_trial, [(trial,) for trial in trials], settings.workers):
-            rows[place] = Row(*keys[place], result)
-            advance(1.0)
-    return [row for row in rows if row is not None]
+    try:
+        with progress("trials", float(len(todo))) as advance:
+            for place, result in in_processes(run_trial, [(trial,) for trial in trials], settings.workers):
+                kept.keep(names[todo[place]], [asdict(result)])
+                advance(1.0)
+    finally:
+        kept.close()
+    return [Row(*key, Result(**kept.done[names[key]][0])) for key in keys]
 
 
 def tables(settings: ComparisonSettings, rows: Sequence[Row]) -> list[Table]:

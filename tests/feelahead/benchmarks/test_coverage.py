@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.errors import ConfigurationError
 from common.reaction import HORIZON_S
 from feelahead.approaches.frozen import AHEAD, ASIDE, PASSED
 from feelahead.approaches.laws import Law
@@ -32,7 +31,7 @@ from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import make_law
 from feelahead.benchmarks.coverage.replay import coasting_s
 from feelahead.benchmarks.coverage.settings import CoverageSettings
-from feelahead.benchmarks.coverage.work import Kept, Piece, pieces
+from feelahead.benchmarks.coverage.work import pieces
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from tests.feelahead.benchmarks.recorded_pulls import SEED, staged
 
@@ -231,39 +230,6 @@ def test_the_plans() -> None:
     assert {cell.key for cell in quick_plan(("swept",)).cells} <= {cell.key for cell in full.cells}
     names_of_pieces = [piece.name for piece in pieces(full, 0, "nothing")]
     assert len(set(names_of_pieces)) == len(names_of_pieces)
-
-
-def piece(name: str) -> Piece:
-    return Piece(name, 1.0, lambda: [], ())
-
-
-def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> None:
-    path = tmp_path / "kept.jsonl"
-    kept = Kept(path, {"plan": {}, "seed": 0})
-    kept.keep(piece("one"), [{"kind": "cell", "law": "swept"}])
-    kept.keep(piece("two"), [])
-    kept.keep(piece("three"), [{"kind": "failed", "piece": "three", "why": "not armed"}])
-    kept.close()
-    path.write_text(path.read_text()[:-10])
-    again = Kept(path, {"plan": {}, "seed": 0})
-    assert again.done == {"one": [{"kind": "cell", "law": "swept"}]}
-    again.keep(piece("two"), [{"kind": "check"}])
-    again.close()
-    last = Kept(path, {"plan": {}, "seed": 0})
-    assert last.done == {"one": [{"kind": "cell", "law": "swept"}], "two": [{"kind": "check"}]}
-    last.close()
-    with pytest.raises(ConfigurationError, match="other settings"):
-        Kept(path, {"plan": {}, "seed": 1})
-    held = Kept(path, {"plan": {}, "seed": 0})
-    with pytest.raises(ConfigurationError, match="another run writes to it"):
-        Kept(path, {"plan": {}, "seed": 0})
-    held.close()
-    path.write_bytes(bytes(range(256)))
-    with pytest.raises(ConfigurationError, match="no run of this benchmark"):
-        Kept(path, {"plan": {}, "seed": 0})
-    path.write_text("nothing of ours\n")
-    with pytest.raises(ConfigurationError, match="no run of this benchmark"):
-        Kept(path, {"plan": {}, "seed": 0})
 
 
 @pytest.mark.parametrize(

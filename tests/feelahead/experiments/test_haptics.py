@@ -75,6 +75,26 @@ def test_a_table_sets_the_arms_side_by_side() -> None:
     assert "-20.0 [-20.0, -20.0]" in reacting
 
 
+def test_trials_that_are_kept_are_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run: list[tuple[str, int]] = []
+
+    def outcome(trial: Trial) -> Result:
+        run.append((trial.arm, trial.seed))
+        return replace(HIT, lifted_mm=trial.seed / 3.0)
+
+    monkeypatch.setattr(command, "run_trial", outcome)
+    few = ComparisonSettings(scenes=("wall",), delays=(0.0,), seeds=2, workers=1, resume=tmp_path / "kept.jsonl")
+    rows = command.compare(few)
+    # One seed after the other, so that what is stopped has whole pairs.
+    assert run == [(arm, seed) for seed in range(2) for arm in ARMS]
+    assert command.compare(few) == rows
+    more = command.compare(replace(few, seeds=3))
+    assert run[6:] == [(arm, 2) for arm in ARMS]
+    assert [row for row in more if row.seed < 2] == rows
+    with pytest.raises(ConfigurationError, match="other settings"):
+        command.compare(replace(few, jitter=5.0))
+
+
 def test_a_trial_is_repeatable_and_differs_by_nothing_but_haptics_at_first() -> None:
     def run(arm: Arm) -> Result:
         return run_trial(Trial("slot", link_of(20.0, 10.0), arm, 3, PersonSettings(), 3.0, tick_period_s=0.004))
