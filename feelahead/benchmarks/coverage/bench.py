@@ -13,7 +13,7 @@ from feelahead.approaches.kept import Kept
 from feelahead.approaches.progress import progress
 from feelahead.benchmarks.coverage.evaluate import Row
 from feelahead.benchmarks.coverage.settings import CoverageSettings
-from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table
+from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table, pull_table
 from feelahead.benchmarks.coverage.work import Piece, do, pieces
 
 _PROGRAM = "feelahead bench coverage"
@@ -35,6 +35,8 @@ def bench_coverage(arguments: Sequence[str]) -> int:
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
     console.print(coverage_table(cells, settings.laws))
     console.print(alarm_table(cells, settings.laws))
+    for law in settings.laws:
+        console.print(pull_table(cells, law))
     console.print(law_table(records, settings.laws))
     for line in check_lines(records):
         console.print(line)

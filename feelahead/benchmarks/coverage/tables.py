@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from rich.box import MARKDOWN
 from rich.table import Table
 from rich.text import Text
 
@@ -50,6 +51,29 @@ def alarm_table(rows: Sequence[Row], laws: Sequence[str]) -> Table:
         by_law = {row["law"]: row for row in group}
         cells = [_alarms(by_law.get(law)) for law in laws]
         table.add_row(*_named(key), f"{group[0]['judged_s'] / 60.0:.1f}", *cells)
+    return table
+
+
+def pull_table(rows: Sequence[Row], law: str) -> Table:
+    """A row for each pull, link and P, for one law: over scenes, cameras and encoders."""
+    # As Markdown, for docs/feel.md.
+    table = Table(title=f"{law}, by pull and link", box=MARKDOWN)
+    for heading in ("pull", "link", "P", "cells that hold", "covered", "least", "false alarms a minute", "most"):
+        table.add_column(heading)
+    mine = [row for row in rows if row["law"] == law]
+    for key, group in _grouped(mine, ("pull", "link", "probability")):
+        judged = [one for one in group if one["coverage"] is not None]
+        pulled = [one for one in group if one["alarms_per_min"] is not None]
+        least = min(judged, key=lambda one: one["coverage"], default=None)
+        most = max(pulled, key=lambda one: one["alarms_per_min"], default=None)
+        table.add_row(
+            *map(str, key),
+            f"{sum(bool(one['holds']) for one in judged)} of {len(judged)}",
+            _mean(judged, "coverage", ".3f"),
+            f"{least['coverage']:.3f} ({least['scene']})" if least else "",
+            _mean(pulled, "alarms_per_min", ".1f"),
+            f"{most['alarms_per_min']:.1f} ({most['scene']})" if most else "",
+        )
     return table
 
 

@@ -267,6 +267,7 @@ def test_the_command_prints_its_tables_writes_its_files_and_resumes(
     assert bench.bench_coverage([*arguments, *files]) == 0
     first = capsys.readouterr().out
     assert "covered: full strength stood in time" in first
+    assert "| steady | 0 ms |" in first
     assert "of 1 as reckoned" in first
     assert (tmp_path / "c.png").stat().st_size > 1000
     assert (tmp_path / "c.csv").read_text().startswith("cell,scene,pull,link")
