@@ -1,12 +1,13 @@
 """What long work has done so far, kept in a file, so that it can be stopped and gone on with."""
 
+import contextlib
 import fcntl
 import hashlib
 import json
 from pathlib import Path
 from typing import Any, Final, TextIO
 
-from common.errors import ConfigurationError
+from common.errors import ConfigurationError, FeelaheadError
 from feelahead.approaches.frozen import frozen_hash
 
 Records = list[dict[str, Any]]
@@ -24,6 +25,8 @@ class Kept:
         self.done: dict[str, Records] = {}
         if path is None:
             return
+        if path.exists() and not path.is_file():
+            raise ConfigurationError(f"--resume {path}: is no regular file; valid: a file of its own, or a new one")
         self._file = path.open("a+", encoding="utf-8")
         try:
             self._load(path, self._file)
@@ -63,12 +66,17 @@ class Kept:
     def close(self) -> None:
         """Let others write to the file."""
         if self._file is not None:
-            self._file.close()
+            # What could not be written was said already.
+            with contextlib.suppress(OSError):
+                self._file.close()
 
     def _write(self, entry: dict[str, Any]) -> None:
         if self._file is not None:
-            self._file.write(json.dumps(entry) + "\n")
-            self._file.flush()
+            try:
+                self._file.write(json.dumps(entry) + "\n")
+                self._file.flush()
+            except OSError as error:
+                raise FeelaheadError(f"--resume {self._file.name}: cannot be written: {error.strerror}") from error
 
 
 def code_hash() -> str:
