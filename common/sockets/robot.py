@@ -56,7 +56,7 @@ class RobotSockets(SocketShell):
         self.revoked = 0
         """Messages of peers that were allowed when they connected, and are no more."""
         self._keys = keys
-        self._told_unreadable: str | None = None
+        self._told: list[str] = []
         self._peers: dict[bytes, _Peer] = {}
         self._second = 0
         self._reader = Reader(frames=2)
@@ -91,11 +91,12 @@ class RobotSockets(SocketShell):
             f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
             for key in self._authenticator.unknown_keys()
         ]
-        if allowed.unreadable != self._told_unreadable:
-            self._told_unreadable = allowed.unreadable
-            if allowed.unreadable is not None:
-                news.append(f"nobody is let in any more: {allowed.unreadable}")
-        return news
+        wrong = [f"passed over, so that it lets nobody in: {fault}" for fault in allowed.faults]
+        if allowed.unreadable is not None:
+            who = "whoever was let in stays so" if allowed.names else "nobody is let in any more"
+            wrong.append(f"{who}: {allowed.unreadable}")
+        told, self._told = self._told, wrong
+        return news + [text for text in wrong if text not in told]
 
     def refresh_keys(self) -> None:
         """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second.

@@ -10,8 +10,9 @@ import pytest
 from common.clock import MonotonicClock
 from common.sockets import robot as robot_sockets
 from common.sockets import shell
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from common.clock import MonotonicClock
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 
@@ -207,5 +208,5 @@ def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
         robot.sockets.refresh_keys()
         exchange(robot, anna, 0.05, until_both=False)
         assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
-        assert any("nobody is let in" in text and "chmod 700" in text for text in robot.sockets.key_news())
+        assert any("nobody is let in any more" in text and "chmod 700" in text for text in robot.sockets.key_news())
         assert robot.sockets.key_news() == []

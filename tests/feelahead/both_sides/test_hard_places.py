@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -45,7 +46,7 @@ def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Pa
     ("side", "arguments"), [(operator_side.main, NOWHERE), (robot_side.main, ROBOT)], ids=["operator", "robot"]
 )
 def test_a_run_that_fails_in_whatever_way_has_its_summary(
-    side: object, arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    side: ModuleType, arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise RuntimeError("of no kind that was thought of")
