@@ -1,9 +1,13 @@
 """The two sides where something around them fails: they end in order, and say in one line what it was."""
 
+import contextlib
 import json
+import os
+import pty
+import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -11,6 +15,8 @@ import pytest
 
 import operator_side.main
 import robot_side.main
+from feelahead.both_sides.processes import SideProcess
+from feelahead.experiments.faults.first_side import free_ports
 
 LIMIT_S = 600.0
 NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")
@@ -57,3 +63,77 @@ def test_a_run_that_fails_in_whatever_way_has_its_summary(
     with pytest.raises(RuntimeError, match="of no kind"):
         command([*arguments, f"--summary={path}", "--status=none"])
     assert json.loads(path.read_text())["errors"] == ["of no kind that was thought of"]
+
+
+@contextlib.contextmanager
+def stalled(kind: str) -> Iterator[int]:
+    """A standard output that is full, and that nobody reads."""
+    reads, writes = pty.openpty() if kind == "terminal" else os.pipe()
+    os.set_blocking(writes, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writes, b"x")
+    os.set_blocking(writes, True)
+    try:
+        yield writes
+    finally:
+        os.close(writes)
+        os.close(reads)
+
+
+@contextlib.contextmanager
+def start(module: str, output: int, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
+    command = [sys.executable, "-P", "-m", module, *arguments]
+    with subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()  # where a test has failed
+
+
+STALLS = pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
+
+
+@pytest.mark.processes
+@STALLS
+@pytest.mark.parametrize(("module", "arguments"), [("operator_side", NOWHERE), ("robot_side", ROBOT)])
+def test_the_loop_goes_on_whoever_stalls_its_output(
+    module: str, arguments: Sequence[str], kind: str, mode: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "out.json"
+    more = ("--duration=1", f"--status={mode}", f"--summary={path}")
+    with stalled(kind) as output, start(module, output, *arguments, *more) as process:
+        _, complaint = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, complaint) == (0, "")
+    assert json.loads(path.read_text())["errors"] == []
+
+
+@pytest.mark.processes
+@STALLS
+def test_a_signal_ends_the_robot_side_whoever_stalls_its_output(kind: str, mode: str) -> None:
+    control, view = (f"tcp://127.0.0.1:{port}" for port in free_ports(2))
+    arguments = [f"--connect={control}", f"--view-connect={view}", "--device=simulated"]
+    with (
+        stalled(kind) as output,
+        start("robot_side", output, f"--bind={control}", f"--view-bind={view}", f"--status={mode}") as robot,
+        SideProcess("operator_side", "operator", arguments) as operator,
+    ):
+        assert any(operator.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5000))
+        robot.send_signal(signal.SIGTERM)
+        _, complaint = robot.communicate(timeout=LIMIT_S)
+        assert (robot.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+@STALLS
+def test_a_signal_ends_the_operator_side_whoever_stalls_its_output(kind: str, mode: str, tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    with SideProcess("robot_side", "robot", ROBOT) as robot, stalled(kind) as output:
+        listening = robot.wait_for("listening", LIMIT_S)
+        ends = (f"--connect={listening['control']}", f"--view-connect={listening['view']}", "--device=simulated")
+        with start("operator_side", output, *ends, f"--status={mode}", f"--summary={path}") as operator:
+            assert any(robot.wait_for("status", LIMIT_S)["state"] == "armed" for _ in range(5000))
+            operator.send_signal(signal.SIGTERM)
+            _, complaint = operator.communicate(timeout=LIMIT_S)
+        assert (operator.returncode, complaint) == (0, "")
+    assert json.loads(path.read_text())["triggers_released"] is True
