@@ -156,6 +156,7 @@ class _Loop:
                 "refused": sockets.refused,
                 "revoked": sockets.revoked,
                 "flooding": sockets.flooding,
+                "crowded": sockets.crowded,
                 "malformed": sockets.rejected,
                 "unread": self._admission.unread,
             },
@@ -199,7 +200,7 @@ class _Loop:
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
-            for text in self._sockets.key_news():
+            for text in self._sockets.news():
                 self._status.note(text)
         self._collection.idle(now_s, resting=self._core.session.safety.state != "armed")
 

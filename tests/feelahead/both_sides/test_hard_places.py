@@ -15,8 +15,12 @@ import pytest
 
 import operator_side.main
 import robot_side.main
+from common.protocol.session import OWNING
+from common.sockets.authentication import make_key_pair
+from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideProcess
 from feelahead.experiments.faults.first_side import free_ports
+from feelahead.experiments.hostile.raw_zmtp import RawConnection, port_of
 
 LIMIT_S = 600.0
 NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")
@@ -137,3 +141,48 @@ def test_a_signal_ends_the_operator_side_whoever_stalls_its_output(kind: str, mo
             _, complaint = operator.communicate(timeout=LIMIT_S)
         assert (operator.returncode, complaint) == (0, "")
     assert json.loads(path.read_text())["triggers_released"] is True
+
+
+# Fewer descriptors than strangers open connections.
+FEW = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+@pytest.mark.processes
+def test_strangers_who_only_connect_cost_nobody_the_session(tmp_path: Path) -> None:
+    folder, summary = KeyFolder(tmp_path / "keys"), tmp_path / "out.json"
+    (robot_key, robot_secret), (anna_key, anna_secret), (ben_key, _) = (make_key_pair() for _ in range(3))
+    folder.write_pair("robot", robot_key, robot_secret)
+    folder.write_pair("operator", anna_key, anna_secret)
+    folder.allow("anna", anna_key)
+    folder.allow("ben", ben_key)
+    keys = f"--keys={folder.path}"
+    with (
+        SideProcess(
+            "robot_side", "robot", [*ROBOT, keys, f"--summary={summary}"], before=[sys.executable, "-c", FEW]
+        ) as robot,
+        contextlib.ExitStack() as crowd,
+    ):
+        listening = robot.wait_for("listening", LIMIT_S)
+        ends = [f"--connect={listening['control']}", f"--view-connect={listening['view']}", "--device=simulated"]
+        with SideProcess("operator_side", "operator", [*ends, keys, f"--robot-key={robot_key}"]) as operator:
+            assert any(robot.wait_for("status", LIMIT_S)["state"] == "armed" for _ in range(5000))
+            for endpoint in (listening["control"], listening["view"]):
+                for _ in range(300):
+                    crowd.enter_context(contextlib.closing(RawConnection(port_of(endpoint))))
+            # The list of keys is looked at anew, and the view is opened anew, in the crowd.
+            folder.revoke("ben")
+            robot.events()
+            for _ in range(10):
+                robot.wait_for("status", LIMIT_S)
+            assert any(robot.wait_for("status", LIMIT_S)["owner"] in OWNING for _ in range(5000))
+            assert any(operator.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5000))
+            operator.check()
+        assert robot.stop(LIMIT_S) == 0
+    figures = json.loads(summary.read_text())
+    assert figures["errors"] == []
+    assert figures["strangers"]["crowded"] > 0
+    assert figures["strangers"]["revoked"] == 0
