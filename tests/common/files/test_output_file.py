@@ -2,12 +2,12 @@
 
 import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
 
 from common.errors import ConfigurationError
-from common.files import output_file as files
 from common.files.output_file import output_file, write_json
 
 
@@ -64,7 +64,7 @@ def test_a_file_in_a_folder_of_others_is_written_where_it_is(tmp_path: Path, mon
     path.write_text("old")
     before = path.stat().st_ino
     # Tests may run as root, whom no mode keeps out.
-    monkeypatch.setattr(files.os, "access", lambda *_: False)
+    monkeypatch.setattr(os, "access", lambda *_: False)
     write_json("--summary", path, 1)
     assert (path.read_text(), path.stat().st_ino) == ("1\n", before)
 
