@@ -109,7 +109,8 @@ class OperatorSide:
         if self.link.peer_epoch != known_epoch:
             self._standing.forget()
         if isinstance(message, LeaseNotice) and arrival.fresh:
-            self._standing.follow(message, now_s)
+            if self._standing.follow(message, now_s):
+                self.link.begin_anew()
             if not self._standing.owns:
                 self._blindness.end()
         if isinstance(message, StiffnessUpdate):

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import json
 import secrets
 import sys
 from collections.abc import Sequence
@@ -16,7 +15,8 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
-from common.errors import ConfigurationError, FeelaheadError
+from common.errors import ConfigurationError
+from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
@@ -94,19 +94,21 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
             loop = _Loop(settings, core, line, sockets, connection, guard, person, status, stored_travel=not given)
-            failure: FeelaheadError | None = None
+            failure: Exception | None = None
             try:
                 loop.run(stop)
             except BrokenPipeError:
                 ignore_broken_output()
-            except FeelaheadError as error:
+            except Exception as error:
                 failure = error
         errors = [] if failure is None else [str(failure)]
         summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors}
-        if settings.summary is not None:
-            settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        if failure is not None:
-            raise failure
+        try:
+            if settings.summary is not None:
+                write_json("--summary", settings.summary, summary)
+        finally:
+            if failure is not None:
+                raise failure
     return 0
 
 

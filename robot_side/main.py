@@ -1,7 +1,6 @@
 """The process `feelahead-robot`: sockets, clock, core; nothing else."""
 
 import dataclasses
-import json
 import secrets
 from collections import deque
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
 from common.emulation.delay_line import BitFlip, DelayLine, link_summary
 from common.emulation.spec import LinkSpec, Stream, unused_clauses
-from common.errors import FeelaheadError
+from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_descriptor_limit, raise_priority
@@ -67,19 +66,21 @@ def command(arguments: Sequence[str]) -> int:
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
             loop = _Loop(settings, core, link, sockets, status)
-            failure: FeelaheadError | None = None
+            failure: Exception | None = None
             try:
                 loop.run(stop)
             except BrokenPipeError:
                 ignore_broken_output()
-            except FeelaheadError as error:
+            except Exception as error:
                 failure = error
             # A run that failed has figures, too.
             summary = loop.summary() | core.summary() | {"errors": [] if failure is None else [str(failure)]}
-            if settings.summary is not None:
-                settings.summary.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        if failure is not None:
-            raise failure
+            try:
+                if settings.summary is not None:
+                    write_json("--summary", settings.summary, summary)
+            finally:
+                if failure is not None:
+                    raise failure
     return 0
 
 
@@ -155,6 +156,7 @@ class _Loop:
                 "refused": sockets.refused,
                 "revoked": sockets.revoked,
                 "flooding": sockets.flooding,
+                "crowded": sockets.crowded,
                 "malformed": sockets.rejected,
                 "unread": self._admission.unread,
             },
@@ -198,7 +200,7 @@ class _Loop:
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
-            for text in self._sockets.key_news():
+            for text in self._sockets.news():
                 self._status.note(text)
         self._collection.idle(now_s, resting=self._core.session.safety.state != "armed")
 

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Mapping
 from types import TracebackType
-from typing import Literal
+from typing import IO, Literal, cast
 
 from rich.console import Console
 from rich.live import Live
@@ -13,6 +13,7 @@ from rich.text import Text
 from common.command.live_line import live_line
 from common.command.live_story import Story
 from common.command.live_view import Value, live_view
+from common.command.patient_output import PatientOutput
 
 StatusMode = Literal["line", "json", "none"]
 
@@ -26,17 +27,22 @@ class _Console(Console):
 
 
 class Status:
-    """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error."""
+    """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error.
+
+    Nothing waits for whoever reads: what a reader that stalls has no room for is dropped.
+    """
 
     def __init__(self, mode: StatusMode, program: str) -> None:
         self._mode = mode
         self._program = program
-        self._console = _Console()
+        self._output = PatientOutput(sys.stdout)
+        self._console = _Console(file=cast("IO[str]", self._output))
         self._live: Live | None = None
         self._story = Story()
         self._next_s = -1.0
 
     def __enter__(self) -> "Status":
+        self._output.__enter__()
         if self._mode == "line" and self._console.is_terminal:
             self._live = Live(console=self._console, auto_refresh=False, transient=False)
             self._live.start()
@@ -45,15 +51,18 @@ class Status:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._live is not None:
-            self._live.stop()
+        try:
+            if self._live is not None:
+                self._live.stop()
+        finally:
+            self._output.__exit__(kind, error, trace)
 
     def due(self, now_s: float) -> bool:
         """Whether `show` would show anything; building the values costs time in a tick."""
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, at most five times a second; BrokenPipeError when a reader has gone."""
+        """Show the values, at most five times a second; BrokenPipeError, once, when the reader has gone."""
         if not self.due(now_s):
             return
         self._next_s = now_s + _PERIOD_S
@@ -67,14 +76,12 @@ class Status:
             style = "bold red" if view.alarm else ""
             self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
         elif (told := self._story.tell(now_s, view)) is not None:
-            print(told, flush=True)
+            self._output.write(f"{told}\n")
 
     def event(self, kind: str, **values: Value) -> None:
         """One line of JSON, in the JSON mode only, at once."""
-        # Without a standard output, whoever read it has gone.
-        if self._mode == "json" and sys.stdout is not None:
-            sys.stdout.write(json.dumps({"event": kind, **values}) + "\n")
-            sys.stdout.flush()
+        if self._mode == "json":
+            self._output.write(json.dumps({"event": kind, **values}) + "\n")
 
     def note(self, text: str) -> None:
         """A line that stays, for people; an event of its own in the JSON mode."""

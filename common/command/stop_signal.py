@@ -1,6 +1,7 @@
 """SIGINT and SIGTERM as a flag that the main loop reads, so that every exit goes the same clean way."""
 
 import os
+import select
 import signal
 import sys
 from types import FrameType, TracebackType
@@ -58,7 +59,6 @@ def leave_at_once_on_signals() -> None:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     del number, frame
-    if sys.__stdout__ is not None and sys.__stdout__.isatty():
-        sys.__stdout__.write("\x1b[?25h")  # a live line hides the cursor
-        sys.__stdout__.flush()
+    if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
+        os.write(1, b"\x1b[?25h")  # a live line hides the cursor
     os._exit(0)

@@ -1,5 +1,6 @@
 """One end of a link to one peer: stamps what leaves, and orders and measures what arrives."""
 
+import hashlib
 from collections import deque
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -70,6 +71,10 @@ class LinkEnd:
         self._newest: Header | None = None
         self._newest_received_s = 0.0
         self._last_sent_s = self._last_received_s = 0.0
+
+    def begin_anew(self) -> None:
+        """Another epoch of ours, after the peer took this one for ended; only who knows this one can guess it."""
+        self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 
     def hello(self, now_s: float) -> Hello:
         """The message that opens our epoch."""

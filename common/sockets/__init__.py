@@ -5,5 +5,5 @@ the operator, apart so that a frame never delays a stiffness. No call but `wait`
 leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
 
 Only `shell`, `authentication`, `robot` and `operator` know ZeroMQ: what both ends share, who may connect, and the
-two ends. `keys`, `endpoints` and `admission` are what they go by.
+two ends. `keys`, `allow_list`, `endpoints`, `crowd` and `admission` are what they go by.
 """

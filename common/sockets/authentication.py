@@ -12,7 +12,8 @@ from zmq.utils import z85
 from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
-from common.sockets.keys import AllowList, KeyFolder, read_public_key
+from common.sockets.allow_list import AllowList
+from common.sockets.keys import KeyFolder, read_public_key
 
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"

@@ -8,6 +8,7 @@ A key is 64 hexadecimal digits (32 bytes, Curve25519), so that no shell needs qu
 with # are for people.
 """
 
+import errno
 import os
 import re
 import stat
@@ -24,6 +25,8 @@ Side = Literal["robot", "operator"]
 PEER_LIMIT = 256
 """Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
+SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+"""What says nothing of a file or folder: this process or the machine is short of something."""
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
@@ -64,6 +67,16 @@ def read_public_key(key_or_file: str, what: str) -> str:
             f"{what}: {key_or_file[:80]!r} is neither a key nor a file; valid: 64 hexadecimal digits, or a .public file"
         )
     return _read_key(path, what)
+
+
+@dataclass(frozen=True)
+class Peers:
+    """Who is let in, and which files let nobody in."""
+
+    names: dict[str, str]
+    """The name of each key."""
+    faults: tuple[str, ...]
+    """What is wrong with the files that hold no key, a line each."""
 
 
 @dataclass(frozen=True)
@@ -153,21 +166,32 @@ class KeyFolder:
             )
 
     def allowed(self) -> dict[str, str]:
-        """The name of each key that is let in; ConfigurationError for a file without one or an open folder."""
+        """The name of each key that is let in; errors as in `peers`."""
+        return self.peers().names
+
+    def peers(self) -> Peers:
+        """Who is let in: a file that cannot be read, or is gone by now, excludes its own key alone.
+
+        ConfigurationError for a folder that others may write to or that cannot be read; OSError when nothing can be
+        read at present, whatever it is.
+        """
         names: dict[str, str] = {}
+        faults = []
         for path in self._peer_files():
-            key = _read_key(path, "allowed")
-            names[key] = f"{names[key]}, {path.stem}" if key in names else path.stem
-        return names
+            try:
+                key = _read_key(path, "allowed")
+            except ConfigurationError as error:
+                faults.append(str(error))
+            else:
+                names[key] = f"{names[key]}, {path.stem}" if key in names else path.stem
+        return Peers(names, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
-        """What changes whenever the peers do: each file's name, time of change and number, without reading any."""
-        try:
-            return tuple(
-                sorted((path.name, (found := path.stat()).st_mtime_ns, found.st_ino) for path in self._peer_files())
-            )
-        except (OSError, ConfigurationError):
-            return ()
+        """What changes whenever the peers do: each file's name, time of change and number, without reading any.
+
+        Errors as in `peers`.
+        """
+        return tuple((path.name, *_stand(path)) for path in self._peer_files())
 
     def command(self, rest: str) -> str:
         """The command line that does `rest` to this folder."""
@@ -195,6 +219,8 @@ class KeyFolder:
         except FileNotFoundError:
             return []
         except OSError as error:
+            if error.errno in SHORTAGES:
+                raise
             raise ConfigurationError(
                 f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder of this user's, mode 0700"
             ) from error
@@ -219,40 +245,14 @@ def passed_over_note(folder: KeyFolder) -> list[str]:
     ]
 
 
-@dataclass
-class AllowList:
-    """Whom a running side lets in: the folder's peers, read again whenever the folder has changed."""
-
-    folder: KeyFolder
-    names: dict[str, str] = field(default_factory=dict)
-    """The name of each key."""
-    unreadable: str | None = None
-    """Why nobody is let in at the moment; None while the folder can be read."""
-    _fingerprint: tuple[tuple[str, int, int], ...] | None = None
-
-    def refresh(self) -> set[str]:
-        """Look at the folder, a few stat calls; the keys that were let in before and are no more.
-
-        What cannot be read lets nobody in: a half of the list is no list.
-        """
-        fingerprint = self.folder.fingerprint()
-        if fingerprint == self._fingerprint:
-            return set()
-        before = set(self.names)
-        try:
-            self.names, self.unreadable, self._fingerprint = self.folder.allowed(), None, fingerprint
-        except (ConfigurationError, OSError) as error:
-            # Without a fingerprint the next look reads again.
-            self.names, self.unreadable, self._fingerprint = {}, str(error), None
-        return before - set(self.names)
-
-
 def _read_key(path: Path, what: str) -> str:
     try:
         content = read_regular_file(path, _FILE_LIMIT_BYTES).decode("ascii")
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{what}: {path} cannot be read: no ASCII text; valid: a key file") from error
     except OSError as error:
+        if error.errno in SHORTAGES:
+            raise
         raise ConfigurationError(f"{what}: {path} cannot be read: {error.strerror}; valid: a key file") from error
     except ValueError as error:
         raise ConfigurationError(f"{what}: {path} {error}") from error
@@ -260,6 +260,15 @@ def _read_key(path: Path, what: str) -> str:
     if len(lines) != 1:
         raise ConfigurationError(f"{what}: {path} holds {len(lines)} lines; valid: one key of 64 hexadecimal digits")
     return checked_key(lines[0], f"{what}: {path}")
+
+
+def _stand(path: Path) -> tuple[int, int]:
+    """What changes when a file does, its permissions included, or why that cannot be known."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        return -1, error.errno or 0
+    return found.st_ctime_ns, found.st_ino
 
 
 def _refuse_writable(path: Path) -> None:

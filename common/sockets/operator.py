@@ -10,6 +10,8 @@ from common.sockets.endpoints import following, parse_connect
 from common.sockets.shell import CONTROL_LIMIT_BYTES, Reader, SocketShell, connect_socket
 
 _RETRY_S = 0.5
+_HANDSHAKE_LIMIT_S = 10.0
+"""A CURVE handshake takes three round trips, seen from here, and the robot side may still be starting."""
 
 
 class OperatorSockets(SocketShell):
@@ -36,7 +38,7 @@ class OperatorSockets(SocketShell):
             if view_connect is None
             else parse_connect(view_connect, "--view-connect")
         )
-        super().__init__(zmq.DEALER, zmq.SUB, heartbeat_timeout_s)
+        super().__init__(zmq.DEALER, zmq.SUB, heartbeat_timeout_s, _HANDSHAKE_LIMIT_S)
         try:
             # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
             self._control.setsockopt(zmq.IMMEDIATE, 1)

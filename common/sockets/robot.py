@@ -1,19 +1,28 @@
 """The robot side's end: it binds, tells its peers apart, and sends floods and revoked keys away."""
 
 import contextlib
+import resource
 import socket
 from dataclasses import dataclass
 
 import zmq
+from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
+from common.sockets.crowd import Crowd
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
-from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket, readable
 
 PEER_LIMIT_PER_S = 5000
 """A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
+HANDSHAKE_LIMIT_S = 2.0
+"""A connection that has not introduced itself by then ends; a CURVE handshake takes two round trips, seen from here."""
+MOST_CONNECTIONS = 1024
+"""To each port, and never more than a quarter of the descriptors that this process may open."""
 _REMEMBERED_PEERS = 1024
+_EVENTS_PER_CALL = 64
+"""So that connections that come and go cannot hold the caller."""
 
 
 @dataclass
@@ -26,6 +35,36 @@ class _Peer:
     """The connection's; -1 where it is not known."""
     received: int = 0
     """Messages in the present second."""
+
+
+class _Gate:
+    """Watches the connections to one bound socket, and hangs up on those that are too many; before it is bound."""
+
+    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", part: "zmq.Socket[bytes]") -> None:
+        limit = min(MOST_CONNECTIONS, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4)
+        self.crowd = Crowd(limit, HANDSHAKE_LIMIT_S)
+        address = f"inproc://gate-{id(part)}"
+        part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
+        self._events = context.socket(zmq.PAIR)
+        self._events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's own thread would wait for us
+        self._events.connect(address)
+
+    def look(self, now_s: float) -> None:
+        """Take note of who has come and gone since the last call; never blocks."""
+        for _ in range(_EVENTS_PER_CALL):
+            if not readable(self._events):
+                break
+            event = parse_monitor_message(self._events.recv_multipart())
+            if event["event"] == zmq.EVENT_ACCEPTED:
+                self.crowd.came(event["value"], now_s)
+            else:
+                self.crowd.went(event["value"])
+        for descriptor in self.crowd.surplus(now_s):
+            _shut_down(descriptor)
+
+    def close(self) -> None:
+        """Look no more."""
+        self._events.close(linger=0)
 
 
 class RobotSockets(SocketShell):
@@ -56,13 +95,17 @@ class RobotSockets(SocketShell):
         self.revoked = 0
         """Messages of peers that were allowed when they connected, and are no more."""
         self._keys = keys
-        self._told_unreadable: str | None = None
+        self.crowded = 0
+        """Connections that were ended because there were too many at once."""
+        self._told: list[str] = []
         self._peers: dict[bytes, _Peer] = {}
         self._second = 0
         self._reader = Reader(frames=2)
         self._view_endpoint: Endpoint | None = None
-        super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s)
+        self._view_outdated = False
+        super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
         try:
+            self._gates = [_Gate(self._context, part) for part in (self._control, self._view)]
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
             for part, endpoint, flag in ((self._control, control, "--bind"), (self._view, view, "--view-bind")):
@@ -82,37 +125,37 @@ class RobotSockets(SocketShell):
         """Handshakes with a key that is not allowed."""
         return 0 if self._authenticator is None else self._authenticator.refused
 
-    def key_news(self) -> list[str]:
-        """What a person should know about the keys since the last call, a line each with the command to run."""
-        if self._keys is None or self._authenticator is None:
-            return []
-        allowed = self._keys.allowed
-        news = [
-            f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
-            for key in self._authenticator.unknown_keys()
-        ]
-        if allowed.unreadable != self._told_unreadable:
-            self._told_unreadable = allowed.unreadable
+    def news(self) -> list[str]:
+        """What a person should know about strangers and keys since the last call, a line each."""
+        news, wrong = [], []
+        if self.crowded:
+            limit = self._gates[0].crowd.limit
+            wrong.append(f"more than {limit} connections at once: strangers are hung up on; who is in stays in")
+        if self._keys is not None and self._authenticator is not None:
+            allowed = self._keys.allowed
+            news = [
+                f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
+                for key in self._authenticator.unknown_keys()
+            ]
+            wrong += [f"passed over, so that it lets nobody in: {fault}" for fault in allowed.faults]
             if allowed.unreadable is not None:
-                news.append(f"nobody is let in any more: {allowed.unreadable}")
-        return news
+                who = "whoever was let in stays so" if allowed.names else "nobody is let in any more"
+                wrong.append(f"{who}: {allowed.unreadable}")
+        told, self._told = self._told, wrong
+        return news + [text for text in wrong if text not in told]
 
     def refresh_keys(self) -> None:
-        """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second.
-
-        Nothing can be sent to some viewers and not to others, so all of them have to shake hands anew.
-        """
+        """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second."""
         if self._keys is None:
             return
         revoked = self._keys.allowed.refresh()
         if revoked:
             for name in [name for name, peer in self._peers.items() if peer.key in revoked]:
                 self._hang_up(name)
-            if self._view_endpoint is None:
-                self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
-            self._view.close(linger=0)
-            self._view = self._open_view(zmq.PUB)
-            self._keys.secure(self._view)
+            self._view_outdated = True
+        if self._view_outdated:
+            with contextlib.suppress(zmq.ZMQError):  # while no descriptor is to be had, the next look tries again
+                self._replace_view(self._keys)
         self._bind_view_again()
 
     def receive(self) -> list[tuple[bytes, bytes]]:
@@ -125,6 +168,7 @@ class RobotSockets(SocketShell):
             self._second = second
             for peer in self._peers.values():
                 peer.received = 0
+        self._watch_connections()
         received = []
         for name, *frames in self._reader.read(self._control):
             if not self._admits(name.bytes, frames[-1] if frames else name):
@@ -157,6 +201,27 @@ class RobotSockets(SocketShell):
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
         return self.wait_for(timeout_s, [self._control], self._authenticator)
 
+    def _watch_connections(self) -> None:
+        now_s = self._clock.now()
+        for gate in self._gates:
+            before = gate.crowd.hung_up
+            gate.look(now_s)
+            self.crowded += gate.crowd.hung_up - before
+
+    def _replace_view(self, keys: RobotKeys) -> None:
+        """Nothing can be sent to some viewers and not to others: all of them have to shake hands anew."""
+        view = self._open_view(zmq.PUB)
+        try:
+            keys.secure(view)
+            gate = _Gate(self._context, view)
+        except zmq.ZMQError:
+            view.close(linger=0)
+            raise
+        self._gates[1].close()
+        self._view.close(linger=0)
+        self._view, self._gates[1], self._view_outdated = view, gate, False
+        self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
+
     def _bind_view_again(self) -> None:
         """After a revocation: the old socket's port is free only when ZeroMQ's own thread has closed it."""
         if self._view_endpoint is not None:
@@ -175,6 +240,8 @@ class RobotSockets(SocketShell):
             if len(self._peers) >= _REMEMBERED_PEERS:
                 del self._peers[next(iter(self._peers))]
             peer = self._peers[name] = _Peer(key, _descriptor(frame))
+            if self._allows(key):
+                self._gates[0].crowd.spoke(peer.descriptor)
         peer.received += 1
         if not self._allows(key):
             self.revoked += 1
@@ -194,8 +261,15 @@ class RobotSockets(SocketShell):
         owners = [other for other, known in self._peers.items() if known.descriptor == descriptor]
         if descriptor < 0 or owners:
             return
-        with contextlib.suppress(OSError), socket.fromfd(descriptor, socket.AF_INET, socket.SOCK_STREAM) as connection:
-            connection.shutdown(socket.SHUT_RDWR)
+        _shut_down(descriptor)
+
+
+def _shut_down(descriptor: int) -> None:
+    """End a connection that ZeroMQ owns and will close; without a descriptor more, as there may be none left."""
+    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=descriptor)
+    with contextlib.suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
+    connection.detach()
 
 
 def _property(frame: zmq.Frame, name: str) -> str:

@@ -33,14 +33,13 @@ CONTROL_LIMIT_BYTES = 4096
 VIEW_LIMIT_BYTES = 4 * 1024 * 1024
 MESSAGES_PER_RECEIVE = 64
 """At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
-HANDSHAKE_LIMIT_S = 10.0
-"""A connection that has not introduced itself by then ends; a CURVE handshake takes three round trips."""
 
 
 class SocketShell:
     """A context with a control and a view socket; no call but `wait_for` blocks."""
 
-    def __init__(self, control_type: int, view_type: int, heartbeat_timeout_s: float) -> None:
+    def __init__(self, control_type: int, view_type: int, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
+        """A connection that has not introduced itself within `handshake_limit_s` ends."""
         if not 0.03 <= heartbeat_timeout_s <= 60.0:
             raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
         self.dropped = 0
@@ -50,6 +49,7 @@ class SocketShell:
         self._clock = MonotonicClock()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
+        self._handshake_ms = round(1e3 * handshake_limit_s)
         self._descriptors: dict[zmq.Socket[bytes], int] = {}
         self._control = self._open_control(control_type)
         self._view = self._open_view(view_type)
@@ -63,7 +63,7 @@ class SocketShell:
             (zmq.HEARTBEAT_IVL, self._heartbeat_ms // 3),
             (zmq.HEARTBEAT_TIMEOUT, self._heartbeat_ms),
             (zmq.HEARTBEAT_TTL, self._heartbeat_ms * 4 // 3),
-            (zmq.HANDSHAKE_IVL, round(1e3 * HANDSHAKE_LIMIT_S)),
+            (zmq.HANDSHAKE_IVL, self._handshake_ms),
             (zmq.LINGER, 0),
         ):
             part.setsockopt(option, value)
@@ -82,7 +82,7 @@ class SocketShell:
             (zmq.TCP_KEEPALIVE_IDLE, 1),
             (zmq.TCP_KEEPALIVE_INTVL, 1),
             (zmq.TCP_KEEPALIVE_CNT, 3),
-            (zmq.HANDSHAKE_IVL, round(1e3 * HANDSHAKE_LIMIT_S)),
+            (zmq.HANDSHAKE_IVL, self._handshake_ms),
             (zmq.LINGER, 0),
         ):
             part.setsockopt(option, value)
@@ -122,7 +122,7 @@ class SocketShell:
         deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
         while True:
             pending = served is not None and served.serve()
-            if any(_readable(part) for part in awaited):
+            if any(readable(part) for part in awaited):
                 return True
             remaining_s = None
             if deadline_s is not None:
@@ -179,7 +179,8 @@ class Reader:
                 yield message
 
 
-def _readable(part: "zmq.Socket[bytes]") -> bool:
+def readable(part: "zmq.Socket[bytes]") -> bool:
+    """Whether something can be received from it at once."""
     return bool(int(part.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
 

@@ -10,6 +10,8 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table as RichTable
 
+from common.files.output_file import output_file
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -115,7 +117,7 @@ def _or_dash(value: float | None) -> str:
 
 def write_csv(path: Path, figures: Sequence[Figure]) -> None:
     """One row for each figure under a heading of `COLUMNS`."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with output_file("--csv", path) as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         writer.writerows([*(getattr(figure, column) for column in COLUMNS)] for figure in figures)

@@ -1,6 +1,5 @@
 """`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
 
-import json
 import sys
 import tempfile
 import time
@@ -19,6 +18,7 @@ from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
+from common.files.output_file import write_json
 from common.protocol.messages import Compensation
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
@@ -103,12 +103,14 @@ def demo(arguments: Sequence[str]) -> int:
             ignore_broken_output()
             errors = []
         merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+    try:
+        for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
+            status.note(line)
+    finally:
+        for error in errors:
+            sys.stderr.write(f"feelahead demo: {error}\n")
         if settings.summary is not None:
-            settings.summary.write_text(json.dumps(merged, indent=2) + "\n", encoding="utf-8")
-    for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
-        status.note(line)
-    for error in errors:
-        sys.stderr.write(f"feelahead demo: {error}\n")
+            write_json("--summary", settings.summary, merged)
     return 1 if errors else 0
 
 

@@ -102,8 +102,9 @@ def _listed(folder: KeyFolder) -> list[str]:
     for side in get_args(Side):
         if folder.secret_path(side).exists():
             lines.append(f"own      {side:<32} {public_part(folder.secret(side))}")
-    lines += [f"allowed  {name:<32} {key}" for key, name in sorted(folder.allowed().items(), key=lambda item: item[1])]
-    lines += passed_over_note(folder)
+    peers = folder.peers()
+    lines += [f"allowed  {name:<32} {key}" for key, name in sorted(peers.names.items(), key=lambda item: item[1])]
+    lines += [*passed_over_note(folder), *(f"passed over: {fault}" for fault in peers.faults)]
     if len(lines) == 1:
         lines.append(f"empty; to begin: {folder.command('make robot')}, or make operator")
     return lines

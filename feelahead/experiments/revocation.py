@@ -26,8 +26,9 @@ from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import raise_priority
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from robot_side.main import KEYS_PERIOD_S

@@ -17,7 +17,7 @@ PACKAGES = ("common", "robot_side", "operator_side", "feelahead")
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 
 ARROWS = """
-    common/files:
+    common/files: common
     common/emulation: common common/files
     common/link_model.py: common/emulation
     common/timing: common
@@ -49,9 +49,9 @@ ARROWS = """
         robot_side/overlap/meshes
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
-    robot_side: common common/command common/emulation common/protocol common/realtime common/sockets common/timing
-        robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper robot_side/objects
-        robot_side/operators robot_side/simulation
+    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
+        common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper
+        robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -64,7 +64,7 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
-    operator_side: common common/command common/emulation common/protocol common/realtime common/sockets
+    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
         operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, fields
 from rich.console import Console
 
 from common.command.command_line import parse_settings
+from common.files.output_file import output_file
 from feelahead.approaches.frozen import frozen_hash
 from feelahead.approaches.kept import Kept
 from feelahead.approaches.progress import progress
@@ -45,7 +46,7 @@ def bench_coverage(arguments: Sequence[str]) -> int:
         console.print(f"failed: {one['piece']}: {one['why']}", markup=False)
     console.print(f"frozen scenes and limits: {frozen}")
     if settings.csv is not None:
-        with settings.csv.open("w", newline="", encoding="utf-8") as file:
+        with output_file("--csv", settings.csv) as file:
             names = [column.name for column in fields(Row)] + ["frozen"]
             writer = csv.DictWriter(file, names, extrasaction="ignore")
             writer.writeheader()

@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
-from common.errors import ConfigurationError
+from common.files.output_file import output_file
 from feelahead.benchmarks.delay.runs import GOAL_S, Outcome, measure, quantile_of_sizes, rms
 from feelahead.benchmarks.delay.traffic import Scenario, scenarios
 from feelahead.benchmarks.report import Goal, Table, show, show_goals
@@ -78,13 +78,10 @@ def bench_delay(arguments: Sequence[str]) -> int:
     show_goals(console, goals(outcomes, settings.seconds))
     console.print(f"took {clock.now() - start_s:.0f} s", highlight=False)
     if settings.csv is not None:
-        try:
-            with settings.csv.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                writer.writerow(COLUMNS)
-                writer.writerows(row for outcome in outcomes for row in _rows(outcome))
-        except OSError as error:
-            raise ConfigurationError(f"--csv {settings.csv}: cannot be written: {error.strerror}") from error
+        with output_file("--csv", settings.csv) as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            writer.writerows(row for outcome in outcomes for row in _rows(outcome))
     return 0
 
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
-from common.files.output_file import require_output_file
+from common.files.output_file import output_file, require_output_file
 from feelahead.approaches.frozen import frozen_hash
 from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.progress import progress
@@ -136,8 +136,7 @@ def _write(settings: ErrorBenchSettings, found: Found, frozen: str) -> None:
         figures = [*propagation_figures(found.outcomes, found.microseconds), *prediction_figures(found.judged)]
         write_figures(settings.csv, figures)
     if settings.table is not None:
-        settings.table.write_text(
-            error_table(found.judged, load_scene().robot.fingerprint, frozen, full_speed_m_s()), encoding="utf-8"
-        )
+        with output_file("--table", settings.table) as file:
+            file.write(error_table(found.judged, load_scene().robot.fingerprint, frozen, full_speed_m_s()))
     if settings.picture is not None:
         draw(found.outcomes, found.microseconds, found.judged, frozen, settings.picture)

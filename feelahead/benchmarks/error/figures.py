@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from common.files.output_file import output_file
 from feelahead.approaches.pulls import PULL_KINDS
 from feelahead.benchmarks.error.prediction import COMPENSATIONS, VARIANTS, Judged
 from feelahead.benchmarks.error.propagation import METHODS, Outcome
@@ -76,7 +77,7 @@ def _spread_figures(kind: str, case: str, found: Spread) -> Iterator[Figure]:
 
 def write_figures(path: Path, figures: Sequence[Figure]) -> None:
     """One row for each under a heading."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with output_file("--csv", path) as file:
         writer = csv.writer(file)
         writer.writerow(Figure._fields)
         writer.writerows(figures)

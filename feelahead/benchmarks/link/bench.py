@@ -19,6 +19,7 @@ from common.emulation.profile import LinkProfile
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
+from common.files.output_file import output_file
 from common.realtime.pacing import SPIN_S
 from feelahead.benchmarks.link.real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band, table
@@ -130,16 +131,13 @@ def bench_link(arguments: Sequence[str]) -> int:
         else:
             sample = _real(settings, profile, reference, console, progress)
     if settings.csv is not None:
-        try:
-            write_samples(settings.csv, sample)
-        except OSError as error:
-            raise ConfigurationError(f"--csv {settings.csv}: cannot be written: {error.strerror}") from error
+        write_samples(settings.csv, sample)
     return 0
 
 
 def write_samples(path: Path, sample: LinkSample) -> None:
     """seq, sent_ns, received_ns of every message, in order of sending; a lost one has no received_ns."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with output_file("--csv", path) as file:
         writer = csv.writer(file)
         writer.writerow(["seq", "sent_ns", "received_ns"])
         for number, (sent_s, delay_s) in enumerate(zip(sample.sent_s, sample.delay_s, strict=True)):

@@ -1,7 +1,6 @@
 """Run every approach that was asked for, and say how each ended."""
 
 import contextlib
-import json
 import math
 import sys
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from common.command.command_line import parse_settings
+from common.files.output_file import write_json
 from feelahead.approaches.approach import Approach, run_approach
 from feelahead.approaches.frozen import frozen_hash
 from feelahead.approaches.laws import compensation_of, without_compensation
@@ -36,7 +36,7 @@ def try_approach(arguments: Sequence[str]) -> int:
     frozen = frozen_hash(settings.models())
     # Files first: whoever reads the table may leave early.
     if settings.summary is not None:
-        settings.summary.write_text(json.dumps(_summary(ended, frozen), indent=2) + "\n", encoding="utf-8")
+        write_json("--summary", settings.summary, _summary(ended, frozen))
     if settings.picture is not None and ended:
         if len(ended) == 1:
             draw_run(*ended[0], frozen, settings.picture)

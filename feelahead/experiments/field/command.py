@@ -1,6 +1,5 @@
 """Look ahead at things that stand at known distances, and say where each strength begins and what that took."""
 
-import json
 import math
 import sys
 import time
@@ -16,7 +15,7 @@ from rich.table import Table
 
 from common.command.command_line import parse_settings
 from common.files.input_file import require_input_file
-from common.files.output_file import require_output_file
+from common.files.output_file import require_output_file, write_json
 from feelahead.approaches.frozen import SITE, frozen_hash, frozen_scene
 from feelahead.approaches.pictures import PICTURES
 from feelahead.approaches.progress import progress
@@ -83,7 +82,7 @@ def try_field(arguments: Sequence[str]) -> int:
     # Files first: whoever reads the table may leave early.
     if settings.summary is not None:
         figures = {name: [_figures(look) for look in looks] for name, looks in found.items()}
-        settings.summary.write_text(json.dumps({"scenes": figures, "frozen": frozen}, indent=2) + "\n")
+        write_json("--summary", settings.summary, {"scenes": figures, "frozen": frozen})
     if settings.picture is not None:
         draw(found, frozen, settings.picture)
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)

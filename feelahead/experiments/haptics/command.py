@@ -22,7 +22,7 @@ from rich.table import Table
 
 from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
-from common.files.output_file import require_output_file
+from common.files.output_file import output_file, require_output_file
 from feelahead.approaches.kept import Kept
 from feelahead.approaches.processes import in_processes
 from feelahead.approaches.progress import progress
@@ -184,7 +184,7 @@ def _cells(off: Sequence[Result], those: Sequence[Result], limit_s: float, *, pa
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
     """A line for each trial."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with output_file("--csv", path) as file:
         writer = csv.writer(file)
         writer.writerow(["scene", "delay_ms", "arm", "seed", *(column.name for column in fields(Result))])
         writer.writerows([row.scene, row.delay_ms, row.arm, row.seed, *astuple(row.result)] for row in rows)

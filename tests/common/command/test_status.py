@@ -144,7 +144,7 @@ def test_a_json_reader_that_has_gone_is_noticed(monkeypatch: pytest.MonkeyPatch)
     stream = os.fdopen(write_end, "w", encoding="utf-8")
     os.close(read_end)
     monkeypatch.setattr(sys, "stdout", stream)
-    with Status("json", "robot") as status, pytest.raises(BrokenPipeError):
+    with pytest.raises(BrokenPipeError), Status("json", "robot") as status:
         status.show(0.0, {"tick": 0})
     with contextlib.suppress(BrokenPipeError):
         stream.close()

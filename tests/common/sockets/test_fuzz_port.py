@@ -9,9 +9,9 @@ import pytest
 
 from common.clock import MonotonicClock
 from common.sockets import robot as robot_sockets
-from common.sockets import shell
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES
@@ -116,7 +116,7 @@ def test_handshakes_cut_off_at_every_byte(robot: RobotSockets, operator: Operato
 
 
 def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shell, "HANDSHAKE_LIMIT_S", 0.2)
+    monkeypatch.setattr(robot_sockets, "HANDSHAKE_LIMIT_S", 0.2)
     with RobotSockets(EPHEMERAL) as robot:
         slow = [RawConnection(port_of(robot.control_endpoint), GREETING[:length]) for length in (0, 1, 10, 63, 64)]
         assert all(connection.ended() for connection in slow)
@@ -129,6 +129,29 @@ def test_five_hundred_connections_at_once_keep_nobody_out(robot: RobotSockets, o
     for connection in crowd:
         connection.close()
     assert until_descriptors_are(before, robot)
+
+
+def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
+    with (
+        RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot,
+        OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator,
+    ):
+        assert is_heard(robot, operator)
+        for endpoint in (robot.control_endpoint, robot.view_endpoint):
+            before = robot.crowded
+            crowd = [RawConnection(port_of(endpoint)) for _ in range(100)]
+            assert any(robot.crowded >= before + 80 for _ in range(ROUNDS) if robot.wait(0.01) or not robot.receive())
+            assert all(connection.ended() for connection in crowd[:70])
+            assert is_heard(robot, operator)
+            for connection in crowd:
+                connection.close()
+        [told] = robot.news()
+        assert "more than 20 connections at once" in told
+        assert robot.news() == []
+        # One that is quick still gets in.
+        with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as late:
+            assert is_heard(robot, late)
 
 
 @pytest.mark.parametrize("claimed", [CONTROL_LIMIT_BYTES + 1, 10**6, 2**31, 2**62, 2**63, 2**64 - 1])

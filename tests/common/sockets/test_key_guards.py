@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from common.sockets import shell
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import Authenticator, RobotKeys, make_key_pair
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from tests.common.sockets import test_fuzz_port as port

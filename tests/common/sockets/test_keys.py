@@ -1,5 +1,6 @@
 """The folder of keys: what is written, who may read it, and what is refused in one line."""
 
+import errno
 import os
 import stat
 from collections.abc import Callable
@@ -8,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from common.errors import ConfigurationError
+from common.files.regular_file import read_regular_file
 from common.sockets import keys
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
 from common.sockets.endpoints import parse_bind, refuse_open
-from common.sockets.keys import AllowList, KeyFolder, checked_key, checked_name, read_public_key
+from common.sockets.keys import KeyFolder, checked_key, checked_name, read_public_key
 
 KEY, OTHER = "ab" * 32, "cd" * 32
 
@@ -165,18 +168,88 @@ def test_a_peer_whose_file_changed_to_another_key_is_revoked(folder: KeyFolder) 
     assert allowed.refresh() == {KEY}
 
 
-def test_an_unreadable_list_lets_nobody_in_until_it_is_mended(folder: KeyFolder) -> None:
+def make_dangling(path: Path) -> None:
+    path.symlink_to("nowhere")
+
+
+def make_broken(path: Path) -> None:
+    path.write_text("half a k")
+
+
+@pytest.mark.parametrize("spoil", [make_dangling, make_broken, Path.mkdir, os.mkfifo])
+def test_a_bad_file_excludes_its_own_key_alone_until_it_is_mended(
+    folder: KeyFolder, spoil: Callable[[Path], None]
+) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    folder.allow("ben", OTHER)
+    allowed.refresh()
+    path = folder.peer_path("ben")
+    path.unlink()
+    spoil(path)
+    assert allowed.refresh() == {OTHER}
+    assert allowed.names == {KEY: "anna"}
+    [fault] = allowed.faults
+    assert "ben.public" in fault
+    assert allowed.unreadable is None
+    path.rmdir() if path.is_dir() else path.unlink()
+    folder.allow("ben", OTHER)
+    allowed.refresh()
+    assert (allowed.names, allowed.faults) == ({KEY: "anna", OTHER: "ben"}, ())
+
+
+def test_who_comes_and_goes_beside_a_bad_file_is_noticed(folder: KeyFolder) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    make_dangling(folder.peer_path("ben"))
+    allowed.refresh()
+    folder.revoke("anna")
+    assert allowed.refresh() == {KEY}
+    folder.allow("anna", OTHER)
+    allowed.refresh()
+    assert allowed.names == {OTHER: "anna"}
+
+
+def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
+    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    allowed = AllowList(folder)
+    folder.allow("anna", KEY)
+    folder.allow("ben", OTHER)
+    allowed.refresh()
+    folder.allow("carl", "ef" * 32)  # so that the list is read anew
+
+    def read_late(path: Path, largest_bytes: int) -> bytes:
+        folder.peer_path("anna").unlink(missing_ok=True)
+        return read_regular_file(path, largest_bytes)
+
+    monkeypatch.setattr(keys, "read_regular_file", read_late)
+    assert allowed.refresh() == {KEY}
+    assert allowed.names == {OTHER: "ben", "ef" * 32: "carl"}
+    allowed.refresh()
+    assert (allowed.faults, allowed.unreadable) == ((), None)
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM])
+@pytest.mark.parametrize("where", ["iterdir", "open"])
+def test_who_was_let_in_stays_in_when_nothing_can_be_opened(
+    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch, where: str, number: int
+) -> None:
     allowed = AllowList(folder)
     folder.allow("anna", KEY)
     allowed.refresh()
-    broken = folder.allowed_path / "ben.public"
-    broken.write_text("half a k")
-    assert allowed.refresh() == {KEY}
-    assert allowed.names == {}
-    assert "ben.public" in str(allowed.unreadable)
-    broken.unlink()
-    allowed.refresh()
+    folder.allow("ben", OTHER)
+
+    def short(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(*((Path, "iterdir", short) if where == "iterdir" else (os, "open", short)))
+        assert allowed.refresh() == set()
     assert allowed.names == {KEY: "anna"}
+    assert os.strerror(number) in str(allowed.unreadable)
+    allowed.refresh()
+    assert allowed.names == {KEY: "anna", OTHER: "ben"}
     assert allowed.unreadable is None
 
 
@@ -197,15 +270,6 @@ def test_a_folder_that_vanished_lets_nobody_in(folder: KeyFolder) -> None:
     folder.allowed_path.rename(folder.path / "elsewhere")
     assert allowed.refresh() == {KEY}
     assert allowed.names == {}
-
-
-def test_a_pipe_among_the_peers_lets_nobody_in_and_holds_nobody_up(folder: KeyFolder) -> None:
-    folder.allow("alice", KEY)
-    os.mkfifo(folder.allowed_path / "x.public")
-    peers = AllowList(folder)
-    peers.refresh()
-    assert peers.names == {}
-    assert "is no regular file" in str(peers.unreadable)
 
 
 def test_a_list_that_cannot_be_read_is_not_taken_for_an_empty_one(

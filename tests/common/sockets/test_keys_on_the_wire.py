@@ -1,14 +1,17 @@
 """CURVE over real sockets on loopback: who gets in, who does not, and who is thrown out while running."""
 
+import errno
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import zmq
 
 from common.clock import MonotonicClock
+from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
-from common.sockets.keys import AllowList, KeyFolder
+from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 
@@ -112,9 +115,9 @@ def test_an_unknown_key_gets_nothing_and_both_sides_say_what_to_do(robot: Robot)
     with robot.connect(OperatorKeys(secret, robot.public)) as stranger:
         assert stays_out_and_says(robot, stranger, f"feelahead keys allow NAME {public}")
     assert robot.sockets.refused > 0
-    [told] = robot.sockets.key_news()
+    [told] = robot.sockets.news()
     assert f"feelahead keys allow NAME {public} --folder {robot.folder.path}" in told
-    assert robot.sockets.key_news() == []
+    assert robot.sockets.news() == []
 
 
 def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> None:
@@ -200,6 +203,25 @@ def test_a_revoked_peer_that_keeps_its_connection_is_dropped_message_by_message(
         assert robot.sockets.revoked > 0
 
 
+def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    def short(*_: object) -> None:
+        raise zmq.ZMQError(errno.EMFILE)
+
+    with robot.operator("anna") as anna, robot.operator("ben") as ben:
+        assert gets_in(robot, anna)
+        assert gets_in(robot, ben)
+        robot.folder.revoke("anna")
+        with monkeypatch.context() as patch:
+            patch.setattr(robot.sockets, "_open_view", short)
+            robot.sockets.refresh_keys()
+            robot.sockets.refresh_keys()
+            robot.sockets.publish(b"telemetry", b"state")
+        robot.sockets.refresh_keys()
+        assert gets_in(robot, ben)
+        exchange(robot, anna, 0.1, until_both=False)  # what was under way
+        assert stays_out(robot, anna)
+
+
 def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
     with robot.operator("anna") as anna:
         assert gets_in(robot, anna)
@@ -207,5 +229,5 @@ def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
         robot.sockets.refresh_keys()
         exchange(robot, anna, 0.05, until_both=False)
         assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
-        assert any("nobody is let in" in text and "chmod 700" in text for text in robot.sockets.key_news())
-        assert robot.sockets.key_news() == []
+        assert any("nobody is let in any more" in text and "chmod 700" in text for text in robot.sockets.news())
+        assert robot.sockets.news() == []

@@ -1,0 +1,94 @@
+"""A stream that never holds anybody up: a reader that stalls loses what does not fit, and nothing waits for it."""
+
+import io
+import os
+import queue
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, TextIO
+
+_WAITING: Final = 64
+"""Texts that wait for a reader; what comes while so many do is dropped."""
+_END_S: Final = 0.5
+"""How long the last of them may take."""
+
+
+class PatientOutput(io.TextIOBase):
+    """Writes to a stream by a thread of its own while the context is open, and directly before and after it.
+
+    Not through the stream's buffer: whoever flushes that at the end would wait for the thread.
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        """`stream` None drops everything."""
+        self._stream = stream
+        self._sink = _sink(stream)
+        self._failure: Exception | None = None
+        self._waiting: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        # A daemon: a write that never returns must not keep the process from ending.
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> "PatientOutput":
+        self._thread = threading.Thread(target=self._write_on, daemon=True, name="output")
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._thread is not None:
+            self._waiting.put(None)
+            self._thread.join(_END_S)
+            if not self._thread.is_alive():
+                self._thread = None
+        if kind is None:
+            self._raise_failure()
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """The stream's."""
+        return getattr(self._stream, "encoding", None) or "utf-8"
+
+    def isatty(self) -> bool:
+        """Whether a person reads it."""
+        return self._stream is not None and self._stream.isatty()
+
+    def write(self, text: str) -> int:
+        """Have it written whole, or dropped; once, the error of an earlier one, after which all is dropped."""
+        self._raise_failure()
+        if self._thread is None:
+            self._sink(text)
+        elif self._waiting.qsize() < _WAITING:
+            self._waiting.put(text)
+        return len(text)
+
+    def _raise_failure(self) -> None:
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def _write_on(self) -> None:
+        while (text := self._waiting.get()) is not None:
+            try:
+                self._sink(text)
+            except (OSError, ValueError) as error:  # gone, full, or without these letters
+                self._failure, self._sink = error, _sink(None)
+
+
+def _sink(stream: TextIO | None) -> Callable[[str], object]:
+    """What writes a text to `stream` at once."""
+    if stream is None:
+        return len
+    try:
+        stream.flush()
+        descriptor = stream.fileno()
+    except io.UnsupportedOperation:
+        return stream.write  # in memory, where nothing stalls
+
+    def write(text: str) -> None:
+        left = text.encode(stream.encoding, stream.errors or "strict")
+        while left:
+            left = left[os.write(descriptor, left) :]
+
+    return write

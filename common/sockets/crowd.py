@@ -1,0 +1,45 @@
+"""How many connections one port bears: whoever has been introduced stays, and of the others the newest."""
+
+from collections.abc import Iterator
+
+
+class Crowd:
+    """The connections of one port by their descriptors; without I/O."""
+
+    def __init__(self, limit: int, introduced_s: float) -> None:
+        """At most `limit` at once; one that is `introduced_s` old has been introduced, or else would be gone."""
+        self.hung_up = 0
+        """Connections that were one too many."""
+        self.limit = limit
+        self._introduced_s = introduced_s
+        self._newcomers: dict[int, float] = {}
+        """When each came, the oldest first."""
+        self._known: set[int] = set()
+
+    def came(self, descriptor: int, now_s: float) -> None:
+        """A connection was accepted."""
+        self.went(descriptor)
+        self._newcomers[descriptor] = now_s
+
+    def spoke(self, descriptor: int) -> None:
+        """A message came by it that only who has been introduced can send."""
+        if self._newcomers.pop(descriptor, None) is not None:
+            self._known.add(descriptor)
+
+    def went(self, descriptor: int) -> None:
+        """It ended; its number may stand for another one next."""
+        self._newcomers.pop(descriptor, None)
+        self._known.discard(descriptor)
+
+    def surplus(self, now_s: float) -> Iterator[int]:
+        """Whom to hang up on: those who came first of the newcomers, so that one who is quick gets in in any crowd."""
+        while self._newcomers:
+            descriptor, came_s = next(iter(self._newcomers.items()))
+            if now_s - came_s >= self._introduced_s:
+                self.spoke(descriptor)
+            elif len(self._newcomers) + len(self._known) > self.limit:
+                del self._newcomers[descriptor]
+                self.hung_up += 1
+                yield descriptor
+            else:
+                return
