@@ -17,8 +17,8 @@ from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, 
 PEER_LIMIT_PER_S = 5000
 """A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
 HANDSHAKE_LIMIT_S = 5.0
-"""A connection that has not introduced itself by then ends. A CURVE handshake takes two round trips, seen from here, and
-one of 2 s is the longest that a session bears."""
+"""A connection that has not introduced itself by then ends. A CURVE handshake takes two round trips, seen from here, of
+2 s at most in a session."""
 MOST_CONNECTIONS = 1024
 """To each port, and never more than a quarter of the descriptors that this process may open."""
 _REMEMBERED_PEERS = 1024

@@ -9,6 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from feelahead.approaches.pictures import LAW_COLOURS
+from feelahead.approaches.pulls import PULL_KINDS
+from feelahead.benchmarks.coverage.cells import LINKS
 
 _MARKS: Final = ("o", "s", "^", "D")
 Row = dict[str, Any]
@@ -60,7 +62,9 @@ def pull_table(rows: Sequence[Row], law: str) -> Table:
     table = Table(title=f"{law}, by pull and link", box=MARKDOWN)
     for heading in ("pull", "link", "P", "cells that hold", "covered", "least", "false alarms a minute", "most"):
         table.add_column(heading)
+    links = list(LINKS)
     mine = [row for row in rows if row["law"] == law]
+    mine.sort(key=lambda row: (PULL_KINDS.index(row["pull"]), links.index(row["link"])))
     for key, group in _grouped(mine, ("pull", "link", "probability")):
         judged = [one for one in group if one["coverage"] is not None]
         pulled = [one for one in group if one["alarms_per_min"] is not None]
