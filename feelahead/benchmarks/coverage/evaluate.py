@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray
-from common.reaction import HORIZON_S
+from common.reaction import HORIZON_S, REACTION_S
 from feelahead.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.approaches.recording import record_approach
 from feelahead.approaches.spoilt import Spoil
@@ -51,6 +51,10 @@ class Row:
     """Median over the places: how much too late full strength stands, of those in which it does before the touch."""
     never: float | None
     """Share of the places in which it does not."""
+    reported: int
+    """Draws in which the operator side has a report of the drift or turn, if any, 0.25 s before the last moment."""
+    reported_coverage: float | None
+    """Of these alone; None without any."""
     mean_strength: float | None
     """In the zone that the finger reaches, 0.25 s before the last moment to let go."""
     places: int
@@ -73,6 +77,8 @@ class _Counts:
 
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)
+    reported: int = 0
+    reported_hits: int = 0
     strength: int = 0
     late_s: list[float] = field(default_factory=list)
     alarms: int = 0
@@ -164,6 +170,9 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Cell, staged: Sequence[
             draw = one.draw(collision.shift_m, cell, number)
             judged = stood(law, draw, last_release_s)
             hits += judged.covered
+            if one.replay.knows_aside(last_release_s - REACTION_S):
+                counts.reported += 1
+                counts.reported_hits += judged.covered
             counts.strength += judged.strength
             if number < len(one.avoidable):
                 late_s = 0.0 if judged.covered else lateness_s(law, draw, last_release_s, collision.touch_s)
@@ -222,6 +231,8 @@ def _row(
         holds=None if covered is None else covered.holds(probability),
         late_ms=1e3 * float(np.median(came)) if (came := [late for late in counts.late_s if late < math.inf]) else None,
         never=1.0 - len(came) / len(counts.late_s) if counts.late_s else None,
+        reported=counts.reported,
+        reported_coverage=counts.reported_hits / counts.reported if counts.reported else None,
         mean_strength=counts.strength / draws if draws else None,
         places=sum(len(one.collisions) for one in staged),
         not_found=sum(one.sought - len(one.collisions) for one in staged),

@@ -31,6 +31,7 @@ _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
 """In the finger's time constants: from full travel to the dead zone it takes 3."""
 _COASTING_STEPS = 100
+_LOOKED_S = 0.03
 
 
 class Replay:
@@ -144,6 +145,21 @@ class Replay:
         twist = self._jacobians[row] @ self.record.joint_velocities_rad_s[row]
         axis = self._axes[row]
         return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
+
+    def knows_aside(self, time_s: float) -> bool:
+        """Whether the operator side's newest report at `time_s` is of a tool that does move aside, if it ever does."""
+        seen_s = float(self.record.seen_sent_s[self.record.tick_row(time_s)])
+        return seen_s >= self._aside_seen_s
+
+    @cached_property
+    def _aside_seen_s(self) -> float:
+        """When it has gone aside, at half of what full sticks ask, for so long that every place was looked from."""
+        motion = self.motion
+        for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
+            across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))
+            if across > 0.5 * motion.stick_speed_m_s or turning > 0.5 * motion.turn_speed_rad_s:
+                return float(time_s) + _LOOKED_S
+        return -math.inf
 
     def under_way_m(self, time_s: float) -> float:
         """How far the true tool still goes along the axis until the command that is sent at `time_s` arrives."""

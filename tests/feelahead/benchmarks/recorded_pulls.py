@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 from feelahead.approaches.frozen import SITE, frozen_scene
+from feelahead.approaches.pulls import PullKind
 from feelahead.approaches.recording import RecordedApproach, record_approach
 from feelahead.benchmarks.coverage.cells import LINKS
 from feelahead.benchmarks.coverage.collisions import first_touch_s, last_release_s
@@ -19,13 +20,15 @@ SEED = 1
 
 
 @cache
-def recorded(link: str = "") -> RecordedApproach:
-    return record_approach("steady", link, SEED, duration_s=2.0)
+def recorded(link: str = "", pull: PullKind = "steady") -> RecordedApproach:
+    return record_approach(pull, link, SEED, duration_s=2.0)
 
 
-def staged(scene_name: str, link: str = "", ahead_m: float = 0.0) -> tuple[Replay, PosedScene, Draw]:
+def staged(
+    scene_name: str, link: str = "", ahead_m: float = 0.0, pull: PullKind = "steady"
+) -> tuple[Replay, PosedScene, Draw]:
     scene = load_scene(frozen_scene(scene_name), SITE)
-    posed, replay = PosedScene(scene), Replay(recorded(link), scene, EncoderSettings(), SEED)
+    posed, replay = PosedScene(scene), Replay(recorded(link, pull), scene, EncoderSettings(), SEED)
     posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], ahead_m * replay.axis)
     errors_m = np.zeros((len(scene.objects), 3))
     return replay, posed, Draw(replay, posed.perceived(errors_m), 0.003)

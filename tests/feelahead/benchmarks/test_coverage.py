@@ -185,6 +185,17 @@ def test_a_cell_has_what_it_takes_to_judge_it() -> None:
     assert beside["swept"].alarms_per_min == 0.0
 
 
+def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
+    drifting = staged("wall", LINKS["50 ms"], pull="drift")[0]
+    times = drifting.record.began_s + np.arange(0.0, 0.8, 0.01)
+    known = np.array([drifting.knows_aside(float(time_s)) for time_s in times])
+    # There and back, with jitter, and 30 ms to look from all places; and the arm has to start.
+    assert 0.1 < times[int(np.argmax(known))] - drifting.record.began_s < 0.3
+    assert known[int(np.argmax(known)) :].all()
+    steady = staged("wall")[0]
+    assert steady.knows_aside(steady.record.began_s)
+
+
 def test_the_same_seed_gives_the_same_rows_and_a_spoilt_law_others() -> None:
     again = judged.__wrapped__()
     assert again == judged()
