@@ -55,7 +55,8 @@ class MujocoArm:
             np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start),
         )
         """Where the joints (n,) end, lowest and highest"""
-        self._reference = JointReference(start, *self.ends_rad, limits or MotionLimits())
+        limits = limits or MotionLimits()
+        self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         self._joint_damping: FloatArray = model.dof_damping[robot.arm_velocities].copy()
         self._acceleration: FloatArray = np.zeros(model.nv)
         self._inertial: FloatArray = np.zeros(model.nv)

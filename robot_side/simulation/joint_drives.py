@@ -9,6 +9,7 @@ from common.arrays import BoolArray, FloatArray
 # The stiffness of what this controller closes itself; servos of the model bring their own.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
+_MOST_WINDUP_RAD = 0.02
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,18 @@ class JointDrives:
     offset: FloatArray
     stiffness: FloatArray
     damping: FloatArray
+    strongest: FloatArray
+    """The greatest torque, N m, or force, N, that it gives; infinite where the model does not say"""
+
+    def windup_rad(self, least_rad: float) -> FloatArray:
+        """How far a reference may lead each joint (n,): until a servo gives an eighth of what it can.
+
+        No less than least_rad, and at most 20 mrad, which every other drive has.
+        """
+        stiffness = self.gear**2 * self.stiffness
+        known = (stiffness > 0.0) & np.isfinite(self.strongest)
+        pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
+        return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
 
     @property
     def is_motor(self) -> BoolArray:

@@ -19,8 +19,9 @@ class MotionLimits:
     deceleration_rad_s2: float = 12.0
     """How fast the reference stops when a command has run out."""
     windup_rad: float = 0.005
-    """How far the reference may run ahead of a joint that something holds back: the built-in arm's large joints press
-    with 20 N m then, some 30 N at the tool, and hardly spring when that gives way."""
+    """How far the reference may run ahead of a joint that something holds back, unless the caller says more for weak
+    drives. The built-in arm's large joints press with 20 N m then, some 30 N at the tool, and hardly spring when that
+    gives way."""
 
     def __post_init__(self) -> None:
         for name in ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "windup_rad"):
@@ -40,15 +41,24 @@ class JointReference:
     """References (n,) for position, velocity and acceleration: they follow a command until it runs out, then stop."""
 
     def __init__(
-        self, position_rad: FloatArray, lower_rad: FloatArray, upper_rad: FloatArray, limits: MotionLimits
+        self,
+        position_rad: FloatArray,
+        lower_rad: FloatArray,
+        upper_rad: FloatArray,
+        limits: MotionLimits,
+        windup_rad: FloatArray | None = None,
     ) -> None:
-        """Stand at `position_rad` (n,); lower_rad and upper_rad (n,) may be infinite."""
+        """Stand at `position_rad` (n,), between lower_rad and upper_rad (n,), which may be infinite.
+
+        windup_rad (n,): that of each joint, in place of the limits'.
+        """
         self.position_rad: FloatArray = np.clip(position_rad, lower_rad, upper_rad)
         self.velocity_rad_s: FloatArray = np.zeros_like(self.position_rad)
         self.acceleration_rad_s2: FloatArray = np.zeros_like(self.position_rad)
         self._lower_rad = lower_rad
         self._upper_rad = upper_rad
         self._limits = limits
+        self._windup_rad = np.full(self.position_rad.shape, limits.windup_rad) if windup_rad is None else windup_rad
         self._stopped: FloatArray = np.zeros_like(self.position_rad)
         self._command = self._stopped
         self._valid_until_s = -math.inf
@@ -97,5 +107,10 @@ class JointReference:
         self.velocity_rad_s = velocity
         way = velocity * step_s
         moved = np.clip(position + way, self._lower_rad, self._upper_rad)
-        lead = limits.windup_rad + np.abs(way)
-        self.position_rad = np.clip(moved, measured_position_rad - lead, measured_position_rad + lead)
+        # What a load has made of the lead stays: a reference that followed the joint back would let it sink.
+        lead = self._windup_rad + np.abs(way)
+        self.position_rad = np.clip(
+            moved,
+            np.minimum(position, measured_position_rad - lead),
+            np.maximum(position, measured_position_rad + lead),
+        )

@@ -94,6 +94,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
             offset=model.actuator_biasprm[actuators, 0].copy(),
             stiffness=-model.actuator_biasprm[actuators, 1],
             damping=-model.actuator_biasprm[actuators, 2],
+            strongest=_strongest(model, actuators),
         ),
         finger_positions=model.jnt_qposadr[fingers].astype(np.int64),
         finger_velocities=model.jnt_dofadr[fingers].astype(np.int64),
@@ -103,6 +104,12 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
         gripper_geoms=geoms,
         geom_on_finger=np.array([int(model.geom_bodyid[geom]) in moved for geom in geoms], dtype=bool),
     )
+
+
+def _strongest(model: Any, actuators: IntArray) -> FloatArray:
+    """The greatest torque or force at the joint (n,) that `actuators` (n,) give; infinite without a limit."""
+    most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]
+    return np.where(model.actuator_forcelimited[actuators].astype(bool), most, np.inf)
 
 
 def _fingerprint(model: Any, joints: IntArray, site: int) -> str:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from robot_side.simulation.joint_drives import JointDrives
 from robot_side.simulation.joint_reference import JointReference, MotionLimits
+from robot_side.simulation.scene import load_scene
 
 STEP_S = 0.001
 LIMITS = MotionLimits(velocity_rad_s=2.0, acceleration_rad_s2=8.0, deceleration_rad_s2=12.0, windup_rad=0.02)
@@ -98,6 +99,34 @@ def test_a_blocked_joint_winds_nothing_up() -> None:
     np.testing.assert_allclose(reference.position_rad, [LIMITS.windup_rad + 1.0 * STEP_S, 0.0])
 
 
+def test_a_load_does_not_draw_the_reference_along() -> None:
+    reference = standing()
+    for command in (np.zeros(2), np.array([-0.1, 0.0])):
+        reference.command(command, 10.0)
+        before = reference.position_rad.copy()
+        for step in range(100):
+            reference.advance(step * STEP_S, STEP_S, before - [0.05, 0.0], np.zeros(2))
+        # It stays where it is under a load that it was not told of, and goes with it where it is told to.
+        assert reference.position_rad[0] == (
+            before[0] if command[0] == 0.0 else pytest.approx(before[0] - 0.01, abs=2e-3)
+        )
+
+
+def test_weak_servos_and_other_drives_may_lead_farther() -> None:
+    nothing = np.zeros(4)
+    drives = JointDrives(
+        gear=np.array([1.0, 2.0, 1.0, 1.0]),
+        gain=nothing,
+        offset=nothing,
+        stiffness=np.array([4000.0, 12.5, 50.0, 0.0]),
+        damping=nothing,
+        strongest=np.array([150.0, 5.0, np.inf, 87.0]),
+    )
+    # An eighth of 5 N m at 2² 12.5 N m/rad is 12.5 mrad.
+    np.testing.assert_allclose(drives.windup_rad(0.005), [0.005, 0.0125, 0.02, 0.02])
+    np.testing.assert_allclose(load_scene().robot.drives.windup_rad(0.005), 0.005)
+
+
 def test_velocity_into_a_position_limit_ends_at_it() -> None:
     reference = JointReference(np.array([0.0, 0.0]), np.array([-1.0, -1.0]), np.array([0.1, 1.0]), LIMITS)
     reference.command(np.array([1.0, 0.1]), 10.0)
@@ -138,6 +167,7 @@ def test_each_kind_of_drive_gives_the_torque_that_is_wanted() -> None:
         gear=np.array([2.0, 2.0, 5.0]),
         gain=np.array([300.0, 40.0, 3.0]),
         offset=np.array([1.0, -1.0, 0.0]),
+        strongest=np.full(3, np.inf),
         stiffness=np.array([100.0, 0.0, 0.0]),
         damping=np.array([10.0, 40.0, 0.0]),
     )
