@@ -55,6 +55,8 @@ class ComparisonSettings:
     """Each way, in milliseconds."""
     jitter: Annotated[float, tyro.conf.arg(metavar="MS")] = 10.0
     """Standard deviation of each delay above 0."""
+    camera_mm: Annotated[float, tyro.conf.arg(metavar="MM")] = 3.0
+    """How far wrong the camera is, and is known to be: standard deviation along each axis."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
     seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 30
@@ -83,6 +85,8 @@ class ComparisonSettings:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 10000 seconds")
         if not 0.0 <= self.jitter <= 1000.0:
             raise ValueError(f"--jitter {self.jitter}: valid: 0 to 1000 milliseconds")
+        if not 0.0 <= self.camera_mm <= 1000.0:
+            raise ValueError(f"--camera-mm {self.camera_mm}: valid: 0 to 1000 millimetres")
         if not 1.0 <= self.tick <= 10.0:
             raise ValueError(f"--tick {self.tick}: valid: 1 to 10 milliseconds")
         require_output_file("--resume", self.resume)
@@ -112,7 +116,7 @@ def compare(settings: ComparisonSettings) -> list[Row]:
     """Every trial, in the order of scenes, delays, arms and seeds; all others before another seed is begun."""
     keys = list(product(settings.scenes, settings.delays, ARMS, range(settings.seeds)))
     names = {key: "{}/{:g} ms/{}/{}".format(*key) for key in keys}
-    same = ("jitter", "link_model", "duration", "tick", "person")
+    same = ("jitter", "camera_mm", "link_model", "duration", "tick", "person")
     kept = Kept(settings.resume, {"trials": {name: asdict(settings)[name] for name in same}})
     todo = sorted((key for key in keys if names[key] not in kept.done), key=lambda key: key[-1])
     trials = [
@@ -125,6 +129,7 @@ def compare(settings: ComparisonSettings) -> list[Row]:
             settings.duration,
             settings.link_model,
             1e-3 * settings.tick,
+            1e-3 * settings.camera_mm,
         )
         for scene, delay_ms, arm, seed in todo
     ]

@@ -15,7 +15,7 @@ from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.main import TICK_PERIOD_S
 from robot_side.objects.perceived import Role
 from robot_side.placing import Placing
-from robot_side.settings import RobotSettings
+from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import load_scene
@@ -44,6 +44,7 @@ class Trial:
     link_model: LinkModel = "datagram"
     tick_period_s: float = TICK_PERIOD_S
     """Of the robot side"""
+    camera_sd_m: float = CameraSettings().sd_m
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,13 @@ class _Watch:
         self._next_s = -math.inf
         self.loopback = Loopback(
             LoopbackSettings(
-                RobotSettings(link=trial.link, link_model=trial.link_model, seed=trial.seed, scene=trial.scene),
+                RobotSettings(
+                    link=trial.link,
+                    link_model=trial.link_model,
+                    seed=trial.seed,
+                    scene=trial.scene,
+                    camera=CameraSettings(sd_m=trial.camera_sd_m),
+                ),
                 OperatorSettings(
                     link=trial.link,
                     link_model=trial.link_model,

@@ -136,6 +136,7 @@ def test_each_scene_is_drawn(tmp_path: Path) -> None:
         (["--delays", "1000"], "1000"),
         (["--delays", "5", "5"], "5.0 5.0"),
         (["--jitter", "-1"], "-1"),
+        (["--camera-mm", "-1"], "-1"),
         (["--tick", "0"], "0"),
         (["--scenes", "attic"], "attic"),
     ],
