@@ -10,6 +10,7 @@ from common.command.status import StatusMode
 from common.emulation.clauses import LinkModel
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
+from common.files.output_file import require_output_file
 from common.units import parse_duration
 
 _LARGEST_ASYMMETRY_S = 10.0
@@ -54,10 +55,7 @@ class RunOptions:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
-        if self.summary is not None and self.summary.is_dir():
-            raise ValueError(f"--summary {self.summary}: is a folder; valid: a file's path")
-        if self.summary is not None and not self.summary.absolute().parent.is_dir():
-            raise ValueError(f"--summary {self.summary}: there is no folder {self.summary.absolute().parent}")
+        require_output_file("--summary", self.summary)
 
     def link_spec(self) -> LinkSpec:
         """The emulated link, with this run's seed; ConfigurationError for a bad one."""

@@ -29,7 +29,8 @@ class _Console(Console):
 class Status:
     """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error.
 
-    Nothing waits for whoever reads: what a reader that stalls has no room for is dropped.
+    Nothing waits for whoever reads: what a reader that stalls has no room for is dropped. A note after the context is
+    a result, which waits for its reader.
     """
 
     def __init__(self, mode: StatusMode, program: str) -> None:
@@ -44,7 +45,13 @@ class Status:
     def __enter__(self) -> "Status":
         self._output.__enter__()
         if self._mode == "line" and self._console.is_terminal:
-            self._live = Live(console=self._console, auto_refresh=False, transient=False)
+            self._live = Live(
+                console=self._console,
+                auto_refresh=False,
+                transient=False,
+                redirect_stdout=False,
+                redirect_stderr=False,  # errors are not dropped, as the line may be
+            )
             self._live.start()
         return self
 

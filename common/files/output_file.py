@@ -3,6 +3,8 @@
 import json
 import os
 import secrets
+import stat
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,10 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
         return
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise ValueError(f"{flag} {path}: is a folder, or its folder is not there; valid: a file's path")
+    end = os.path.realpath(path)
+    # Links that lead in a circle end at one of them.
+    if os.path.lexists(end) and not os.access(end, os.W_OK):
+        raise ValueError(f"{flag} {path}: cannot be written to; valid: a file's path")
     if endings and path.suffix.lower() not in endings:
         raise ValueError(f"{flag} {path}: valid: a file's path that ends in {', '.join(endings)}")
 
@@ -25,23 +31,55 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
 def output_file(flag: str, path: Path) -> Iterator[TextIO]:
     """`path`, open for text, lines as they are given; what was there before stays until all of the new is written.
 
-    ConfigurationError, in one line of `flag`, when the system does not let us write it, as on a full disk.
+    Where a new file would not be the same to others (a pipe, a second name, another's file), the old one is written to
+    instead. ConfigurationError, in one line of `flag`, when the system does not let us, as on a full disk.
     """
-    end = path.resolve()  # a link stays a link
-    # A pipe or a device cannot be replaced, and a file in a folder that is not ours may not be.
-    replaced = (path.is_file() or not path.exists()) and os.access(end.parent, os.W_OK)
-    written = end.with_name(f".feelahead-{secrets.token_hex(8)}") if replaced else path
+    end = Path(os.path.realpath(path))  # a link stays a link
+    new = end.with_name(f".feelahead-{secrets.token_hex(8)}")
+    replaced = False
     try:
-        with written.open("x" if replaced else "w", newline="", encoding="utf-8") as file:
+        old = _state(path)
+        own = _own_output(old)
+        replaced = own is None and _replaceable(path, end, old)
+        place = new if replaced else path if own is None else own
+        with open(place, "w", newline="", encoding="utf-8", closefd=own is None) as file:
+            if replaced and old is not None:
+                os.fchmod(file.fileno(), stat.S_IMODE(old.st_mode))
             yield file
         if replaced:
-            written.replace(end)
+            new.replace(end)
     except OSError as error:
         reason = f"{error.strerror}; valid: a place that can be written to, with room for it"
         raise ConfigurationError(f"{flag} {path}: cannot be written: {reason}") from error
     finally:
         if replaced:
-            written.unlink(missing_ok=True)
+            new.unlink(missing_ok=True)
+
+
+def _state(path: Path) -> os.stat_result | None:
+    """What is there; None where nothing is."""
+    try:
+        return path.stat()
+    except FileNotFoundError:
+        return None
+
+
+def _own_output(old: os.stat_result | None) -> int | None:
+    """Our own output or error stream where that is what is written to; it goes on where the stream has come to."""
+    for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
+        if old is not None and stream is not None and os.path.samestat(old, os.fstat(descriptor)):
+            stream.flush()
+            return descriptor
+    return None
+
+
+def _replaceable(path: Path, end: Path, old: os.stat_result | None) -> bool:
+    """Whether another file at `end` is the same to everybody: not a pipe, a file of others, or one of two names."""
+    if old is None:
+        return os.access(end.parent, os.W_OK)
+    plain = stat.S_ISREG(old.st_mode) and path.absolute().parts[1] not in ("dev", "proc")
+    ours = (old.st_uid, old.st_gid, old.st_nlink) == (os.geteuid(), os.getegid(), 1)
+    return plain and ours and os.access(end, os.W_OK) and os.access(end.parent, os.W_OK)
 
 
 def write_json(flag: str, path: Path, figures: Any) -> None:

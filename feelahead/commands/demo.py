@@ -1,5 +1,6 @@
 """`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
 
+import contextlib
 import sys
 import tempfile
 import time
@@ -14,7 +15,7 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import LINK_UP, Value
 from common.command.run_options import RunOptions
 from common.command.status import Status
-from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.command.stop_signal import StopSignal
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
@@ -88,29 +89,24 @@ def demo(arguments: Sequence[str]) -> int:
     if (complaint := _too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
     given = given_fields(arguments, DemoSettings)
-    with (
-        tempfile.TemporaryDirectory(prefix="feelahead-") as folder,
-        StopSignal() as stop,
-        Status(settings.status, "feelahead demo") as status,
-    ):
-        for text in unused_clauses(settings.link_spec(), _SENT):
-            status.note(text)
-        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
-        try:
-            errors = _run_both(settings, given, summaries, stop, status)
-        except BrokenPipeError:
-            # Whoever read our status has seen enough; the sides have ended in order.
-            ignore_broken_output()
-            errors = []
-        merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+    errors: list[str] = []
     try:
+        with Status(settings.status, "feelahead demo") as status:
+            with tempfile.TemporaryDirectory(prefix="feelahead-") as folder, StopSignal() as stop:
+                for text in unused_clauses(settings.link_spec(), _SENT):
+                    status.note(text)
+                summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
+                with contextlib.suppress(BrokenPipeError):
+                    errors = _run_both(settings, given, summaries, stop, status)
+                merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+            # Before the report, which waits for its reader.
+            if settings.summary is not None:
+                write_json("--summary", settings.summary, merged)
         for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
             status.note(line)
     finally:
         for error in errors:
             sys.stderr.write(f"feelahead demo: {error}\n")
-        if settings.summary is not None:
-            write_json("--summary", settings.summary, merged)
     return 1 if errors else 0
 
 
@@ -129,7 +125,9 @@ def _run_both(
         operator_arguments = _operator_arguments(settings, given, summaries["operator"], listening)
         with SideProcess("operator_side", "operator", operator_arguments) as operator:
             status.event("started", side="operator", process_id=operator.process_id)
-            errors = _watch(settings, robot, operator, stop, status)
+            errors: list[str] = []
+            with contextlib.suppress(BrokenPipeError):  # whoever read our status has seen enough
+                errors = _watch(settings, robot, operator, stop, status)
             # Both at once: neither is to take the other's end for a fault of the link.
             operator.interrupt()
             robot.interrupt()

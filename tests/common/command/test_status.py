@@ -1,4 +1,5 @@
 import contextlib
+import itertools
 import json
 import os
 import sys
@@ -139,12 +140,29 @@ def test_the_terminal_is_given_back_after_an_error_too(
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
 
 
+def test_errors_do_not_go_with_the_live_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with Status("line", "robot") as status:
+        status.show(0.0, {"tick": 1})
+        sys.stderr.write("something is wrong\n")
+    assert capsys.readouterr().err == "something is wrong\n"
+
+
 def test_a_json_reader_that_has_gone_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     read_end, write_end = os.pipe()
     stream = os.fdopen(write_end, "w", encoding="utf-8")
     os.close(read_end)
     monkeypatch.setattr(sys, "stdout", stream)
-    with pytest.raises(BrokenPipeError), Status("json", "robot") as status:
-        status.show(0.0, {"tick": 0})
+
+    def run() -> None:
+        with Status("json", "robot") as status:
+            for second in itertools.count():
+                status.show(float(second), {"tick": 0})
+
+    with pytest.raises(BrokenPipeError):
+        run()
     with contextlib.suppress(BrokenPipeError):
         stream.close()

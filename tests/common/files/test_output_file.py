@@ -3,12 +3,15 @@
 import errno
 import json
 import os
+import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from common.errors import ConfigurationError
-from common.files.output_file import output_file, write_json
+from common.files.output_file import output_file, require_output_file, write_json
 
 
 def fill_up(path: Path) -> None:
@@ -67,6 +70,90 @@ def test_a_file_in_a_folder_of_others_is_written_where_it_is(tmp_path: Path, mon
     monkeypatch.setattr(os, "access", lambda *_: False)
     write_json("--summary", path, 1)
     assert (path.read_text(), path.stat().st_ino) == ("1\n", before)
+
+
+def test_the_mode_stays(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    path.chmod(0o600)
+    write_json("--summary", path, 1)
+    assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("1\n", 0o600)
+
+
+def test_both_names_of_a_file_lead_to_the_new_one(tmp_path: Path) -> None:
+    path, other = tmp_path / "out.json", tmp_path / "other.json"
+    path.write_text("old")
+    other.hardlink_to(path)
+    write_json("--summary", path, 1)
+    assert other.read_text() == "1\n"
+
+
+@pytest.mark.parametrize("function", ["geteuid", "getegid"])
+def test_another_persons_file_stays_theirs(function: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    before = path.stat().st_ino
+    monkeypatch.setattr(os, function, lambda: 12_345)
+    write_json("--summary", path, 1)
+    assert (path.read_text(), path.stat().st_ino) == ("1\n", before)
+
+
+def test_a_file_that_may_not_be_written_is_refused_before_and_after(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    path.chmod(0o444)
+    before = path.stat().st_ino
+    # Tests may run as root, whom no mode keeps out.
+    monkeypatch.setattr(os, "access", lambda asked, _: Path(asked) != path)
+    with pytest.raises(ValueError, match=r"--summary .*out.json: cannot be written to; valid: "):
+        require_output_file("--summary", path)
+    if os.geteuid() == 0:
+        write_json("--summary", path, 1)
+    else:
+        with pytest.raises(ConfigurationError, match="Permission denied"):
+            write_json("--summary", path, 1)
+    assert path.stat().st_ino == before
+
+
+def test_links_in_a_circle_are_refused_before_and_after(tmp_path: Path) -> None:
+    path, other = tmp_path / "out.csv", tmp_path / "other.csv"
+    path.symlink_to(other)
+    other.symlink_to(path)
+    with pytest.raises(ValueError, match=r"--csv .*out.csv: cannot be written to; valid: "):
+        require_output_file("--csv", path)
+    with pytest.raises(ConfigurationError, match=os.strerror(errno.ELOOP)):
+        write_json("--csv", path, 1)
+    assert path.is_symlink()
+
+
+PRINTS = """
+import sys
+from pathlib import Path
+from common.files.output_file import output_file
+print("before")
+with output_file("--csv", Path(sys.argv[1])) as file:
+    file.write("written\\n")
+print("after")
+"""
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("named", ["out.txt", "/dev/stdout", "link"])
+def test_what_goes_to_the_output_comes_in_its_turn(named: str, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("/dev/stdout")
+    with (tmp_path / "out.txt").open("w") as output:
+        subprocess.run([sys.executable, "-c", PRINTS, tmp_path / named], stdout=output, check=True, timeout=600)
+    assert (tmp_path / "out.txt").read_text() == "before\nwritten\nafter\n"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs open files that have names")
+def test_an_open_file_with_a_name_of_its_own_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    with path.open("w+") as file:
+        write_json("--summary", Path(f"/dev/fd/{file.fileno()}"), 1)
+        assert file.read() == "1\n"
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -1,6 +1,7 @@
 """What the demo passes on to the two sides, and what it says when something ends early."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 
 from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
+from common.command.status import Status
 from common.errors import ConfigurationError
 from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
@@ -103,6 +105,26 @@ def test_errors_go_to_standard_error_in_every_mode(
 ) -> None:
     monkeypatch.setattr(module, "_run_both", lambda *_: ["the robot side ended early"])
     assert demo(["--status", mode]) == 1
+    assert capsys.readouterr().err == "feelahead demo: the robot side ended early\n"
+
+
+def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(*arguments: object) -> list[str]:
+        status = arguments[-1]
+        assert isinstance(status, Status)
+        status.note("to nobody")
+        return ["the robot side ended early"]
+
+    reads, writes = os.pipe()
+    os.close(reads)
+    monkeypatch.setattr(module, "_run_both", run)
+    path = tmp_path / "out.json"
+    with os.fdopen(writes, "w", encoding="utf-8") as gone:
+        monkeypatch.setattr(sys, "stdout", gone)
+        assert demo(["--summary", str(path)]) == 1
+    assert json.loads(path.read_text())["errors"] == ["the robot side ended early"]
     assert capsys.readouterr().err == "feelahead demo: the robot side ended early\n"
 
 
