@@ -66,7 +66,8 @@ class PatientOutput(io.TextIOBase):
                     self._waiting.get_nowait()
             self._waiting.put(text)
         else:
-            self._thread.join()
+            if self._thread.is_alive():
+                self._thread.join()
             self._write(text)
         self._raise_failure()
         return len(text)
