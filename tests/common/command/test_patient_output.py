@@ -52,6 +52,7 @@ def test_a_reader_that_stalls_gets_whole_lines_and_holds_nobody_up() -> None:
                 output.write(line)
         held = os.read(reads, 100_000).decode()
         os.close(reads)
+        output.write("late\n")  # waits for the thread, which would write to whatever has the descriptor next
     assert line * 6 == held[:60_000]
 
 
