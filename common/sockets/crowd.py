@@ -26,6 +26,10 @@ class Crowd:
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
 
+    def holds(self, descriptor: int) -> bool:
+        """Whether it is there, as far as was said."""
+        return descriptor in self._newcomers or descriptor in self._known
+
     def went(self, descriptor: int) -> None:
         """It ended; its number may stand for another one next."""
         self._newcomers.pop(descriptor, None)

@@ -22,8 +22,8 @@ HANDSHAKE_LIMIT_S = 5.0
 MOST_CONNECTIONS = 1024
 """To each port, and never more than a quarter of the descriptors that this process may open."""
 _REMEMBERED_PEERS = 1024
-_EVENTS_PER_CALL = 64
-"""So that connections that come and go cannot hold the caller."""
+_EVENTS_PER_CALL = 256
+"""Of each port, 5 us each, so that connections that come and go cannot hold the caller."""
 
 
 @dataclass
@@ -32,8 +32,8 @@ class _Peer:
 
     key: str
     """Whom it authenticated as; empty without keys."""
-    descriptor: int
-    """The connection's; -1 where it is not known."""
+    descriptor: int = -1
+    """That which its last message came by; -1 where it is not known."""
     received: int = 0
     """Messages in the present second."""
 
@@ -50,18 +50,16 @@ class _Gate:
         self._events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's own thread would wait for us
         self._events.connect(address)
 
-    def look(self, now_s: float) -> None:
-        """Take note of who has come and gone since the last call; never blocks."""
-        for _ in range(_EVENTS_PER_CALL):
-            if not readable(self._events):
-                break
-            event = parse_monitor_message(self._events.recv_multipart())
-            if event["event"] == zmq.EVENT_ACCEPTED:
-                self.crowd.came(event["value"], now_s)
-            else:
-                self.crowd.went(event["value"])
-        for descriptor in self.crowd.surplus(now_s):
-            _shut_down(descriptor)
+    def look(self, now_s: float) -> bool:
+        """Take note of the next that has come or gone; False when there is none; never blocks."""
+        if not readable(self._events):
+            return False
+        event = parse_monitor_message(self._events.recv_multipart())
+        if event["event"] == zmq.EVENT_ACCEPTED:
+            self.crowd.came(event["value"], now_s)
+        else:
+            self.crowd.went(event["value"])
+        return True
 
     def close(self) -> None:
         """Look no more."""
@@ -100,6 +98,10 @@ class RobotSockets(SocketShell):
         """Connections that were ended because there were too many at once."""
         self._told: list[str] = []
         self._peers: dict[bytes, _Peer] = {}
+        self._spoke_by: dict[int, bytes] = {}
+        """Which peer was the last to take up a descriptor, until it is hung up on."""
+        self._all_seen = False
+        """Whether what the gates know of the connections was all there was to know."""
         self._second = 0
         self._reader = Reader(frames=2)
         self._view_endpoint: Endpoint | None = None
@@ -151,6 +153,7 @@ class RobotSockets(SocketShell):
             return
         revoked = self._keys.allowed.refresh()
         if revoked:
+            self._watch_connections()
             for name in [name for name, peer in self._peers.items() if peer.key in revoked]:
                 self._hang_up(name)
             self._view_outdated = True
@@ -203,11 +206,24 @@ class RobotSockets(SocketShell):
         return self.wait_for(timeout_s, [self._control], self._authenticator)
 
     def _watch_connections(self) -> None:
+        """Take note of who has come and gone at both ports, and hang up on who is too many.
+
+        A descriptor may stand for another connection by now, at the other port, too: only when a last look has found
+        nothing new at either is each known to be whose it is. With more than one call takes in, nobody is hung up on.
+        """
         now_s = self._clock.now()
+        self._all_seen = False
+        for _ in range(_EVENTS_PER_CALL):
+            looks = [gate.look(now_s) for gate in self._gates]
+            if not any(looks):
+                self._all_seen = True
+                break
+        else:
+            return
         for gate in self._gates:
-            before = gate.crowd.hung_up
-            gate.look(now_s)
-            self.crowded += gate.crowd.hung_up - before
+            for descriptor in gate.crowd.surplus(now_s):
+                _shut_down(descriptor)
+                self.crowded += 1
 
     def _replace_view(self, keys: RobotKeys) -> None:
         """Nothing can be sent to some viewers and not to others: all of them have to shake hands anew."""
@@ -240,9 +256,12 @@ class RobotSockets(SocketShell):
         if peer is None or peer.key != key:
             if len(self._peers) >= _REMEMBERED_PEERS:
                 del self._peers[next(iter(self._peers))]
-            peer = self._peers[name] = _Peer(key, _descriptor(frame))
-            if self._allows(key):
-                self._gates[0].crowd.spoke(peer.descriptor)
+            peer = self._peers[name] = _Peer(key)
+        if (descriptor := _descriptor(frame)) != peer.descriptor:
+            peer.descriptor = descriptor
+            self._spoke_by[descriptor] = name
+        if self._allows(key):
+            self._gates[0].crowd.spoke(descriptor)
         peer.received += 1
         if not self._allows(key):
             self.revoked += 1
@@ -256,21 +275,21 @@ class RobotSockets(SocketShell):
 
     def _hang_up(self, name: bytes) -> None:
         """End the connection of `name`, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
-        peer = self._peers[name]
-        descriptor, peer.descriptor = peer.descriptor, -1
-        # The number may stand for another connection by now: that of the peer which spoke last from there.
-        owners = [other for other, known in self._peers.items() if known.descriptor == descriptor]
-        if descriptor < 0 or owners:
-            return
-        _shut_down(descriptor)
+        descriptor = self._peers[name].descriptor
+        # The number may stand for another connection by now, or for none.
+        if self._all_seen and self._spoke_by.get(descriptor) == name and self._gates[0].crowd.holds(descriptor):
+            del self._spoke_by[descriptor]
+            _shut_down(descriptor)
 
 
 def _shut_down(descriptor: int) -> None:
     """End a connection that ZeroMQ owns and will close; without a descriptor more, as there may be none left."""
-    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=descriptor)
-    with contextlib.suppress(OSError):
-        connection.shutdown(socket.SHUT_RDWR)
-    connection.detach()
+    with contextlib.suppress(OSError):  # it may have gone this moment
+        connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=descriptor)
+        try:
+            connection.shutdown(socket.SHUT_RDWR)
+        finally:
+            connection.detach()
 
 
 def _property(frame: zmq.Frame, name: str) -> str:

@@ -30,7 +30,7 @@ class Kept:
         self._file = path.open("a+", encoding="utf-8")
         try:
             self._load(path, self._file)
-        except ConfigurationError:
+        except FeelaheadError:
             self.close()
             raise
 
@@ -41,27 +41,31 @@ class Kept:
             text = file.read()
         except BlockingIOError as error:
             raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
+        except OSError as error:
+            raise ConfigurationError(
+                f"--resume {path}: cannot be locked and read: {error.strerror}; valid: a file on another disk"
+            ) from error
         except UnicodeDecodeError as error:
             raise ConfigurationError(
                 f"--resume {path}: it holds no run of this benchmark; valid: a new file"
             ) from error
-        # A line may be torn: whoever wrote it was stopped.
         entries = [entry for line in text.splitlines() if isinstance(entry := _read(line), dict)]
         if text and (not entries or "code" not in entries[0]):
             raise ConfigurationError(f"--resume {path}: it holds no run of this benchmark; valid: a new file")
         if entries and entries[0] != self._setup:
             raise ConfigurationError(f"--resume {path}: it holds a run with other settings or code; valid: a new file")
         if not text:
-            self._write(self._setup)
+            self._write(json.dumps(self._setup))
         elif not text.endswith("\n"):
-            file.write("\n")
-        self.done = {entry["piece"]: entry["records"] for entry in entries if "piece" in entry}
+            self._write("")
+        # A line may be torn: whoever wrote it was stopped.
+        self.done = {entry["piece"]: entry["records"] for entry in entries if {"piece", "records"} <= entry.keys()}
 
     def keep(self, piece: str, records: Records) -> None:
         """Write one piece down at once; one that failed is tried again next time."""
         self.done[piece] = records
         if not any(record.get("kind") == "failed" for record in records):
-            self._write({"piece": piece, "records": records})
+            self._write(json.dumps({"piece": piece, "records": records}))
 
     def close(self) -> None:
         """Let others write to the file."""
@@ -70,10 +74,10 @@ class Kept:
             with contextlib.suppress(OSError):
                 self._file.close()
 
-    def _write(self, entry: dict[str, Any]) -> None:
+    def _write(self, line: str) -> None:
         if self._file is not None:
             try:
-                self._file.write(json.dumps(entry) + "\n")
+                self._file.write(line + "\n")
                 self._file.flush()
             except OSError as error:
                 raise FeelaheadError(f"--resume {self._file.name}: cannot be written: {error.strerror}") from error

@@ -1,11 +1,13 @@
 """Strangers at the open port, by raw TCP: whatever they do, the operator is heard and nothing piles up."""
 
 import contextlib
+import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import zmq
 
 from common.clock import MonotonicClock
 from common.sockets import robot as robot_sockets
@@ -154,6 +156,62 @@ def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.Monkey
             assert is_heard(robot, late)
 
 
+def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
+    """That many strangers are accepted and leave again while the robot side looks at nothing."""
+    before = descriptors()
+    crowd = [RawConnection(port_of(endpoint)) for _ in range(count)]
+    assert any(descriptors() >= before + 2 * count for _ in range(ROUNDS) if not robot.wait(0.01))
+    for connection in crowd:
+        connection.close()
+    assert any(descriptors() <= before for _ in range(ROUNDS) if not robot.wait(0.01))
+
+
+def test_a_crowd_that_has_left_before_anybody_looked_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
+        for endpoint in (robot.control_endpoint, robot.view_endpoint):
+            come_and_go(robot, endpoint, 100)
+            robot.receive()
+        assert robot.crowded == 0
+
+
+def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
+    monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
+    hung_up: list[int] = []
+    monkeypatch.setattr(robot_sockets, "_shut_down", hung_up.append)
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
+        come_and_go(robot, robot.view_endpoint, 100)
+        with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
+            assert is_heard(robot, operator)
+            for _ in range(50):
+                robot.receive()
+            assert hung_up == []
+            assert robot._all_seen
+
+
+def test_what_is_no_connection_any_more_is_left_alone() -> None:
+    reading, writing = os.pipe()
+    robot_sockets._shut_down(reading)
+    os.close(writing)
+    assert os.read(reading, 1) == b""
+    os.close(reading)
+    robot_sockets._shut_down(reading)
+
+
+def test_who_comes_back_by_the_same_name_is_no_stranger(robot: RobotSockets) -> None:
+    before = descriptors()
+    for _ in range(2):
+        with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
+            dealer.setsockopt(zmq.LINGER, 0)
+            dealer.setsockopt(zmq.ROUTING_ID, b"same")
+            dealer.connect(robot.control_endpoint)
+            dealer.send(b"here")
+            assert drain(robot, PATIENT_S) == [b"here"]
+            assert robot._peers[b"same"].descriptor in robot._gates[0].crowd._known
+        assert until_descriptors_are(before, robot)
+
+
 @pytest.mark.parametrize("claimed", [CONTROL_LIMIT_BYTES + 1, 10**6, 2**31, 2**62, 2**63, 2**64 - 1])
 def test_a_frame_that_claims_too_much_ends_its_connection_alone(
     robot: RobotSockets, operator: OperatorSockets, claimed: int
@@ -207,6 +265,33 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
         assert connection.ended()
     assert robot.flooding > 0
     assert received <= 200
+    assert is_heard(robot, operator)
+
+
+def test_a_flood_by_the_descriptor_of_a_peer_that_has_left_is_cut_off(
+    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = descriptors()
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(b"good"))
+        assert drain(robot, PATIENT_S) == [b"good"]
+    assert until_descriptors_are(before, robot)
+    test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(robot, operator, monkeypatch)
+
+
+def test_a_flood_whose_sender_has_left_is_only_counted(
+    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
+    monkeypatch.setattr(robot, "_second", 0)
+    monkeypatch.setattr(robot, "_clock", StandingClock())
+    before = descriptors()
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(b"flood") * 1000)
+    assert any(descriptors() <= before for _ in range(ROUNDS) if not operator.wait(0.01))
+    received = [payload for _ in range(100) for _, payload in robot.receive()]
+    assert received == [b"flood"] * 200
+    assert robot.flooding == 800
     assert is_heard(robot, operator)
 
 

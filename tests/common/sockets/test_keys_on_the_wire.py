@@ -203,6 +203,22 @@ def test_a_revoked_peer_that_keeps_its_connection_is_dropped_message_by_message(
         assert robot.sockets.revoked > 0
 
 
+def test_an_operator_that_has_left_can_be_revoked(robot: Robot) -> None:
+    with robot.operator("anna") as anna:
+        assert gets_in(robot, anna)
+    [peer] = robot.sockets._peers.values()
+    connection = Path(f"/proc/self/fd/{peer.descriptor}")
+    clock = MonotonicClock()
+    end_s = clock.now() + LIMIT_S
+    while connection.exists() and clock.now() < end_s:
+        robot.sockets.wait(0.01)
+        robot.sockets.receive()
+    robot.folder.revoke("anna")
+    robot.sockets.refresh_keys()
+    with robot.operator("ben") as ben:
+        assert gets_in(robot, ben)
+
+
 def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     def short(*_: object) -> None:
         raise zmq.ZMQError(errno.EMFILE)

@@ -1,3 +1,5 @@
+import errno
+import fcntl
 import resource
 from pathlib import Path
 
@@ -40,6 +42,40 @@ def test_what_never_ends_is_not_read() -> None:
     for device in ("/dev/zero", "/dev/full"):
         with pytest.raises(ConfigurationError, match="no regular file"):
             Kept(Path(device), {})
+
+
+def test_a_line_without_records_is_done_again(tmp_path: Path) -> None:
+    path = tmp_path / "kept.jsonl"
+    Kept(path, {}).close()
+    path.write_text(path.read_text() + '{"piece": "one"}\n')
+    kept = Kept(path, {})
+    assert kept.done == {}
+    kept.close()
+
+
+def test_a_disk_that_knows_no_locks_ends_it_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsupported(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", unsupported)
+    with pytest.raises(ConfigurationError, match="cannot be locked and read: No locks available"):
+        Kept(tmp_path / "kept.jsonl", {})
+
+
+def test_a_torn_line_that_cannot_be_ended_for_want_of_room_ends_it_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "kept.jsonl"
+    Kept(path, {}).close()
+    path.write_text(path.read_text() + "torn")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
+    try:
+        with pytest.raises(FeelaheadError, match="cannot be written: File too large") as caught:
+            Kept(path, {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    # It holds the file no more, though the error is still there.
+    Kept(path, {}).close()
+    assert caught.value is not None
 
 
 def test_a_full_disk_ends_it_in_one_line(tmp_path: Path) -> None:
