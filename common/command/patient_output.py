@@ -1,4 +1,4 @@
-"""A stream that never holds anybody up: a reader that stalls loses what does not fit, and nothing waits for it."""
+"""A stream that holds nobody up while its context is open: a reader that stalls loses what does not fit."""
 
 import contextlib
 import io

@@ -127,7 +127,7 @@ def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, fart
 def geom_distance(
     model: Any, data: Any, mine: int, other: int, farthest_m: float, ends: FloatArray | None = None
 ) -> float:
-    """The signed distance between two geoms, at most `farthest_m`; its `ends` (6,) are not known of a height field."""
+    """The signed distance between two geoms, at most `farthest_m`; `ends` (6,) say nothing of a height field."""
     found = mujoco.mj_geomDistance(model, data, mine, other, farthest_m, ends)
     # Of a height field MuJoCo sees the first 50 prisms within that distance, which need not be the nearest.
     while model.geom_type[other] == GeomKind.HFIELD and 0.0 < found < farthest_m:

@@ -19,7 +19,7 @@ LINKS: Final = {
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
 """Scenes that start from another home pose than `empty`: where their approaches are recorded."""
 _NOT_STILL = ("moving", "fleeing", "place_held", "terrain_ahead")
-"""Left to `try approach`: things that move by themselves, or with the gripper, and what MuJoCo knows no distance to."""
+"""Left to `try approach`: things that move by themselves, or with the gripper, and a hill."""
 STILL_AHEAD: Final = tuple(name for name in AHEAD if name not in _NOT_STILL)
 
 

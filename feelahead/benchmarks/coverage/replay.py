@@ -32,6 +32,7 @@ _LONGEST_RETURN = 4.0
 """In the finger's time constants: from full travel to the dead zone it takes 3."""
 _COASTING_STEPS = 100
 _LOOKED_S = 0.03
+"""Within this every place aside has been looked from: each is at least every 20 ms."""
 
 
 class Replay:
@@ -153,7 +154,7 @@ class Replay:
 
     @cached_property
     def _aside_seen_s(self) -> float:
-        """When it has gone aside, at half of what full sticks ask, for so long that every place was looked from."""
+        """When the tool first went aside at half of what full sticks ask, and all places were looked from."""
         motion = self.motion
         for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
             across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))

@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
-from common.files.output_file import output_file
+from common.files.output_file import output_file, require_output_file
 from feelahead.benchmarks.delay.runs import GOAL_S, Outcome, measure, quantile_of_sizes, rms
 from feelahead.benchmarks.delay.traffic import Scenario, scenarios
 from feelahead.benchmarks.report import Goal, Table, show, show_goals
@@ -56,8 +56,7 @@ class DelayEstimatesSettings:
             raise ValueError(f"--seconds {self.seconds}: valid: 1 to 3600")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
-        if self.csv is not None and (self.csv.is_dir() or not self.csv.absolute().parent.is_dir()):
-            raise ValueError(f"--csv {self.csv}: valid: a file in a folder that is there")
+        require_output_file("--csv", self.csv)
 
 
 def bench_delay(arguments: Sequence[str]) -> int:

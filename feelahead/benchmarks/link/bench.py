@@ -19,7 +19,7 @@ from common.emulation.profile import LinkProfile
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
-from common.files.output_file import output_file
+from common.files.output_file import output_file, require_output_file
 from common.realtime.pacing import SPIN_S
 from feelahead.benchmarks.link.real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band, table
@@ -100,8 +100,7 @@ class LinkBenchSettings:
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
         self._refuse_what_would_be_passed_over()
-        if self.csv is not None and (self.csv.is_dir() or not self.csv.absolute().parent.is_dir()):
-            raise ValueError(f"--csv {self.csv}: valid: a file in a folder that is there")
+        require_output_file("--csv", self.csv)
 
     def _refuse_what_would_be_passed_over(self) -> None:
         for name in ("spin", "realtime"):

@@ -15,6 +15,7 @@ from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
+from common.files.output_file import require_output_file
 from feelahead.benchmarks.overlap.accuracy import draw_samples, measure_accuracy
 from feelahead.benchmarks.overlap.classes import MAKERS, frozen_classes
 from feelahead.benchmarks.overlap.distances import measure_distances
@@ -79,11 +80,8 @@ class OverlapBenchSettings:
             raise ValueError(f"--seed {self.seed}: valid: 0 or more")
         if self.peer_header is not None:
             require_input_file("--peer-header", self.peer_header, f"overlap.hpp, from: {SDIST}")
-        for name in ("csv", "write_docs"):
-            path: Path | None = getattr(self, name)
-            if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-                flag = name.replace("_", "-")
-                raise ValueError(f"--{flag} {path}: valid: a file in a folder that is there")
+        require_output_file("--csv", self.csv)
+        require_output_file("--write-docs", self.write_docs)
         if self.figures is not None and self.figures.exists() and not self.figures.is_dir():
             raise ValueError(f"--figures {self.figures}: is a file; valid: a folder")
 

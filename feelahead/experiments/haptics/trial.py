@@ -45,6 +45,7 @@ class Trial:
     tick_period_s: float = TICK_PERIOD_S
     """Of the robot side"""
     camera_sd_m: float = CameraSettings().sd_m
+    """Of the camera's error along each axis, which the law knows"""
 
 
 @dataclass(frozen=True)

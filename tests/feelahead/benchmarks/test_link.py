@@ -79,7 +79,7 @@ def test_a_comparison_prints_every_seed_and_a_verdict(capsys: pytest.CaptureFixt
         (["--virtual", "--realtime"], "--realtime", "where nothing waits"),
         (["--sends", "x.csv"], "--sends x.csv", "--virtual"),
         (["--against", "nowhere.csv"], "nowhere.csv", "delay_ns"),
-        (["--csv", "/nowhere/x.csv"], "/nowhere/x.csv", "a file in a folder"),
+        (["--csv", "/nowhere/x.csv"], "/nowhere/x.csv", "its folder is not there"),
     ],
 )
 def test_bad_input_is_one_line(arguments: list[str], named: str, valid: str) -> None:

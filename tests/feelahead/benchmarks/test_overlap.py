@@ -86,7 +86,7 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
         (["bench", "overlap", "--timed", "0"], "--timed 0", "10 to"),
         (["bench", "overlap", "--adversarial", "-5"], "--adversarial -5", "1 to"),
         (["bench", "overlap", "--seed", "-1"], "--seed -1", "0 or more"),
-        (["bench", "overlap", "--csv", "/nowhere/at/all.csv"], "/nowhere/at/all.csv", "a folder that is there"),
+        (["bench", "overlap", "--csv", "/nowhere/at/all.csv"], "/nowhere/at/all.csv", "its folder is not there"),
         (["bench", "overlap", "--write-docs", "/"], "--write-docs /", "a file"),
         (["bench", "overlap", "--peer-header", "/nowhere/overlap.hpp"], "/nowhere/overlap.hpp", "pip download"),
         (["bench", "overlap", "--figures", __file__], "--figures", "a folder"),
