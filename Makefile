@@ -50,8 +50,10 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(BIN)/python -m tests.kernel $(ARGS)
 
-lock: ## pin every dependency anew (needs uv); the file holds hashes and no addresses
-	rm -f uv.lock && uv export --quiet --all-extras --no-emit-project --no-header -o requirements.lock && rm -f uv.lock
+EXPORT = uv export --quiet --no-emit-project --no-header
+lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses
+	rm -f uv.lock && $(EXPORT) --all-extras -o requirements.lock
+	$(EXPORT) --extra robot -o docker/robot.lock && $(EXPORT) --extra operator -o docker/operator.lock && rm -f uv.lock
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -70,6 +70,7 @@ ARROWS = """
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
+    feelahead/containers: common/*
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
@@ -92,6 +93,7 @@ LIBRARIES = {
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",
         "feelahead/commands",
+        "feelahead/containers",
         "feelahead/benchmarks",
         "feelahead/experiments",
     ),

@@ -1,0 +1,46 @@
+"""The kernel's netem for a link: which words it gets, and whether it can do what is asked at all."""
+
+from typing import Literal, get_args
+
+from common.emulation.distribution import DelayTable
+from common.emulation.profile import LinkProfile
+from common.emulation.spec import Direction, LinkSpec
+from common.errors import FeelaheadError
+
+CARRIED: tuple[Literal["haptics", "telemetry"], ...] = ("haptics", "telemetry")
+"""The streams that travel between the sides, over one cable here."""
+_NOTHING = "delay 0ms"
+
+
+class BeyondNetemError(FeelaheadError):
+    """The link asks for something that the kernel's netem does not do; the text says for what."""
+
+
+def netem_words(link: LinkSpec) -> dict[Direction, str]:
+    """For each direction the arguments of `tc qdisc ... netem`; BeyondNetemError where they would mean something else.
+
+    netem sees packets, not messages and not streams: both ports of a direction share one cable.
+    """
+    return {direction: _direction_words(link, direction) for direction in get_args(Direction)}
+
+
+def _direction_words(link: LinkSpec, direction: Direction) -> str:
+    words = {link.profile(direction, stream).words() for stream in CARRIED}
+    if len(words) > 1:
+        raise BeyondNetemError(f"{direction}: its streams have links of their own, and netem sees only packets")
+    if (beyond := _beyond(link.profile(direction))) is not None:
+        raise BeyondNetemError(f"{direction}: {beyond}")
+    return words.pop() or _NOTHING
+
+
+def _beyond(profile: LinkProfile) -> str | None:
+    if isinstance(profile.distribution, DelayTable) or profile.distribution == "exponential":
+        return "a distribution that tc has no table of"
+    for name, there in (
+        ("trace", profile.trace is not None),
+        ("outage", bool(profile.outages)),
+        ("retransmit", profile.retransmit_s is not None),
+    ):
+        if there:
+            return f"{name} is not one of netem's words"
+    return None
