@@ -34,7 +34,7 @@ from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import SimulatedOperator
+from operator_side.simulated_person.whoever import Whoever, whoever
 
 MOTION_PERIOD_S = 1 / 250
 _GUARD_PERIOD_S = 0.5
@@ -74,12 +74,12 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
-        person: SimulatedOperator | None = None
+        person: Whoever | None = None
         with ExitStack() as stack:
             guard: ReleaseGuard | None = None
             if settings.device == "simulated":
                 simulated = SimulatedDualSense()
-                person = SimulatedOperator(
+                person = whoever(
                     simulated, settings.person, settings.seed, settings.calibration, swap_sides=settings.swap_sides
                 )
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
@@ -131,7 +131,7 @@ class _Loop:
         sockets: OperatorSockets,
         connection: Connection,
         guard: ReleaseGuard | None,
-        person: SimulatedOperator | None,
+        person: Whoever | None,
         status: Status,
         *,
         stored_travel: bool,

@@ -54,3 +54,5 @@ class OperatorSettings(RunOptions):
         super().__post_init__()
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
+        if self.swap_sides and self.person.pull_n is not None:
+            raise ValueError("--swap-sides with --person.pull-n: valid: one of them, as the finger pulls R2 to advance")

@@ -29,6 +29,7 @@ from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
+from robot_side.simulation.true_contact import TrueContact
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
@@ -40,11 +41,17 @@ class SimulationObserver:
 
     def __init__(self, scene: Scene) -> None:
         self._truth = GroundTruth(scene)
+        self._contact = TrueContact(scene, supports=False)
         self._roles = scene.roles
 
     def observe(self, figures: RunFigures, now_s: float) -> None:
         """Tell `figures` the true distances and contacts."""
         figures.truth(self._truth.observe(), self._roles, now_s)
+
+    def watch(self, figures: RunFigures, since_start_s: float) -> None:
+        """Tell `figures` the first contact; before it nothing can be held."""
+        if not figures.touched and (onset := self._contact.update(None)) is not None:
+            figures.first_contact(onset.thing, onset.closing_speed_m_s, since_start_s)
 
 
 def build_robot_side(

@@ -45,6 +45,10 @@ class Observer(Protocol):
         """Tell `figures` the true distances and contacts."""
         ...
 
+    def watch(self, figures: RunFigures, since_start_s: float) -> None:
+        """In every turn: tell `figures` the first contact."""
+        ...
+
 
 class RobotSide:
     """The pipeline of one robot, with one operator at a time and others that observe."""
@@ -200,7 +204,10 @@ class RobotSide:
         target = target_index(objects)
         held = self._held is not None and self._held.index == target
         self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)
-        if self._observer is not None and now_s >= self._next_truth_s:
+        if self._observer is None:
+            return
+        self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
+        if now_s >= self._next_truth_s:
             self._next_truth_s = now_s + TRUTH_PERIOD_S
             self._observer.observe(self.figures, now_s)
 

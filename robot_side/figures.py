@@ -34,6 +34,7 @@ class RunFigures:
         self._r2 = RunningStatistics(seed)
         self._min_distance_m: float | None = None
         self._min_obstacle_distance_m: float | None = None
+        self._first_contact: dict[str, Any] | None = None
         self._touched_s: dict[str, float] = {}
         self._contacts: dict[str, int] = {}
         self._obstacle_contacts = 0
@@ -67,6 +68,16 @@ class RunFigures:
             self._touched_s[name] = now_s
         if truth.target is not None:
             self._placing.observe(truth.target, self._held, self._warned, now_s)
+
+    @property
+    def touched(self) -> bool:
+        """Whether the first contact has been."""
+        return self._first_contact is not None
+
+    def first_contact(self, thing: str, closing_speed_m_s: float, since_start_s: float) -> None:
+        """The gripper has touched something that is no support, for the first time, at so much since the start."""
+        speed_mm_s = 1e3 * closing_speed_m_s
+        self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": since_start_s}
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
         """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
@@ -102,6 +113,7 @@ class RunFigures:
             },
             "min_distance_mm": _scaled(self._min_distance_m, 1e3),
             "contacts": sum(self._contacts.values()),
+            "first_contact": self._first_contact,
             "task": {
                 "time_to_grasp_s": grasp_s,
                 "lifted_mm": 1e3 * self._lifted_m,

@@ -8,6 +8,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from common.emulation.clauses import LinkModel
+from common.emulation.grammar import GRAMMAR
+from common.emulation.named_links import NAMED_LINKS, with_names_spelled_out
 from common.emulation.profile import LinkProfile, check_seed_and_models, choices
 from common.emulation.randomness import CorrelationModel
 from common.errors import ConfigurationError
@@ -40,11 +42,17 @@ class LinkSpec:
     ) -> "LinkSpec":
         """Read `[PROFILE;] [NAME: PROFILE;] ...`, a name being a direction, a stream or `DIRECTION.STREAM`.
 
-        ConfigurationError, in one line, for an unknown or repeated name and for a bad profile.
+        The name of a link, such as `wifi`, stands for its words. ConfigurationError, in one line, for an unknown or
+        repeated name and for a bad profile.
         """
         check_seed_and_models(seed, model, correlation_model)
         clauses: dict[str, LinkProfile] = {}
-        for clause in filter(str.strip, spec.split(";")):
+        for clause in filter(str.strip, with_names_spelled_out(spec).split(";")):
+            if (word := clause.strip()).replace("-", "").isalpha() and word not in GRAMMAR:
+                raise ConfigurationError(
+                    f"link {spec!r}: {word!r} is unknown there; valid: {', '.join(NAMED_LINKS)}, or netem's words, such"
+                    " as 'delay 50ms 10ms distribution normal loss 1%'"
+                )
             before, colon, after = clause.partition(":")
             # A colon further on belongs to a file's name.
             named = bool(colon) and len(before.split()) <= 1

@@ -15,13 +15,12 @@ from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.approaches.margin_law import MarginLaw
 from feelahead.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
-from feelahead.approaches.pulling_hands import PullingHands
-from feelahead.approaches.pulls import Pull, constant_force
 from feelahead.approaches.spoilt import Spoil, controller
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.pulling_hands import Pull, PullingHands, constant_force
 from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene

@@ -1,8 +1,8 @@
 """From the start of both sides until the hand pulls."""
 
 from common.errors import FeelaheadError
-from feelahead.approaches.pulling_hands import PullingHands
 from feelahead.both_sides.loopback import Loopback
+from operator_side.simulated_person.pulling_hands import PullingHands
 
 LONGEST_ARMING_S = 30.0
 _LOOK_S = 0.01

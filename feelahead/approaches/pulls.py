@@ -4,64 +4,27 @@ A pull is open loop: the same one again, whatever stands in the way.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 import numpy as np
 
-from common.protocol.messages import Vector2
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
+from operator_side.simulated_person.pulling_hands import Hands, Pull
 
 PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw"]
 PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)
 
 _TRAVEL = TriggerTravel()
 _STICK = StickRest()
-ASIDE_S: Final = 1.5
-"""150 mm across, or 43°, at full deflection."""
 _NOISE_STEP_S = 0.05
 _LONGEST_S = 20.0
-
-
-@dataclass(frozen=True)
-class Hands:
-    """What both hands do at one moment; sticks as the controller has them, -1 to 1."""
-
-    r2_n: float = 0.0
-    l2_n: float = 0.0
-    left_stick: Vector2 = (0.0, 0.0)
-    right_stick: Vector2 = (0.0, 0.0)
-
-
-Pull = Callable[[float], Hands]
-"""The hands, so many seconds after the pull began."""
 
 
 def force_for(travel: float) -> float:
     """The force in newtons that holds a free trigger at the calibrated `travel`, 0 to 1."""
     return SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * _TRAVEL.raw(travel) if travel > 0.0 else 0.0
-
-
-def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
-    """R2 pressed with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
-
-    They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
-    """
-    straight = Hands(r2_n=force_n)
-    aside = Hands(r2_n=force_n, left_stick=_beyond_dead_zone(across), right_stick=_beyond_dead_zone(turning))
-    return lambda since_s: aside if since_s < ASIDE_S else straight
-
-
-def _beyond_dead_zone(deflection: Vector2) -> Vector2:
-    """Where the stick has to be for this to count."""
-    length = math.hypot(*deflection)
-    if length == 0.0:
-        return deflection
-    part = (_STICK.dead_zone + (1.0 - _STICK.dead_zone) * length) / length
-    return deflection[0] * part, deflection[1] * part
 
 
 def make_pull(kind: PullKind, seed: int) -> Pull:

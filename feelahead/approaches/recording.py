@@ -12,12 +12,12 @@ from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.pulling_hands import PullingHands
 from feelahead.approaches.pulls import PullKind, make_pull
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.pulling_hands import PullingHands
 from robot_side.settings import RobotSettings
 from robot_side.simulation.posed_scene import let_through
 from robot_side.simulation.scene import Scene, load_scene

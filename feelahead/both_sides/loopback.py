@@ -21,7 +21,7 @@ from operator_side.dualsense.hid.search import Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import SimulatedOperator
+from operator_side.simulated_person.whoever import whoever
 from robot_side.ahead.law import Law
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
@@ -96,7 +96,7 @@ class Loopback:
         self.person: Person = (
             person(self.device)
             if person is not None
-            else SimulatedOperator(
+            else whoever(
                 self.device,
                 settings.operator.person,
                 settings.operator.seed,

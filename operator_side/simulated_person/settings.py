@@ -40,6 +40,9 @@ class PersonSettings:
     lift_m: float = 0.1
     carry_m: float = 0.06
     """How far back, towards the robot, they carry it before they set it down."""
+    pull_n: float | None = None
+    """Instead of all this: arm, then pull R2 with so many newtons and go on, whatever is felt or seen. 2 is a light
+    pull, 3.7 a normal one."""
 
     def __post_init__(self) -> None:
         lengths = ("depth_error_sd_m", "grasp_depth_m", "lift_m", "carry_m")
@@ -56,5 +59,7 @@ class PersonSettings:
         # From 90° on a person would not correct what they see, or make it worse.
         if not 0.0 <= self.phase_margin_rad < math.pi / 2:
             raise ValueError(f"phase_margin_rad = {self.phase_margin_rad}; valid: 0 to below pi / 2")
+        if self.pull_n is not None and not 0.0 <= self.pull_n <= 20.0:
+            raise ValueError(f"pull_n = {self.pull_n}; valid: 0 to 20")
         if self.attempts < 1:
             raise ValueError(f"attempts = {self.attempts}; valid: 1 or more")

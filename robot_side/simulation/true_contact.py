@@ -8,7 +8,8 @@ from typing import Any
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.objects.perceived import Role
 from robot_side.simulation.ground_truth import geom_distance, least_distance
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.scene import Scene
@@ -32,20 +33,23 @@ class ContactOnset:
 class TrueContact:
     """Watches one scene's physics from turn to turn; it changes nothing."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, *, supports: bool = True) -> None:
+        """`supports`: whether touching one of them counts."""
         self._scene = scene
         self._model, self._data = scene.model, scene.data
-        self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
+        self._object_of = {
+            geom: thing.name
+            for thing in scene.objects
+            if supports or scene.roles[thing.name] is not Role.SUPPORT
+            for geom in thing.geoms
+        }
         self._gripper = frozenset(int(geom) for geom in scene.robot.gripper_geoms)
+        self._ours: tuple[str | None, BoolArray] = None, self._geoms_of(None)
         # Nobody simulates this one: it holds the state before the last step, or a gripper moved in thought.
         self._before = mujoco.MjData(self._model)
         self._thought = mujoco.MjData(self._model)
         self._held: str | None = None
-        self._touched = frozenset(
-            self._object_of[pair[2]]
-            for row in range(self._data.ncon)
-            if (pair := self._pair(self._data.contact[row], None)) is not None
-        )
+        self._touched = frozenset(self._object_of[theirs] for _, _, theirs, _ in self._touching(None))
         self._remember()
 
     def update(self, held: str | None) -> ContactOnset | None:
@@ -55,9 +59,7 @@ class TrueContact:
         """
         if self._data.time == self._seen_s:
             return None
-        data = self._data
-        # Each look at MuJoCo's contacts takes longer than a step of the physics, and most of the time there are none.
-        touching = [pair for row in range(data.ncon) if (pair := self._pair(data.contact[row], held)) is not None]
+        touching = self._touching(held)
         # What touched at the last look has had its onset; so has what something touched before it was gripped.
         names = frozenset(self._object_of[theirs] for _, _, theirs, _ in touching)
         known = self._touched if held == self._held else names
@@ -100,6 +102,20 @@ class TrueContact:
         carried = [geom for geom, name in self._object_of.items() if name == held]
         others = [geom for geom, name in self._object_of.items() if name != held]
         return np.array([*self._gripper, *carried], dtype=np.int64), np.array(others, dtype=np.int64)
+
+    def _geoms_of(self, held: str | None) -> BoolArray:
+        """Which geoms are the gripper's or the held object's."""
+        ours = np.zeros(self._model.ngeom, dtype=bool)
+        ours[[*self._gripper, *(geom for geom, name in self._object_of.items() if name == held)]] = True
+        return ours
+
+    def _touching(self, held: str | None) -> list[tuple[Any, int, int, float]]:
+        if self._ours[0] != held:
+            self._ours = held, self._geoms_of(held)
+        contacts = self._data.contact
+        # A look at each single contact takes as long as a step of the physics, and most are none of the gripper's.
+        rows = np.flatnonzero(self._ours[1][contacts.geom].any(axis=1))
+        return [pair for row in rows if (pair := self._pair(contacts[row], held)) is not None]
 
     def _pair(self, contact: Any, held: str | None) -> tuple[Any, int, int, float] | None:
         """The contact, the gripper's and the other geom, and the sign by which the normal leads to the other."""

@@ -28,6 +28,7 @@ NAN, INFINITY = math.nan, math.inf
         (PersonSettings, "touch_reaction_s", (0.0, -0.1, 10.0, NAN)),
         (PersonSettings, "touch_reaction_sd_s", (-0.1, 10.0, NAN)),
         (PersonSettings, "trust", (-0.1, 1.1, NAN)),
+        (PersonSettings, "pull_n", (-0.1, 20.1, NAN, INFINITY)),
         (PersonSettings, "noticeable_force", (-0.1, 1.1, NAN)),
         (TriggerTravel, "dead_zone", (-0.1, 0.98, 1.5, NAN)),
         (TriggerTravel, "saturation", (0.05, 0.0, 1.1, NAN)),
@@ -132,3 +133,8 @@ def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> No
 @pytest.mark.parametrize(("text", "seconds"), [("0ms", 0.0), ("12ms", 0.012), ("-12ms", -0.012), ("-2s", -2.0)])
 def test_an_asymmetry_has_a_sign(text: str, seconds: float) -> None:
     assert OperatorSettings(asymmetry=text).asymmetry_s() == pytest.approx(seconds)
+
+
+def test_a_finger_that_pulls_r2_to_advance_has_the_usual_sides() -> None:
+    with pytest.raises(ConfigurationError, match="--swap-sides with --person"):
+        parse_settings(OperatorSettings, "operator", ["--swap-sides", "--person.pull-n", "3"])

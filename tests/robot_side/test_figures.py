@@ -174,3 +174,11 @@ def test_a_summary_is_json_and_stays_as_it_was_taken() -> None:
     assert json.loads(json.dumps(first)) == first
     assert first["ticks"] == 1
     assert figures.summary()["enlargement_mm"]["max"] == pytest.approx(30.0)
+
+
+def test_the_first_contact_stays_the_first() -> None:
+    figures = RunFigures()
+    assert (figures.touched, figures.summary()["first_contact"]) == (False, None)
+    figures.first_contact("post", 0.21, 3.4)
+    assert figures.touched
+    assert figures.summary()["first_contact"] == {"with": "post", "speed_mm_s": 210.0, "time_s": 3.4}

@@ -81,6 +81,8 @@ class ComparisonSettings:
         for name, lowest in (("seeds", 1), ("workers", 1)):
             if getattr(self, name) < lowest:
                 raise ValueError(f"--{name} {getattr(self, name)}: valid: {lowest} or more")
+        if self.person.pull_n is not None:
+            raise ValueError(f"--person.pull-n {self.person.pull_n}: valid: not here, where a task is done")
         if not 0.0 < self.duration < 1e4:
             raise ValueError(f"--duration {self.duration}: valid: above 0 and below 10000 seconds")
         if not 0.0 <= self.jitter <= 1000.0:

@@ -17,12 +17,12 @@ from feelahead.approaches.approach import Approach, PullRun, robot_settings, run
 from feelahead.approaches.frozen import ASIDE
 from feelahead.approaches.laws import Law
 from feelahead.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from feelahead.approaches.pulls import Hands
 from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
 from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
+from operator_side.simulated_person.pulling_hands import Hands
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from tests.helpers.repository import DATA
 

@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.messages import Vector2
-from feelahead.approaches.pulls import PULL_KINDS, Hands, Pull, PullKind, constant_force, force_for, make_pull
+from feelahead.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from operator_side.simulated_person.pulling_hands import Hands, Pull, constant_force
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 STEP_S = 0.001

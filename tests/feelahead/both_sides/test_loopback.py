@@ -9,11 +9,12 @@ import pytest
 
 from common.protocol.messages import Compensation
 from feelahead.approaches.approach import Approach, PullRun
-from feelahead.approaches.pulls import Hands
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import Phase, SimulatedOperator
+from operator_side.simulated_person.pulling_hands import Hands
+from operator_side.simulated_person.settings import PersonSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA
 
@@ -239,3 +240,16 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
     assert max(map(abs, speeds_mm_s(2.3, began_s + 1.8))) < 1.0
     assert max(speeds_mm_s(began_s + 1.8, began_s + 2.1)) > 100.0
     assert both.summary()["rendering"]["blind"] == 1
+
+
+@pytest.mark.parametrize(("haptics", "slowest_mm_s", "fastest_mm_s"), [(True, 0.0, 40.0), (False, 200.0, 220.0)])
+def test_the_summary_tells_how_fast_a_constant_finger_hits_the_wall(
+    haptics: bool, slowest_mm_s: float, fastest_mm_s: float
+) -> None:
+    operator = OperatorSettings(haptics=haptics, person=PersonSettings(pull_n=3.0))
+    run = Loopback(LoopbackSettings(RobotSettings(scene="wall"), operator))
+    run.run_until(4.0)
+    first = run.summary()["first_contact"]
+    assert first["with"] == "wall"
+    assert slowest_mm_s < first["speed_mm_s"] < fastest_mm_s
+    assert 2.0 < first["time_s"] < 4.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from robot_side.objects.perceived import Role
 from robot_side.simulation.scene import Scene, load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
 from tests.helpers.repository import DATA
@@ -158,6 +159,18 @@ def test_of_several_contacts_the_fastest_counts() -> None:
     outer = min(("left_fingertip", "right_fingertip"), key=lambda tip: script.scene.data.geom(tip).xpos[1])
     assert onset.gripper_part == outer
     assert onset.closing_speed_m_s == pytest.approx(1.0 + 4.0 * 0.0545, rel=1e-2)
+
+
+def test_a_support_counts_only_where_it_is_asked_for() -> None:
+    scene = load_scene(DATA / "wall.xml", "tool", {"wall": Role.SUPPORT})
+    found = []
+    for supports in (True, False):
+        script = Script(scene)
+        mujoco.mj_resetDataKeyframe(scene.model, scene.data, scene.model.key("home").id)
+        mujoco.mj_forward(scene.model, scene.data)
+        script.truth = TrueContact(scene, supports=supports)
+        found.append(script.go(0.319).until_contact(0.1 * AHEAD, steps=50))
+    assert [None if one is None else one.thing for one in found] == ["wall", None]
 
 
 # Once

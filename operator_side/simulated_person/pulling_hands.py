@@ -1,11 +1,14 @@
 """A person who arms the robot and then pulls as told: no eyes for the scene, no will of their own."""
 
-from typing import Literal
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
 
-from common.protocol.messages import Telemetry
-from feelahead.approaches.pulls import Hands, Pull
+from common.protocol.messages import Telemetry, Vector2
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.button_map import BUTTON_OF, Action
+from operator_side.hands.travel_calibration import StickRest
 
 _REST_S = 1.2
 """The triggers rest for longer than the healthy second that arming asks for."""
@@ -14,9 +17,45 @@ _PATIENCE_S = 3.0
 """After so long in vain they press again."""
 _GRIP_S = 0.3
 """What is gripped is held for so long before the pull begins."""
-
+_ASIDE_S: Final = 1.5
+"""150 mm across, or 43°, at full deflection."""
+_STICK: Final = StickRest()
 
 Phase = Literal["rest", "arm", "grip", "pull"]
+_DOING: Final[dict[Phase, str]] = {"rest": "resting", "arm": "arming", "grip": "grasping", "pull": "pulling"}
+
+
+@dataclass(frozen=True)
+class Hands:
+    """What both hands do at one moment; sticks as the controller has them, -1 to 1."""
+
+    r2_n: float = 0.0
+    l2_n: float = 0.0
+    left_stick: Vector2 = (0.0, 0.0)
+    right_stick: Vector2 = (0.0, 0.0)
+
+
+Pull = Callable[[float], Hands]
+"""The hands, so many seconds after the pull began."""
+
+
+def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
+    """R2 pressed with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
+
+    They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
+    """
+    straight = Hands(r2_n=force_n)
+    aside = Hands(r2_n=force_n, left_stick=_beyond_dead_zone(across), right_stick=_beyond_dead_zone(turning))
+    return lambda since_s: aside if since_s < _ASIDE_S else straight
+
+
+def _beyond_dead_zone(deflection: Vector2) -> Vector2:
+    """Where the stick has to be for this to count."""
+    length = math.hypot(*deflection)
+    if length == 0.0:
+        return deflection
+    part = (_STICK.dead_zone + (1.0 - _STICK.dead_zone) * length) / length
+    return deflection[0] * part, deflection[1] * part
 
 
 class PullingHands:
@@ -33,6 +72,11 @@ class PullingHands:
         self._grips = grip
         self._since_s: float | None = None
         self._holding_s: float | None = None
+
+    @property
+    def doing(self) -> str:
+        """Their phase in a word for people."""
+        return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Act at `now_s` on what the screen says of arming and gripping; nothing else of it counts."""
