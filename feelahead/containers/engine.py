@@ -1,0 +1,106 @@
+"""Docker and its compose, driven by their commands: either generation of compose, whichever is installed."""
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import ConfigurationError, FeelaheadError
+
+COMPOSE_FILE: Final = Path(__file__).parents[2] / "docker" / "compose.yaml"
+_LIMIT_S: Final = 60.0
+_BUILD_LIMIT_S: Final = 1200.0
+
+
+class EngineError(FeelaheadError):
+    """The engine could not do it; the text is what it said."""
+
+
+class Engine:
+    """One project of compose: containers, networks and volumes under a name of their own."""
+
+    def __init__(self, project: str, environment: Mapping[str, str] | None = None) -> None:
+        """`environment`: on top of this process's, as DOCKER_HOST; ConfigurationError where there is no engine."""
+        self.project = project
+        self._environment = os.environ | dict(environment or {})
+        if not COMPOSE_FILE.is_file():
+            raise ConfigurationError(f"{COMPOSE_FILE.name} is not there; valid: a checkout of feelahead, with docker/")
+        if shutil.which("docker", path=self._environment.get("PATH")) is None:
+            raise ConfigurationError("docker is not installed; valid: apt-get install docker.io docker-compose")
+        try:
+            self.docker("version")
+        except EngineError as error:
+            raise ConfigurationError(f"docker: {error}; valid: a running engine that you may use") from error
+        self._compose = self._find_compose()
+
+    def docker(self, *words: str) -> str:
+        """What `docker WORDS` prints; EngineError when it fails."""
+        return self._run(["docker", *words], self._environment, _LIMIT_S)
+
+    def compose(self, *words: str, settings: Mapping[str, str] | None = None, limit_s: float = _LIMIT_S) -> str:
+        """What `docker compose WORDS` prints, for this project; `settings`: the variables of compose.yaml."""
+        project = ["--project-name", self.project, "--file", str(COMPOSE_FILE)]
+        return self._run([*self._compose, *project, *words], self._environment | dict(settings or {}), limit_s)
+
+    def build(self) -> None:
+        """Build the images, as far as they are not built yet; minutes, the first time."""
+        self.compose("build", limit_s=_BUILD_LIMIT_S)
+
+    def remove(self) -> None:
+        """End and remove whatever the project has: containers, networks and volumes."""
+        self.compose("down", "--volumes", "--timeout", "2")
+
+    def container(self, service: str) -> str:
+        """The container of a service; EngineError where it has none."""
+        labels = {"project": self.project, "service": service}
+        filters = [
+            word for name, value in labels.items() for word in ("--filter", f"label=com.docker.compose.{name}={value}")
+        ]
+        found = self.docker("ps", "--all", "--quiet", *filters).split()
+        if len(found) != 1:
+            raise EngineError(f"{service}: {len(found)} containers of this service")
+        return found[0]
+
+    def inspect(self, container: str) -> dict[str, Any]:
+        """What the engine knows of a container."""
+        [known] = json.loads(self.docker("inspect", container))
+        return dict(known)
+
+    def attached(self, container: str) -> list[str]:
+        """The command that starts a container, shows what it prints, hands signals on and ends with its exit code."""
+        return ["docker", "start", "--attach", container]
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        """What commands of the engine have to run in."""
+        return self._environment
+
+    def _find_compose(self) -> list[str]:
+        for words in (["docker", "compose"], ["docker-compose"]):
+            try:
+                self._run([*words, "version"], self._environment, _LIMIT_S)
+            except EngineError:
+                continue
+            return words
+        raise ConfigurationError("docker has no compose; valid: apt-get install docker-compose")
+
+    def _run(self, words: Sequence[str], environment: Mapping[str, str], limit_s: float) -> str:
+        try:
+            done = subprocess.run(
+                words,
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=limit_s,
+                check=False,
+                stdin=subprocess.DEVNULL,
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise EngineError(f"{' '.join(words[:3])}: {error}") from error
+        if done.returncode != 0:
+            said = done.stderr.strip().splitlines() or done.stdout.strip().splitlines()
+            raise EngineError(said[-1] if said else f"{' '.join(words)}: code {done.returncode}")
+        return done.stdout
