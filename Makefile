@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel lock clean
+.PHONY: demo test quick types test-kernel test-containers lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -49,6 +49,10 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 # Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(BIN)/python -m tests.kernel $(ARGS)
+
+# Needs Docker; in CI, root gets Debian's for the time being. It says so and is skipped elsewhere.
+test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
+	$(BIN)/python -m tests.containers $(ARGS)
 
 EXPORT = uv export --quiet --no-emit-project --no-header
 lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses

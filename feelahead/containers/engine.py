@@ -12,7 +12,6 @@ from common.errors import ConfigurationError, FeelaheadError
 
 COMPOSE_FILE: Final = Path(__file__).parents[2] / "docker" / "compose.yaml"
 _LIMIT_S: Final = 60.0
-_BUILD_LIMIT_S: Final = 1200.0
 
 
 class EngineError(FeelaheadError):
@@ -44,10 +43,6 @@ class Engine:
         """What `docker compose WORDS` prints, for this project; `settings`: the variables of compose.yaml."""
         project = ["--project-name", self.project, "--file", str(COMPOSE_FILE)]
         return self._run([*self._compose, *project, *words], self._environment | dict(settings or {}), limit_s)
-
-    def build(self) -> None:
-        """Build the images, as far as they are not built yet; minutes, the first time."""
-        self.compose("build", limit_s=_BUILD_LIMIT_S)
 
     def remove(self) -> None:
         """End and remove whatever the project has: containers, networks and volumes."""

@@ -1,0 +1,172 @@
+"""What is tried on the running containers, each with a line about what was seen."""
+
+import json
+import re
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from feelahead.containers.engine import Engine
+from tests.containers.watch import Event, Watched, check, link_up, state_is
+
+SERVICES: Final = ("router", "robot", "operator")
+_DISTURBED: Final = re.compile(r"warning|traceback|error|exception|refused|denied", re.IGNORECASE)
+
+
+def first_stiffness(engine: Engine, settings: Mapping[str, str]) -> str:
+    """From nothing but images to a stiffened trigger."""
+    began_s = time.monotonic()
+    engine.compose("up", "--detach", settings=settings)
+    operator = Watched(engine, "operator")
+    operator.wait_for("stiffened", lambda event: (event.get("R2") or 0.0) > 0.0, 120.0)
+    return f"{time.monotonic() - began_s:.1f} s from `up` to the first stiffness (asked: 20 s)"
+
+
+def closed(engine: Engine, _: Mapping[str, str]) -> str:
+    """Nothing listens on the host; users, rights and programs are as few as promised."""
+    for service in SERVICES:
+        known = engine.inspect(engine.container(service))
+        host, ports = known["HostConfig"], known["NetworkSettings"]["Ports"] or {}
+        check(not any(ports.values()), f"{service} listens on the host: {ports}")
+        added = [name.removeprefix("CAP_") for name in host["CapAdd"] or []]
+        check(added == (["NET_ADMIN"] if service == "router" else []), f"{service} may: {added}")
+        check(host["CapDrop"] == ["ALL"], f"{service} keeps rights: {host['CapDrop']}")
+        check(host["ReadonlyRootfs"], f"{service} can write to its own files")
+        user = engine.docker("exec", known["Id"], "id", "-u").strip()
+        check((user == "0") == (service == "router"), f"{service} runs as {user}")
+        found = engine.docker("exec", known["Id"], "sh", "-c", "command -v gcc cc g++ ld make || true").strip()
+        check(not found, f"{service} has a compiler: {found}")
+    return "no port on the host, sides without root and rights, no compiler"
+
+
+def healthy(engine: Engine, _: Mapping[str, str]) -> str:
+    """The health checks agree."""
+    end_s = time.monotonic() + 60.0
+    while True:
+        states = {name: engine.inspect(engine.container(name))["State"]["Health"]["Status"] for name in SERVICES}
+        if set(states.values()) == {"healthy"}:
+            return "router, robot and operator healthy"
+        check(time.monotonic() < end_s, f"health: {states}")
+        time.sleep(1.0)
+
+
+def quiet_logs(engine: Engine, _: Mapping[str, str]) -> str:
+    """No line of any container's log tells of trouble."""
+    lines = engine.compose("logs", "--no-color").splitlines()
+    bad = [line for line in lines if _DISTURBED.search(_without_figures(line)) and "NO netem" not in line]
+    check(not bad, f"{len(bad)} of {len(lines)} lines: {bad[:3]}")
+    how = next((line.split("feelahead-router: ", 1)[1] for line in lines if "netem" in line), "")
+    return f"{len(lines)} lines without a warning; link: {how[:90]}"
+
+
+def operator_killed(engine: Engine, _: Mapping[str, str]) -> str:
+    """kill -9: the arm stops by itself, and the operator side comes back disarmed."""
+    return _disturbed_and_back(engine, Watched(engine, "operator").kill)
+
+
+def router_killed(engine: Engine, _: Mapping[str, str]) -> str:
+    """kill -9 of the router: the cable is gone, and comes back."""
+    return _disturbed_and_back(engine, Watched(engine, "router").kill)
+
+
+def network_taken(engine: Engine, _: Mapping[str, str]) -> str:
+    """The router is taken out of the operator's network, and put back: another address, another interface."""
+    network, router = f"{engine.project}_operator", engine.container("router")
+
+    def take() -> None:
+        engine.docker("network", "disconnect", "--force", network, router)
+        time.sleep(1.0)
+        engine.docker("network", "connect", "--alias", "robot", network, router)
+
+    return _disturbed_and_back(engine, take)
+
+
+def robot_killed(engine: Engine, _: Mapping[str, str]) -> str:
+    """kill -9: the triggers are released, and the robot side comes back disarmed, with none of the old commands."""
+    robot, operator = Watched(engine, "robot"), Watched(engine, "operator")
+    _armed(robot)
+    operator.new_events()
+    robot.kill()
+    operator.wait_for("without a link", lambda event: event.get("event") == "status" and event.get("link") != "up")
+    heard = operator.wait_for("link up", link_up)
+    stiff = [event["R2"] for event in heard if event.get("event") == "status" and event.get("link") != "up"]
+    check(not any(stiff), f"R2 stiff without a link: {stiff}")
+    began_s = time.monotonic()
+    back = robot.wait_for("armed", state_is("armed"))
+    _came_back_disarmed(back)
+    return (
+        f"triggers free while it was away; disarmed, then armed by the person {time.monotonic() - began_s:.0f} s later"
+    )
+
+
+def ended(engine: Engine, _: Mapping[str, str]) -> str:
+    """SIGTERM ends both sides well, with summaries."""
+    containers = {service: engine.container(service) for service in ("operator", "robot")}
+    engine.docker("stop", "--time", "5", *containers.values())
+    for service, container in containers.items():
+        code = engine.inspect(container)["State"]["ExitCode"]
+        check(code == 0, f"{service} ended with code {code}")
+    summary = read_summary(engine, "robot")
+    stops = [stop["reason"] for stop in summary["stops"]]
+    return f"codes 0, summaries written; the last robot process ticked {summary['ticks']} times, stops: {stops}"
+
+
+def nothing_left(engine: Engine, _: Mapping[str, str]) -> str:
+    """`down --volumes` leaves neither containers nor networks nor volumes."""
+    engine.remove()
+    label = f"label=com.docker.compose.project={engine.project}"
+    left = [
+        engine.docker(*kind, "--quiet", "--filter", label).split()
+        for kind in (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
+    ]
+    check(not any(left), f"left: {left}")
+    return "no container, no network, no volume"
+
+
+def read_summary(engine: Engine, service: str) -> dict[str, Any]:
+    """The summary that a side has written."""
+    packed = engine.docker("cp", f"{engine.container(service)}:/results/{service}.json", "-")
+    # A tar of one file: its text begins at the first brace and ends at the last.
+    summary: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
+    return summary
+
+
+def _disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> str:
+    robot = Watched(engine, "robot")
+    _armed(robot)
+    disturb()
+    stopped = robot.wait_for("disarmed", state_is("disarmed", "ready"))
+    because = next((event["stopped_because"] for event in stopped if event.get("stopped_because")), "its owner is away")
+    began_s = time.monotonic()
+    back = stopped[-1:] + robot.wait_for("armed", state_is("armed"), 120.0)
+    _came_back_disarmed(back)
+    return f"stopped: {because}; disarmed, then armed by the person {time.monotonic() - began_s:.0f} s later"
+
+
+def _armed(robot: Watched) -> None:
+    robot.new_events()
+    robot.wait_for("armed", state_is("armed"), 120.0)
+
+
+def _came_back_disarmed(events: list[Event]) -> None:
+    states = [event["state"] for event in events if event.get("event") == "status"]
+    check("disarmed" in states[:-1] or "ready" in states[:-1], f"armed at once: {states}")
+
+
+def _without_figures(line: str) -> str:
+    """A line of a log without the names of figures, such as `refused`, which count and do not complain."""
+    return re.sub(r'"[a-z_0-9]+": ', "", line)
+
+
+CHECKS: Final[tuple[Callable[[Engine, Mapping[str, str]], str], ...]] = (
+    first_stiffness,
+    closed,
+    healthy,
+    quiet_logs,
+    operator_killed,
+    robot_killed,
+    router_killed,
+    network_taken,
+    ended,
+    nothing_left,
+)
