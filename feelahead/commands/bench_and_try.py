@@ -134,6 +134,12 @@ try_out = Menu(
             "the same simulated person with and without haptics, where there is something to hit",
             _BOTH_SIDES,
         ),
+        "latency": Entry(
+            "feelahead.experiments.latency.command",
+            "try_latency",
+            "a constant finger over links as they are: delays and contacts, and whether emulations of a link agree",
+            "pip install 'feelahead[robot,operator,bench]'",
+        ),
         "scenes": Entry(
             "feelahead.experiments.scenes",
             "try_scenes",
