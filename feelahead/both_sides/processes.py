@@ -9,7 +9,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
@@ -22,16 +22,15 @@ class SideFailedError(FeelaheadError):
     """A side ended by itself with an error; the text is what it said."""
 
 
-class SideProcess:
-    """One side, started with `--status json`; its events are read by a thread so that none blocks it."""
+class StartedSide:
+    """One side with `--status json`, by the command that starts it; a thread reads its events: none blocks it."""
 
-    def __init__(self, module: str, name: str, arguments: Sequence[str], before: Sequence[str] = ()) -> None:
-        """Run `module` with `arguments`; `before` is a command in whose surroundings it is to run."""
+    def __init__(self, name: str, command: Sequence[str]) -> None:
+        """Start it."""
         self.name = name
         self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed by __exit__
-        # -P: a folder named `common` in the working directory must not shadow the package.
         self._process = subprocess.Popen(
-            [*before, sys.executable, "-P", "-m", module, "--status", "json", *arguments],
+            command,
             stdout=subprocess.PIPE,
             stderr=self._errors,
             stdin=subprocess.DEVNULL,
@@ -46,7 +45,7 @@ class SideProcess:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> "SideProcess":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -156,3 +155,12 @@ class SideProcess:
                 except json.JSONDecodeError:
                     continue  # a library wrote to standard output; not ours to interpret
         self._events.put({"event": "end"})
+
+
+class SideProcess(StartedSide):
+    """A side as a process of this machine, in this Python."""
+
+    def __init__(self, module: str, name: str, arguments: Sequence[str], before: Sequence[str] = ()) -> None:
+        """Run `module` with `arguments`; `before` is a command in whose surroundings it is to run."""
+        # -P: a folder named `common` in the working directory must not shadow the package.
+        super().__init__(name, [*before, sys.executable, "-P", "-m", module, "--status", "json", *arguments])

@@ -1,6 +1,8 @@
 """The kernel's netem for a link: which words it gets, and whether it can do what is asked at all."""
 
-from typing import Literal, get_args
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
 from common.emulation.distribution import DelayTable
 from common.emulation.profile import LinkProfile
@@ -22,6 +24,30 @@ def netem_words(link: LinkSpec) -> dict[Direction, str]:
     netem sees packets, not messages and not streams: both ports of a direction share one cable.
     """
     return {direction: _direction_words(link, direction) for direction in get_args(Direction)}
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Packets, since netem was set up."""
+
+    sent: int
+    dropped: int
+
+    def lost_share_since(self, before: "Counted") -> float | None:
+        """Of everything that came since `before`; None where nothing did."""
+        dropped = self.dropped - before.dropped
+        came = self.sent - before.sent + dropped
+        return dropped / came if came > 0 else None
+
+
+def count_packets(queues: Iterable[Mapping[str, Any]], interfaces: Mapping[Direction, str]) -> dict[Direction, Counted]:
+    """For each direction what `tc -statistics -json qdisc show` says of the netem on the interface towards it."""
+    by_interface = {queue["dev"]: queue for queue in queues if queue["kind"] == "netem"}
+    return {
+        direction: Counted(by_interface[name]["packets"], by_interface[name]["drops"])
+        for direction, name in interfaces.items()
+        if name in by_interface
+    }
 
 
 def _direction_words(link: LinkSpec, direction: Direction) -> str:

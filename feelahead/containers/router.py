@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,8 +25,8 @@ from common.command.command_line import parse_settings, run_command
 from common.command.stop_signal import StopSignal
 from common.emulation.spec import Direction, LinkSpec
 from common.errors import FeelaheadError
-from common.files.output_file import output_file
-from feelahead.containers.netem import BeyondNetemError, netem_words
+from common.files.output_file import output_file, write_json
+from feelahead.containers.netem import BeyondNetemError, count_packets, netem_words
 
 PROGRAM = "feelahead-router"
 PORTS = (5555, 5556)
@@ -49,6 +49,8 @@ class RouterSettings:
     """The robot side's name or address in its own network."""
     said: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/emulated")
     """Where to write what the sides have to emulate themselves: nothing, or the link."""
+    packets: Annotated[Path, tyro.conf.arg(metavar="FILE.json")] = Path("/link/packets.json")
+    """Where to write, twice a second, what netem has passed on and dropped in each direction."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """These settings from a file."""
 
@@ -89,11 +91,14 @@ class Cable:
 
     def delays(self, words: Mapping[Direction, str]) -> list[list[str]]:
         """The arguments for tc: what leaves towards a side is what was sent to it."""
-        leaves: dict[Direction, str] = {"to_robot": self.robot_interface, "to_operator": self.operator_interface}
         return [
             ["tc", "qdisc", "replace", "dev", interface, "root", "netem", *words[direction].split()]
-            for direction, interface in leaves.items()
+            for direction, interface in self.leaves().items()
         ]
+
+    def leaves(self) -> dict[Direction, str]:
+        """The interface by which each direction leaves us."""
+        return {"to_robot": self.robot_interface, "to_operator": self.operator_interface}
 
 
 def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> Cable | None:
@@ -127,6 +132,10 @@ def command(arguments: Sequence[str]) -> int:
                     file.write("" if words is not None else settings.link)
                 _say(f"{cable.operator_interface} to {cable.robot_address} over {cable.robot_interface}")
             there = cable
+            if cable is not None and words is not None:
+                queues = json.loads(_run(["tc", "-statistics", "-json", "qdisc", "show"]))
+                counted = count_packets(queues, cable.leaves())
+                write_json("--packets", settings.packets, {name: asdict(one) for name, one in counted.items()})
             time.sleep(_PERIOD_S)
     return 0
 
