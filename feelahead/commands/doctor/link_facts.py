@@ -23,6 +23,8 @@ from common.sockets.operator import OperatorSockets
 from feelahead.commands.doctor.link_judgement import CONNECT_LIMIT_S, LinkFacts, Opening, Talk, judge
 
 _ROUND_TRIPS: Final = 20
+_MEASURE_S: Final = 5.0
+"""On a long way fewer round trips must do."""
 _PAUSE_S: Final = 0.11
 """The robot side answers strangers ten times a second."""
 _KNOCKS: Final = ((KNOCK, 2.0), (b"\r\n\r\n", 1.0))
@@ -151,6 +153,7 @@ class _Questions:
                 return Talk()
         answers: list[tuple[float, LeaseNotice]] = []
         lost = 0
+        enough_s = self._clock.now() + _MEASURE_S
         while True:
             asked_s = self._clock.now()
             notice = self._notice(_ANSWER_LIMIT_S)
@@ -160,7 +163,7 @@ class _Questions:
                 lost += 1
             else:
                 answers.append((self._clock.now() - asked_s, notice))
-            if len(answers) >= _ROUND_TRIPS or lost >= _MOST_LOST:
+            if len(answers) >= _ROUND_TRIPS or lost >= _MOST_LOST or (answers and self._clock.now() >= enough_s):
                 break
             self._listen(_PAUSE_S)
             self._ask()

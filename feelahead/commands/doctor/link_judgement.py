@@ -253,7 +253,7 @@ def _judge_handshake(facts: LinkFacts, place: str, handshake: str) -> Fault:
         return Fault(
             Wrong.OUR_KEY,
             f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked",
-            f"to be run there: feelahead keys allow NAME {facts.keys}",
+            f"run there: feelahead keys allow NAME {facts.keys}",
         )
     if facts.keys is None:
         return Fault(

@@ -159,7 +159,8 @@ LINE_END = b"\r\n\r\n"
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """However busy the machine is."""
-    for name in ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "CONNECT_LIMIT_S"):
+    limits = ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "_MEASURE_S")
+    for name in (*limits, "CONNECT_LIMIT_S"):
         monkeypatch.setattr(link_facts, name, LONG_S)
     monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, LONG_S), (LINE_END, LONG_S)))
     monkeypatch.setattr(link_facts, "_ROUND_TRIPS", 3)

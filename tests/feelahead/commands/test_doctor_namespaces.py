@@ -123,4 +123,5 @@ def test_large_packets_that_are_swallowed(desk: Desk) -> None:
 def test_all_is_well(desk: Desk) -> None:
     with desk.serving():
         told = desk.doctor()
-    assert (told["reached"], told["round_trips"], told["arm"]) == (True, 20, "free")
+    assert (told["reached"], told["arm"]) == (True, "free")
+    assert told["round_trips"] > 0
