@@ -14,7 +14,7 @@ from feelahead.commands.virtual_dualsense import virtual_dualsense
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
-    "doctor": (doctor, "what is missing on this machine, and the command that mends it"),
+    "doctor": (doctor, "what is missing on this machine, or wrong on the way to a robot side, and what mends it"),
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),

@@ -139,7 +139,7 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     waiting: int
     """How many observe."""
     place: int = 0
-    """The receiver's place among them: 1 is next; 0 for an owner, and for who is not known."""
+    """The receiver's place among them, or for who is not known that which it would get: 1 is next, 0 owns."""
 
     def __post_init__(self) -> None:
         if len(self.why) > _LONGEST_REASON:

@@ -138,6 +138,8 @@ class HandshakeWatch:
         """Why the newest handshake failed, with what to do about it; None after one that succeeded."""
         self.failed = False
         """Whether one has failed since the caller last cleared this: ZeroMQ does not try again by itself."""
+        self.key_refused = False
+        """Whether the newest ended because the robot side does not let our key in."""
         self._keys = keys
         self._events = part.get_monitor_socket(
             zmq.EVENT_HANDSHAKE_SUCCEEDED
@@ -155,6 +157,7 @@ class HandshakeWatch:
                 return
             self.failed = event != zmq.EVENT_HANDSHAKE_SUCCEEDED
             self.trouble = self._reason(event) if self.failed else None
+            self.key_refused = event == zmq.EVENT_HANDSHAKE_FAILED_AUTH
 
     def close(self) -> None:
         """Look no more; before the socket itself is closed."""

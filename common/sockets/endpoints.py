@@ -44,7 +44,7 @@ def parse_bind(text: str, flag: str) -> Endpoint:
     port = _EPHEMERAL if port_text == "*" else _port(port_text, text, flag, lowest=0)
     if host == "*":
         return Endpoint(host, port, ipv6=False)
-    numeric, ipv6 = _resolve(host, text, flag)
+    numeric, ipv6 = resolve(host, text, flag)
     return Endpoint(numeric, port, ipv6)
 
 
@@ -53,11 +53,33 @@ def parse_connect(text: str, flag: str) -> Endpoint:
 
     ConfigurationError names `flag`, `text` and what is valid.
     """
+    host, port = split_connect(text, flag)
+    return Endpoint(host, port, resolve(host, text, flag)[1])
+
+
+def split_connect(text: str, flag: str) -> tuple[str, int]:
+    """Host and port of an address to connect to, by its spelling alone; ConfigurationError as in parse_connect."""
     host, port_text = _split(text, flag, "tcp://192.168.1.5:5555")
     port = _port(port_text, text, flag, lowest=1)
     if host == "*":
         raise ConfigurationError(f"{flag}: {text!r} names no host to connect to; valid: tcp://HOST:PORT")
-    return Endpoint(host, port, _resolve(host, text, flag)[1])
+    return host, port
+
+
+def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
+    """The first numeric address, IPv4 if there is one, and whether there is none of IPv4; ConfigurationError."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "no valid host name"
+        raise ConfigurationError(
+            f"{flag}: {host!r} in {text!r} cannot be resolved ({reason}); "
+            "valid: an IP address, or a host name that this machine knows"
+        ) from error
+    for family, _, _, _, address in found:
+        if family == socket.AF_INET:
+            return str(address[0]), False
+    return str(found[0][4][0]), True
 
 
 def following(control: Endpoint, text: str, flag: str) -> Endpoint:
@@ -91,19 +113,3 @@ def _port(port_text: str, text: str, flag: str, lowest: int) -> int:
     if not re.fullmatch(r"[0-9]{1,5}", port_text) or not lowest <= int(port_text) <= _HIGHEST_PORT:
         raise ConfigurationError(f"{flag}: {port_text!r} in {text!r} is no port; valid: {lowest} to {_HIGHEST_PORT}")
     return int(port_text)
-
-
-def _resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
-    """The first numeric address, IPv4 if there is one, and whether there is none of IPv4."""
-    try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "no valid host name"
-        raise ConfigurationError(
-            f"{flag}: {host!r} in {text!r} cannot be resolved ({reason}); "
-            "valid: an IP address, or a host name that this machine knows"
-        ) from error
-    for family, _, _, _, address in found:
-        if family == socket.AF_INET:
-            return str(address[0]), False
-    return str(found[0][4][0]), True

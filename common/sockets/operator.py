@@ -61,6 +61,11 @@ class OperatorSockets(SocketShell):
         """Why the robot side does not let us in, and what to do about it; None as far as we know."""
         return next((watch.trouble for _, _, watch in self._watched if watch.trouble is not None), None)
 
+    @property
+    def key_refused(self) -> bool:
+        """Whether `trouble` is that our key is not let in."""
+        return any(watch.key_refused for _, _, watch in self._watched)
+
     def receive(self) -> list[bytes]:
         """Every control message that has arrived, oldest first."""
         self._look_after_handshakes()

@@ -58,8 +58,10 @@ class Announcements:
             return
         self._answered_stranger_s = now_s
         self._hello(peer, self._link, now_s)
-        waiting = len(self._lease.observers())
-        notice = LeaseNotice(self.stamp(now_s), session=session, why=why, token=self._lease.token, waiting=waiting)
+        waiting, is_free = len(self._lease.observers()), self._lease.owner is None
+        place = 0 if is_free else waiting + 1
+        header, token = self.stamp(now_s), self._lease.token
+        notice = LeaseNotice(header, session=session, why=why, token=token, waiting=waiting, place=place)
         self._answers.append(Answer(peer, encode(notice)))
 
     def take(self, now_s: float) -> list[Answer]:

@@ -1,17 +1,20 @@
-"""`feelahead doctor`: what is missing on this machine, and the command that mends it."""
+"""`feelahead doctor`: what is missing on this machine or on the way to a robot side, and what mends it."""
 
 import dataclasses
 import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import Annotated, Final
 
+import tyro
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from common.command.command_line import parse_settings
+from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import facts
 from feelahead.commands.doctor.controller_checks import (
     ControllerSeen,
@@ -21,6 +24,8 @@ from feelahead.commands.doctor.controller_checks import (
     check_uhid,
 )
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
+from feelahead.commands.doctor.link_facts import Way, look_along
+from feelahead.commands.doctor.link_judgement import LinkFacts, judge, reached, told
 from feelahead.commands.doctor.machine_checks import check_ports, check_realtime
 from feelahead.commands.doctor.python_checks import check_extra, check_python
 
@@ -34,28 +39,62 @@ class DoctorSettings:
 
     Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
     without, "missing" is what does not work as it is.
+
+    With --connect: the way from here to a robot side instead, in one line: the first thing that is wrong with it and
+    what mends it (code 1), or how long a round trip takes and whether somebody has the arm (code 0). Whoever drives
+    notices nothing of it. The wall clocks are no matter, and not looked at.
     """
 
     json: bool = False
     """One JSON object for programs."""
+    connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Where a robot side should listen: look at the way there."""
+    view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Where it should publish what the screen shows; the port after the control port unless given."""
+    keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """As for feelahead-operator: the folder with the operator's key."""
+    robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
+    """With --keys: the robot side's public key."""
+
+    def __post_init__(self) -> None:
+        for name in ("view_connect", "keys", "robot_key"):
+            if getattr(self, name) is not None and self.connect is None:
+                raise ValueError(f"--{name.replace('_', '-')} without --connect; valid: both")
+        if self.robot_key is not None and self.keys is None:
+            raise ValueError("--robot-key without --keys; valid: both")
 
 
 def doctor(arguments: Sequence[str]) -> int:
     """Look, judge and tell."""
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
+    if settings.connect is not None:
+        keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
+        return _tell_of_link(look_along(Way(settings.connect, settings.view_connect, keys)), as_json=settings.json)
     controllers = facts.controllers_seen()
     findings = examine(controllers)
     fit = fit_for_demo(findings)
     if settings.json:
-        told = {
+        found = {
             "demo": fit,
             "findings": [dataclasses.asdict(finding) for finding in findings],
             "controllers": None if controllers is None else [dataclasses.asdict(seen) for seen in controllers],
         }
-        sys.stdout.write(json.dumps(told, indent=2) + "\n")
+        sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         show(findings, Console(width=None if sys.stdout.isatty() else _WIDTH_WITHOUT_TERMINAL))
     return 0 if fit else 1
+
+
+def _tell_of_link(link: LinkFacts, *, as_json: bool) -> int:
+    fault = judge(link)
+    if as_json:
+        said = json.dumps(told(link), indent=2)
+    elif fault is not None:
+        said = f"{fault.wrong}: {fault.said}; to mend it: {fault.remedy}"
+    else:
+        said = reached(link)
+    sys.stdout.write(said + "\n")
+    return 0 if fault is None else 1
 
 
 def examine(controllers: list[ControllerSeen] | None) -> list[Finding]:

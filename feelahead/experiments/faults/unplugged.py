@@ -15,7 +15,7 @@ from feelahead.experiments.faults.fault import Outcome
 from feelahead.experiments.faults.real_faults import Advance, Onsets
 from feelahead.experiments.faults.rig import Rig, RigError, stands
 
-_ROBOT, _OPERATOR = "10.91.83.1", "10.91.83.2"
+ROBOT, OPERATOR = "10.91.83.1", "10.91.83.2"
 """Inside namespaces of our own, where no other network is."""
 
 
@@ -27,7 +27,7 @@ def unplugged(repeats: int, advance: Advance) -> Outcome:
     """Both sides in namespaces of their own; the link between them is set down while the arm moves, then up again."""
     onsets, safe = Onsets(), True
     try:
-        with _namespaces() as (robot, operator), Rig(f"tcp://{_ROBOT}:5555", ["--insecure"], robot) as rig:
+        with namespaces() as (robot, operator), Rig(f"tcp://{ROBOT}:5555", ["--insecure"], robot) as rig:
             driver = rig.driver(before=operator)
             for _ in rig.rounds(repeats, advance, 120.0):
                 evenly = rig.drive(driver)
@@ -45,8 +45,11 @@ def unplugged(repeats: int, advance: Advance) -> Outcome:
 
 
 @contextlib.contextmanager
-def _namespaces() -> Iterator[tuple[list[str], list[str]]]:
-    """The commands that run a program in either namespace; both are gone afterwards."""
+def namespaces() -> Iterator[tuple[list[str], list[str]]]:
+    """The commands that run a program in either namespace; both are gone afterwards.
+
+    NotPermittedError where there can be none.
+    """
     if shutil.which("ip") is None or os.geteuid() != 0:
         raise NotPermittedError("network namespaces need root and iproute2 (apt install iproute2)")
     robot, operator = (f"feelahead-{side}-{os.getpid()}" for side in ("robot", "operator"))
@@ -59,7 +62,7 @@ def _namespaces() -> Iterator[tuple[list[str], list[str]]]:
         link = ("robot0", "type", "veth", "peer", "name", "operator0")
         _ip("-n", robot, "link", "add", *link)
         _ip("-n", robot, "link", "set", "operator0", "netns", operator)
-        for name, device, address in ((robot, "robot0", _ROBOT), (operator, "operator0", _OPERATOR)):
+        for name, device, address in ((robot, "robot0", ROBOT), (operator, "operator0", OPERATOR)):
             _ip("-n", name, "address", "add", f"{address}/24", "dev", device)
             _ip("-n", name, "link", "set", device, "up")
             _ip("-n", name, "link", "set", "lo", "up")

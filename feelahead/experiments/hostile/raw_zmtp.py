@@ -3,8 +3,10 @@
 import socket
 import struct
 
-GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
-"""Signature, version 3.0, mechanism NULL, not a server, filler: 64 bytes."""
+from common.sockets.greeting import KNOCK
+
+GREETING = KNOCK + b"NULL".ljust(20, b"\0") + bytes(32)
+"""With mechanism NULL, not a server, filler: 64 bytes."""
 _MORE, _LONG, _COMMAND = 1, 2, 4
 _TIMEOUT_S = 5.0
 

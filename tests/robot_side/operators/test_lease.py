@@ -236,3 +236,41 @@ def test_a_robot_does_not_take_a_robot_for_an_operator(bench: Bench) -> None:
     bench.robot.receive(stranger.peer, encode(hello), bench.now_s)
     assert bench.robot.session.rejected == 1
     assert bench.robot.session.lease.owner is None
+
+
+def place_of_a_stranger(bench: Bench) -> int:
+    stranger = bench.operator(99, b"stranger")
+    bench.silence(0.1)
+    bench.send(stranger)
+    bench.tick()
+    assert stranger.notice is not None
+    assert stranger.notice.session is SessionState.UNKNOWN
+    return stranger.notice.place
+
+
+def test_who_says_no_hello_hears_which_place_it_would_get(bench: Bench) -> None:
+    assert place_of_a_stranger(bench) == 0
+    owner = bench.join(2)
+    assert place_of_a_stranger(bench) == 1
+    observer = bench.join(3, b"observer")
+    assert place_of_a_stranger(bench) == 2
+    assert (owner.state, observer.state) == (SessionState.DISARMED, SessionState.OBSERVING)
+
+
+def cruise_beside(asks: bool) -> tuple[list[tuple[float, float]], list[StiffnessUpdate]]:
+    bench = Bench()
+    owner, stranger = bench.join(2), Operator(99, b"stranger")
+    bench.arm_it(owner)
+    for _ in range(5):
+        bench.drive(0.1, owner, r2=CRUISE)
+        if asks:
+            bench.robot.receive(stranger.peer, stranger.command(bench.now_s), bench.now_s)
+    assert bench.robot.session.rejected == (5 if asks else 0)
+    return list(bench.arm.speeds_rad_s), owner.felt
+
+
+def test_whoever_drives_notices_nothing_of_a_stranger_who_asks() -> None:
+    (speeds, felt), (undisturbed, felt_alone) = cruise_beside(asks=True), cruise_beside(asks=False)
+    assert speeds == undisturbed
+    stripped = [[msgspec.structs.replace(one, header=felt[0].header) for one in each] for each in (felt, felt_alone)]
+    assert stripped[0] == stripped[1]

@@ -1,0 +1,295 @@
+"""What is wrong on the way from this machine to a robot side, first things first, from facts alone."""
+
+import errno
+import os
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Literal
+
+from common.protocol.codec import PROTOCOL_VERSION
+from common.sockets.greeting import mechanism_of
+
+CONNECT_LIMIT_S: Final = 4.0
+"""A second more than it takes Linux to find out that nobody on the network has an address."""
+_WITHOUT_KEYS, _WITH_KEYS = "NULL", "CURVE"
+_OTHERS: Final = {
+    b"HTTP/": "an HTTP server",
+    b"SSH-": "an SSH server",
+    b"<": "an HTTP server",
+    b"\x15\x03": "a TLS server",
+}
+"""Who they are that begin so."""
+_STEPS: Final = "feelahead keys --help has the steps on both machines"
+
+_VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
+
+
+class Wrong(StrEnum):
+    """What kind of thing is wrong, in the order in which it is looked for."""
+
+    NAME = "name"
+    ROUTE = "route"
+    CLOSED = "closed port"
+    FIREWALL = "firewall"
+    OTHER = "something else"
+    KEYS = "keys"
+    ROBOT_KEY = "robot key"
+    OUR_KEY = "our key"
+    SILENT = "no answer"
+    VERSION = "version"
+    VIEW = "view port"
+    LARGE = "large packets"
+
+
+@dataclass(frozen=True)
+class Opening:
+    """How a port took a TCP connection, and what it said first."""
+
+    error: int | None = None
+    """The errno of a connection that failed, ETIMEDOUT for one that nobody answered; None for one that stands."""
+    said: bytes = b""
+    hung_up: bool = False
+    """Whether it ended the connection by itself."""
+    took_s: float = 0.0
+    """Until the connection stood."""
+
+
+@dataclass(frozen=True)
+class Talk:
+    """What came of questions that ask for nothing, over ZeroMQ."""
+
+    handshake: Literal["key refused", "failed"] | None = None
+    """How it failed, if it did."""
+    answered: bool = False
+    other_version: str | None = None
+    """What the robot side speaks, where that is another protocol than ours."""
+    round_trips_s: tuple[float, ...] = ()
+    place: int = 0
+    """The one that we would get: 0 owns the arm."""
+    waiting: int = 0
+    """How many observe already."""
+
+
+@dataclass(frozen=True)
+class LinkFacts:
+    """What is known of the way so far; None for what has not been looked at yet."""
+
+    control: str
+    """As HOST:PORT."""
+    view: str
+    keys: str | None = None
+    """Our public key, where we have been given keys."""
+    loopback: bool = False
+    """Whether the robot side is sought on this machine."""
+    unresolved: str | None = None
+    """Why a name cannot be resolved."""
+    control_opening: Opening | None = None
+    talk: Talk | None = None
+    view_opening: Opening | None = None
+    telemetry: bool | None = None
+    """Whether the view port said what it is for."""
+    large_arrive: bool | None = None
+    """Whether packets of full size reach the robot side."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """The first thing that is wrong."""
+
+    wrong: Wrong
+    said: str
+    remedy: str
+
+
+def judge(facts: LinkFacts) -> Fault | None:
+    """The first thing that is wrong with what has been looked at; None if nothing is."""
+    if facts.unresolved is not None:
+        said, _, valid = facts.unresolved.partition("; valid: ")
+        return Fault(Wrong.NAME, said, f"say {valid}, in /etc/hosts for example")
+    return (
+        (facts.control_opening and _judge_port(facts, facts.control, facts.control_opening))
+        or (facts.talk and _judge_talk(facts, facts.talk))
+        or (facts.view_opening and _judge_view(facts, facts.view_opening))
+        or _judge_telemetry(facts)
+        or _judge_size(facts)
+    )
+
+
+def told(facts: LinkFacts) -> dict[str, object]:
+    """The same for programs."""
+    fault, talk = judge(facts), facts.talk
+    trips_s = talk.round_trips_s if talk is not None else ()
+    answered = talk is not None and talk.answered
+    return {
+        "connect": facts.control,
+        "view_connect": facts.view,
+        "reached": fault is None,
+        "wrong": None if fault is None else fault.wrong.value,
+        "said": None if fault is None else fault.said,
+        "remedy": None if fault is None else fault.remedy,
+        "protocol": PROTOCOL_VERSION,
+        "round_trip_ms": 1e3 * min(trips_s) if trips_s else None,
+        "round_trips": len(trips_s),
+        "arm": None if talk is None or not answered else "free" if talk.place == 0 else "taken",
+        "waiting": None if talk is None or not answered else talk.waiting,
+    }
+
+
+def reached(facts: LinkFacts) -> str:
+    """The line for a way on which nothing is wrong."""
+    talk = facts.talk or Talk()
+    trips_s = talk.round_trips_s
+    measured = f"round trip {1e3 * min(trips_s):.1f} ms (best of {len(trips_s)})" if trips_s else "round trip unknown"
+    if talk.place == 0:
+        arm = "the arm is free (you would own it)"
+    else:
+        arm = f"somebody has the arm (you would observe, as number {talk.place} of those who wait)"
+    return f"reached: protocol {PROTOCOL_VERSION}, {measured}, {arm}"
+
+
+def _judge_port(facts: LinkFacts, place: str, opening: Opening) -> Fault | None:
+    if opening.error is not None:
+        return _judge_error(facts, place, opening.error)
+    mechanism = mechanism_of(opening.said)
+    if mechanism is None:
+        return _judge_stranger(place, opening)
+    if facts.keys is None and mechanism == _WITH_KEYS:
+        return Fault(
+            Wrong.KEYS,
+            f"the robot side at {place} asks for keys, and none were given",
+            f"--keys FOLDER --robot-key KEY ({_STEPS})",
+        )
+    if facts.keys is not None and mechanism == _WITHOUT_KEYS:
+        return Fault(
+            Wrong.KEYS,
+            f"the robot side at {place} runs without keys, and --keys was given",
+            f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm",
+        )
+    if mechanism not in (_WITH_KEYS, _WITHOUT_KEYS):
+        return Fault(
+            Wrong.OTHER, f"{place} speaks ZeroMQ with {mechanism!r:.24}, as no robot side does", _see_who(place)
+        )
+    return None
+
+
+def _judge_error(facts: LinkFacts, place: str, error: int) -> Fault:
+    host, _, port = place.rpartition(":")
+    if error == errno.ECONNREFUSED:
+        start = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port} and --keys FOLDER"
+        return Fault(
+            Wrong.CLOSED,
+            f"{place} refuses connections: nothing listens there",
+            f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port}"
+            if facts.loopback
+            else f"{start}: without --bind it listens on its own loopback alone",
+        )
+    if error == errno.ETIMEDOUT:
+        ports = " and ".join(dict.fromkeys(one.rpartition(":")[2] for one in (facts.control, facts.view)))
+        return Fault(
+            Wrong.FIREWALL,
+            f"{place} gave no answer in {CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has "
+            "that address",
+            f"let TCP ports {ports} in on the robot's machine, such as: sudo ufw allow proto tcp from any to any port "
+            f"{ports.replace(' and ', ',')}; whether it is on: ping {host.strip('[]')}",
+        )
+    if error == errno.EHOSTUNREACH:
+        reason = "no machine on its network has that address, a router knows no way, or a firewall rejects it"
+    elif error == errno.ENETUNREACH:
+        reason = "this machine is in no network from which it can be reached"
+    else:
+        reason = "this machine does not send there"
+    return Fault(
+        Wrong.ROUTE,
+        f"no way to {place} ({os.strerror(error)}): {reason}",
+        f"see that the robot's machine is on, and both are in one network: ip route get {host.strip('[]')}",
+    )
+
+
+def _judge_stranger(place: str, opening: Opening) -> Fault:
+    if opening.said:
+        known = (name for start, name in _OTHERS.items() if opening.said.startswith(start))
+        who = next(known, f"something that begins with {opening.said[:16]!r}")
+        return Fault(Wrong.OTHER, f"at {place} is {who}, and no robot side", _see_who(place))
+    if opening.hung_up:
+        return Fault(
+            Wrong.OTHER,
+            f"{place} takes connections and hangs up at once: a forwarded port with nothing behind it, or a robot side "
+            "with too many connections",
+            "start the robot side behind it, or end whoever keeps connecting",
+        )
+    return Fault(
+        Wrong.OTHER,
+        f"{place} takes connections and says nothing: no robot side, or one that stands still",
+        f"{_see_who(place)}; a stopped process goes on after: kill -CONT PID",
+    )
+
+
+def _see_who(place: str) -> str:
+    port = place.rpartition(":")[2]
+    return f"say the robot side's own port; who has this one is shown on that machine by: ss -ltnp 'sport = :{port}'"
+
+
+def _judge_talk(facts: LinkFacts, talk: Talk) -> Fault | None:
+    if talk.handshake is not None:
+        return _judge_handshake(facts, facts.control, talk.handshake)
+    if talk.other_version is not None:
+        return Fault(
+            Wrong.VERSION,
+            f"the robot side speaks {talk.other_version}, this machine {PROTOCOL_VERSION}",
+            "install the same release of feelahead on both",
+        )
+    if not talk.answered:
+        return Fault(
+            Wrong.SILENT,
+            f"{facts.control} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its "
+            "view port, or another program",
+            "wait until it says that it listens (its first start compiles for a minute), and say its control port",
+        )
+    return None
+
+
+def _judge_handshake(facts: LinkFacts, place: str, handshake: str) -> Fault:
+    if handshake == "key refused":
+        return Fault(
+            Wrong.OUR_KEY,
+            f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked",
+            f"run there: feelahead keys allow NAME {facts.keys}",
+        )
+    if facts.keys is None:
+        return Fault(
+            Wrong.OTHER, f"{place} speaks ZeroMQ and is no control port, but perhaps a view port", _see_who(place)
+        )
+    return Fault(
+        Wrong.ROBOT_KEY,
+        f"whoever is at {place} has another key than --robot-key says, or is no such port of a robot side",
+        "--robot-key with what is shown on the robot's machine by: feelahead keys show robot",
+    )
+
+
+def _judge_view(facts: LinkFacts, opening: Opening) -> Fault | None:
+    fault = _judge_port(facts, facts.view, opening)
+    if fault is None:
+        return None
+    remedy = f"{fault.remedy}; or {_VIEW_CONNECT}" if fault.wrong is Wrong.FIREWALL else _VIEW_CONNECT
+    return Fault(Wrong.VIEW, f"the control port works, but not the view port: {fault.said}", remedy)
+
+
+def _judge_telemetry(facts: LinkFacts) -> Fault | None:
+    if facts.telemetry is not False:
+        return None
+    return Fault(
+        Wrong.VIEW,
+        f"the control port works, but {facts.view} is no view port of a robot side, or not of this one: it sends no "
+        "telemetry",
+        _VIEW_CONNECT,
+    )
+
+
+def _judge_size(facts: LinkFacts) -> Fault | None:
+    if facts.large_arrive is not False:
+        return None
+    return Fault(
+        Wrong.LARGE,
+        f"small packets reach {facts.control}, large ones do not: the way swallows what is longer than it can carry",
+        "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)",
+    )

@@ -1,0 +1,396 @@
+"""`feelahead doctor --connect`: all that can be wrong on the way, by made-up facts and by sockets on loopback."""
+
+import contextlib
+import errno
+import json
+import re
+import socket
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigurationError
+from common.protocol.codec import PROTOCOL_VERSION, encode
+from common.protocol.link_end import LinkEnd
+from common.sockets.allow_list import AllowList
+from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.greeting import KNOCK
+from common.sockets.keys import KeyFolder
+from feelahead.commands.doctor import link_facts
+from feelahead.commands.doctor.link_judgement import LinkFacts, Opening, Talk, Wrong, judge, reached
+from feelahead.main import command
+from tests.helpers.serving_robot import ServingRobot
+
+# By made-up facts
+
+
+def greeting(mechanism: bytes) -> Opening:
+    return Opening(said=KNOCK + mechanism.ljust(20, b"\0") + bytes(32))
+
+
+PLAIN, CURVE = greeting(b"NULL"), greeting(b"CURVE")
+FINE = LinkFacts(
+    "robot:5555",
+    "robot:5556",
+    control_opening=PLAIN,
+    talk=Talk(answered=True, round_trips_s=(2e-3, 1.26e-3, 3e-3)),
+    view_opening=PLAIN,
+    telemetry=True,
+    large_arrive=True,
+)
+WITH_KEYS = replace(FINE, keys="ab" * 32, control_opening=CURVE, view_opening=CURVE)
+
+
+def failed(error: int) -> LinkFacts:
+    return LinkFacts("robot:5555", "robot:5556", control_opening=Opening(error))
+
+
+@pytest.mark.parametrize(
+    ("facts", "wrong", "said", "remedy"),
+    [
+        (
+            LinkFacts("robot:5555", "", unresolved="--connect: 'robot' cannot be resolved; valid: an IP address"),
+            Wrong.NAME,
+            "'robot' cannot be resolved",
+            "an IP address",
+        ),
+        (failed(errno.ENETUNREACH), Wrong.ROUTE, "this machine is in no network", "ip route get robot"),
+        (failed(errno.EHOSTUNREACH), Wrong.ROUTE, "no machine on its network has that address", "ip route get robot"),
+        (failed(errno.EACCES), Wrong.ROUTE, "Permission denied", "ip route get robot"),
+        (failed(errno.ECONNREFUSED), Wrong.CLOSED, "nothing listens there", "--bind tcp://0.0.0.0:5555"),
+        (
+            replace(failed(errno.ECONNREFUSED), loopback=True),
+            Wrong.CLOSED,
+            "nothing listens there",
+            "--connect tcp://ROBOT:5555",
+        ),
+        (failed(errno.ETIMEDOUT), Wrong.FIREWALL, "robot:5555 gave no answer", "any to any port 5555,5556"),
+        (replace(FINE, control_opening=Opening(said=b"HTTP/1.1 400")), Wrong.OTHER, "an HTTP server", "ss -ltnp"),
+        (replace(FINE, control_opening=Opening(said=b"SSH-2.0-x")), Wrong.OTHER, "an SSH server", "ss -ltnp"),
+        (replace(FINE, control_opening=Opening(said=b"220 mail")), Wrong.OTHER, "b'220 mail'", "ss -ltnp"),
+        (replace(FINE, control_opening=Opening(said=PLAIN.said[:12])), Wrong.OTHER, "begins with", "ss -ltnp"),
+        (replace(FINE, control_opening=Opening()), Wrong.OTHER, "says nothing", "kill -CONT"),
+        (replace(FINE, control_opening=Opening(hung_up=True)), Wrong.OTHER, "hangs up at once", "behind it"),
+        (replace(FINE, control_opening=greeting(b"PLAIN")), Wrong.OTHER, "'PLAIN'", "ss -ltnp"),
+        (replace(FINE, control_opening=CURVE), Wrong.KEYS, "asks for keys", "--robot-key KEY"),
+        (replace(WITH_KEYS, control_opening=PLAIN), Wrong.KEYS, "runs without keys", "leave --keys out"),
+        (
+            replace(WITH_KEYS, talk=Talk("failed")),
+            Wrong.ROBOT_KEY,
+            "another key than --robot-key",
+            "feelahead keys show robot",
+        ),
+        (
+            replace(WITH_KEYS, talk=Talk("key refused")),
+            Wrong.OUR_KEY,
+            "never allowed there, or was revoked",
+            f"feelahead keys allow NAME {'ab' * 32}",
+        ),
+        (replace(FINE, talk=Talk("failed")), Wrong.OTHER, "no control port", "ss -ltnp"),
+        (replace(FINE, talk=Talk()), Wrong.SILENT, "does not answer", "wait until it says that it listens"),
+        (
+            replace(FINE, talk=Talk(other_version="protocol version 99")),
+            Wrong.VERSION,
+            f"speaks protocol version 99, this machine {PROTOCOL_VERSION}",
+            "the same release",
+        ),
+        (replace(FINE, view_opening=Opening(errno.ECONNREFUSED)), Wrong.VIEW, "robot:5556 refuses", "--view-connect"),
+        (replace(FINE, view_opening=Opening(errno.ETIMEDOUT)), Wrong.VIEW, "robot:5556 gave no answer", "5555,5556"),
+        (replace(FINE, view_opening=CURVE), Wrong.VIEW, "robot:5556 asks for keys", "--view-connect"),
+        (replace(FINE, telemetry=False), Wrong.VIEW, "sends no telemetry", "--view-connect"),
+        (replace(FINE, large_arrive=False), Wrong.LARGE, "large ones do not", "mtu 1280"),
+    ],
+)
+def test_the_first_thing_that_is_wrong(facts: LinkFacts, wrong: Wrong, said: str, remedy: str) -> None:
+    fault = judge(facts)
+    assert fault is not None
+    assert (fault.wrong, "\n" in fault.said + fault.remedy) == (wrong, False)
+    assert said in fault.said
+    assert remedy in fault.remedy
+
+
+def test_what_comes_first_is_said_first() -> None:
+    everything = replace(
+        WITH_KEYS,
+        control_opening=Opening(errno.ETIMEDOUT),
+        talk=Talk("key refused"),
+        view_opening=Opening(errno.ECONNREFUSED),
+        telemetry=False,
+        large_arrive=False,
+    )
+    expected = [Wrong.FIREWALL, Wrong.OUR_KEY, Wrong.VIEW, Wrong.VIEW, Wrong.LARGE]
+    for field, wrong in zip(
+        ("control_opening", "talk", "view_opening", "telemetry", "large_arrive"), expected, strict=True
+    ):
+        fault = judge(everything)
+        assert fault is not None
+        assert fault.wrong is wrong
+        everything = replace(everything, **{field: getattr(WITH_KEYS, field)})
+    assert judge(everything) is None
+
+
+@pytest.mark.parametrize(
+    "facts", [FINE, WITH_KEYS, LinkFacts("robot:5555", "robot:5556"), replace(FINE, telemetry=None)]
+)
+def test_nothing_is_wrong_with_what_was_not_looked_at(facts: LinkFacts) -> None:
+    assert judge(facts) is None
+
+
+def test_who_has_the_arm() -> None:
+    begin = f"reached: protocol {PROTOCOL_VERSION}, round trip 1.3 ms (best of 3), "
+    assert reached(FINE) == begin + "the arm is free (you would own it)"
+    taken = Talk(answered=True, round_trips_s=(1.26e-3, 2.0, 3.0), place=2, waiting=1)
+    line = "somebody has the arm (you would observe, as number 2 of those who wait)"
+    assert reached(replace(FINE, talk=taken)) == begin + line
+
+
+# By sockets on loopback
+
+
+LONG_S, SHORT_S = 60.0, 0.3
+"""For what comes in the end, and for what never does."""
+LINE_END = b"\r\n\r\n"
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However busy the machine is."""
+    limits = ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "_MEASURE_S")
+    for name in (*limits, "CONNECT_LIMIT_S"):
+        monkeypatch.setattr(link_facts, name, LONG_S)
+    monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, LONG_S), (LINE_END, LONG_S)))
+    monkeypatch.setattr(link_facts, "_ROUND_TRIPS", 3)
+
+
+@pytest.fixture
+def no_answers(monkeypatch: pytest.MonkeyPatch, patience: None) -> None:  # noqa: ARG001  # after it
+    for name in ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S"):
+        monkeypatch.setattr(link_facts, name, SHORT_S)
+
+
+class Doctor:
+    """Asks the doctor, and keeps what it says."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def line(self, *arguments: str, code: int = 1) -> str:
+        assert command(["doctor", *arguments]) == code
+        [line] = self._capsys.readouterr().out.splitlines()
+        return str(line)
+
+    def of(self, robot: ServingRobot, *arguments: str, code: int = 1) -> str:
+        return self.line("--connect", robot.control, "--view-connect", robot.view, *arguments, code=code)
+
+
+@pytest.fixture
+def doctor(capsys: pytest.CaptureFixture[str]) -> Doctor:
+    return Doctor(capsys)
+
+
+@contextlib.contextmanager
+def listening(accept: bool = False) -> Iterator[str]:
+    """A port that takes connections and says nothing, or hangs up at once."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def hang_up() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    server.accept()[0].close()
+
+        if accept:
+            threading.Thread(target=hang_up, daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)
+
+
+@contextlib.contextmanager
+def closed() -> Iterator[str]:
+    """A port that is taken, so that nobody else gets it, and on which nobody listens."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+
+
+@contextlib.contextmanager
+def http_server() -> Iterator[str]:
+    class Quiet(BaseHTTPRequestHandler):
+        def log_message(self, format: str, *arguments: object) -> None:  # noqa: A002  # its name
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Quiet) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"tcp://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+def test_a_closed_port(doctor: Doctor) -> None:
+    with closed() as address:
+        assert doctor.line("--connect", address).startswith("closed port: 127.0.0.1:")
+
+
+def test_a_server_that_says_nothing(doctor: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, SHORT_S), (LINE_END, SHORT_S)))
+    with listening() as address:
+        assert "takes connections and says nothing" in doctor.line("--connect", address)
+
+
+def test_a_server_that_hangs_up(doctor: Doctor) -> None:
+    with listening(accept=True) as address:
+        assert "hangs up at once" in doctor.line("--connect", address)
+
+
+def test_an_http_server(doctor: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, SHORT_S), (LINE_END, LONG_S)))
+    with http_server() as address:
+        assert "is an HTTP server, and no robot side" in doctor.line("--connect", address)
+
+
+def test_a_name_that_nobody_knows(doctor: Doctor) -> None:
+    assert doctor.line("--connect", "tcp://robot.invalid:5555").startswith("name: --connect: 'robot.invalid'")
+    line = doctor.line("--connect", "tcp://127.0.0.1:5555", "--view-connect", "tcp://view.invalid:5556")
+    assert line.startswith("name: --view-connect: 'view.invalid'")
+
+
+def test_all_is_well_and_nobody_was_let_in(doctor: Doctor) -> None:
+    with ServingRobot() as robot:
+        line = doctor.of(robot, code=0)
+        pattern = rf"reached: protocol {PROTOCOL_VERSION}, round trip [\d.]+ ms \(best of 3\), the arm is free .*"
+        assert re.fullmatch(pattern, line)
+        assert robot.session.leases_granted == robot.session.refused == robot.session.motion_received == 0
+
+
+def test_whoever_has_the_arm_keeps_it(doctor: Doctor) -> None:
+    with ServingRobot() as robot:
+        owner = LinkEnd("operator", 2, "an operator's")
+        now_s = robot._clock.now()
+        robot.session.receive(b"owner", encode(owner.hello(now_s)), now_s)
+        token = robot.session.lease.token
+        assert "somebody has the arm (you would observe, as number 1 " in doctor.of(robot, code=0)
+        assert robot.session.owner_peer == b"owner"
+        assert (robot.session.lease.token, robot.session.leases_granted) == (token, 1)
+        assert robot.session.lease.observers() == []
+
+
+def test_one_object_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    with ServingRobot() as robot:
+        assert command(["doctor", "--connect", robot.control, "--view-connect", robot.view, "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert (told["reached"], told["wrong"], told["arm"], told["waiting"]) == (True, None, "free", 0)
+        assert (told["protocol"], told["round_trips"]) == (PROTOCOL_VERSION, 3)
+        assert told["round_trip_ms"] > 0.0
+    with ServingRobot() as robot, closed() as view:
+        assert command(["doctor", "--connect", robot.control, "--view-connect", view, "--json"]) == 1
+        told = json.loads(capsys.readouterr().out)
+        assert (told["reached"], told["wrong"], told["view_connect"]) == (False, "view port", view[6:])
+        assert "refuses connections" in told["said"]
+        assert told["remedy"].startswith("say --view-connect")
+
+
+@pytest.mark.usefixtures("no_answers")
+def test_a_robot_side_that_does_not_answer(doctor: Doctor) -> None:
+    with ServingRobot(answers=False, publishes=False) as robot:
+        assert doctor.of(robot).startswith("no answer: ")
+
+
+def test_a_robot_side_of_another_version(doctor: Doctor) -> None:
+    with ServingRobot(version=PROTOCOL_VERSION + 1) as robot:
+        line = doctor.of(robot)
+    assert line.startswith(f"version: the robot side speaks protocol version {PROTOCOL_VERSION + 1}, this machine")
+
+
+@pytest.mark.usefixtures("no_answers")
+def test_the_view_port_in_place_of_the_control_port(doctor: Doctor) -> None:
+    with ServingRobot() as robot:
+        line = doctor.line("--connect", robot.view, "--view-connect", robot.control)
+    assert "its view port" in line or "perhaps a view port" in line
+
+
+def test_no_view_port(doctor: Doctor) -> None:
+    with ServingRobot() as robot, closed() as view:
+        line = doctor.line("--connect", robot.control, "--view-connect", view)
+    assert line.startswith("view port: the control port works, but not the view port: 127.0.0.1:")
+
+
+def test_a_view_port_that_sends_nothing(doctor: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ServingRobot(publishes=False) as robot:
+        monkeypatch.setattr(link_facts, "_TELEMETRY_LIMIT_S", SHORT_S)
+        assert "sends no telemetry" in doctor.of(robot)
+
+
+class Keyed:
+    """A robot side with keys, and an operator whom it lets in."""
+
+    def __init__(self, folder: Path) -> None:
+        self.robot = KeyFolder(folder / "robot")
+        self.operator = KeyFolder(folder / "operator")
+        self.robot_key, secret = make_key_pair()
+        self.operator_key, ours = make_key_pair()
+        self.operator.write_pair("operator", self.operator_key, ours)
+        self.robot.allow("anna", self.operator_key)
+        self.allowed = AllowList(self.robot)
+        self.allowed.refresh()
+        self.keys = RobotKeys(secret, self.allowed)
+
+    def arguments(self, robot_key: str | None = None) -> tuple[str, ...]:
+        return ("--keys", str(self.operator.path), "--robot-key", robot_key or self.robot_key)
+
+
+@pytest.fixture
+def keyed(tmp_path: Path) -> Keyed:
+    return Keyed(tmp_path)
+
+
+def test_all_is_well_with_keys(doctor: Doctor, keyed: Keyed) -> None:
+    with ServingRobot(keys=keyed.keys) as robot:
+        assert doctor.of(robot, *keyed.arguments(), code=0).startswith("reached: ")
+    assert robot.sockets.refused == 0
+
+
+def test_keys_on_one_side_alone(doctor: Doctor, keyed: Keyed) -> None:
+    with ServingRobot(keys=keyed.keys) as robot:
+        assert "asks for keys, and none were given" in doctor.of(robot)
+    assert robot.sockets.refused == 0
+    with ServingRobot() as robot:
+        assert "runs without keys, and --keys was given" in doctor.of(robot, *keyed.arguments())
+
+
+def test_a_wrong_robot_key(doctor: Doctor, keyed: Keyed) -> None:
+    with ServingRobot(keys=keyed.keys) as robot:
+        assert doctor.of(robot, *keyed.arguments(make_key_pair()[0])).startswith("robot key: ")
+
+
+def test_a_key_that_is_not_let_in(doctor: Doctor, keyed: Keyed) -> None:
+    keyed.robot.revoke("anna")
+    keyed.allowed.refresh()
+    with ServingRobot(keys=keyed.keys) as robot:
+        line = doctor.of(robot, *keyed.arguments())
+    assert line.startswith("our key: ")
+    assert line.endswith(f"feelahead keys allow NAME {keyed.operator_key}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--connect", "127.0.0.1:5555"], "'127.0.0.1:5555' is no address"),
+        (["--connect", "tcp://*:5555"], "names no host"),
+        (["--connect", "tcp://robot.invalid:99999"], "'99999'"),
+        (["--connect", "tcp://127.0.0.1:65535"], "--view-connect"),
+        (["--connect", "tcp://127.0.0.1:1", "--view-connect", "view"], "--view-connect: 'view' is no address"),
+        (["--view-connect", "tcp://127.0.0.1:5556"], "--view-connect without --connect"),
+        (["--keys", "/nowhere"], "--keys without --connect"),
+        (["--connect", "tcp://127.0.0.1:1", "--robot-key", "ab"], "--robot-key without --keys"),
+        (["--connect", "tcp://127.0.0.1:1", "--keys", "/nowhere"], "feelahead keys make operator"),
+    ],
+)
+def test_bad_input_is_refused(arguments: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        command(["doctor", *arguments])
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,98 @@
+"""A robot side without an arm: real sockets and the real session, in a thread or as a program.
+
+python serving_robot.py tcp://ADDRESS:PORT     until its standard input ends
+"""
+
+import sys
+import threading
+from types import TracebackType
+from typing import Self
+
+import msgpack
+
+from common.clock import MonotonicClock
+from common.protocol.codec import PROTOCOL_VERSION, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Telemetry
+from common.sockets.authentication import RobotKeys
+from common.sockets.robot import RobotSockets
+from robot_side.operators.operator_session import OperatorSession
+from robot_side.operators.safety import Safety, SafetySettings
+
+LEASE_S = 59.0
+"""So that an owner who says nothing stays one."""
+
+
+class ServingRobot:
+    """Answers as a robot side does, and publishes telemetry."""
+
+    def __init__(
+        self,
+        bind: str = "tcp://127.0.0.1:0",
+        keys: RobotKeys | None = None,
+        *,
+        insecure: bool = False,
+        answers: bool = True,
+        publishes: bool = True,
+        version: int = PROTOCOL_VERSION,
+    ) -> None:
+        self.session = OperatorSession(
+            lambda: LinkEnd("robot", 7, "a robot's"), Safety(SafetySettings(lease_s=LEASE_S))
+        )
+        self.sockets = RobotSockets(bind, keys=keys, insecure=insecure)
+        self.control, self.view = self.sockets.control_endpoint, self.sockets.view_endpoint
+        self.payloads: list[bytes] = []
+        self._answers, self._publishes, self._version = answers, publishes, version
+        self._clock = MonotonicClock()
+        self._ends = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ends.set()
+        self._thread.join()
+        self.sockets.close()
+
+    def _serve(self) -> None:
+        while not self._ends.is_set():
+            self.sockets.wait(0.005)
+            received = self.sockets.receive()
+            now_s = self._clock.now()
+            for peer, payload in received if self._answers else ():
+                self.payloads.append(payload)
+                if self._version == PROTOCOL_VERSION:
+                    self.session.receive(peer, payload, now_s)
+                else:
+                    self.sockets.send(peer, msgpack.packb([self._version, "what nobody here knows"]))
+            for answer in self.session.take_answers(now_s):
+                self.sockets.send(answer.peer, answer.payload)
+            if self._publishes:
+                self.sockets.publish(b"telemetry", self._telemetry(now_s))
+
+    def _telemetry(self, now_s: float) -> bytes:
+        message = Telemetry(
+            self.session.view_header(now_s),
+            state="disarmed",
+            tool_position_m=(0.0, 0.0, 0.0),
+            tool_speed_m_s=0.0,
+            target=None,
+            target_in_tool_m=None,
+            up_in_tool=(0.0, 0.0, 1.0),
+            gripper_opening_m=0.0,
+            holding=False,
+            enlargement_m=0.0,
+            l2=0.0,
+            r2=0.0,
+        )
+        return encode(message)
+
+
+if __name__ == "__main__":
+    with ServingRobot(sys.argv[1], insecure=True) as robot:
+        print(robot.control, flush=True)
+        sys.stdin.read()
