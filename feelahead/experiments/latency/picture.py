@@ -7,7 +7,7 @@ from typing import Any, Final
 from common.emulation.spec import Direction
 from feelahead.experiments.latency.equivalence import mean_half_width
 from feelahead.experiments.latency.matrix import Row
-from feelahead.experiments.latency.tables import grouped, values, way
+from feelahead.experiments.latency.tables import by_seed, grouped, way
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 _WIDE: Final = 0.7
@@ -15,7 +15,7 @@ _WIDE: Final = 0.7
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Three panels: the delay in each direction, a mark for each trial with mean and 95 %, and contact speeds."""
+    """Three panels: the delay in each direction, a dot for each seed with mean and 95 %, and contact speeds."""
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     links = list(dict.fromkeys(row.trial.link for row in rows))
@@ -41,7 +41,7 @@ def _draw_delays(panel: Any, rows: Sequence[Row], links: Sequence[str], names: S
         colour, label = _COLOURS[names.index(medium) % len(_COLOURS)], medium
         for link in links:
             group = [row for row in rows if (row.trial.link, row.medium) == (link, medium)]
-            means = values(group, way(to, lambda one: one.mean_ms))
+            means = by_seed(group, way(to, lambda one: one.mean_ms))
             if not means:
                 continue
             place = _place(links, names, link, medium)
@@ -57,11 +57,12 @@ def _draw_speeds(panel: Any, rows: Sequence[Row], links: Sequence[str], names: S
     labelled = set()
     for (link, haptics, medium), group in grouped(rows).items():
         colour, label = _COLOURS[names.index(medium) % len(_COLOURS)], f"{medium}, {'on' if haptics else 'off'}"
-        # Whoever touches nothing has been stopped before it: 0 mm/s.
-        speeds = [row.figures.contact_speed_mm_s or 0.0 for row in group]
         place = _place(links, names, link, medium)
-        face = colour if haptics else "none"
-        shown = {"color": colour, "markerfacecolor": face, "label": "" if label in labelled else label}
-        panel.plot([place] * len(speeds), speeds, "o", **shown)
-        labelled.add(label)
-    panel.set(ylabel="mm/s", title="speed of the first contact (none: 0)", ylim=(0.0, None))
+        for row in group:
+            # An arm that the robot side stopped, for want of commands, has not been kept from the wall by any feeling.
+            mark = "x" if row.figures.stops else "o"
+            shown = {"color": colour, "markerfacecolor": colour if haptics else "none"}
+            text = "" if label in labelled or row.figures.stops else label
+            panel.plot(place, row.figures.contact_speed_mm_s or 0.0, mark, label=text, **shown)
+            labelled.update({text} - {""})
+    panel.set(ylabel="mm/s", title="first contact (none: 0; x: robot side stopped)", ylim=(-5.0, None))

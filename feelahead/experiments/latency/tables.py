@@ -17,7 +17,7 @@ from feelahead.experiments.latency.matrix import Row
 _COMPARED: Final[tuple[tuple[str, str, float, Callable[[WayFigures], float | None]], ...]] = (
     ("mean", "ms", 2.0, lambda way: way.mean_ms),
     ("sd", "ms", 1.0, lambda way: way.sd_ms),
-    ("lost", "%", 0.1, lambda way: None if way.loss_share is None else 100.0 * way.loss_share),
+    ("lost", "%-points", 0.1, lambda way: None if way.loss_share is None else 100.0 * way.loss_share),
 )
 """What the media are to agree on, in which unit, within which margin."""
 
@@ -110,7 +110,7 @@ def agreements(rows: Sequence[Row]) -> list[Agreement]:
             for direction in get_args(Direction):
                 for name, unit, margin, figure in _COMPARED:
                     parts = ([row for row in mine if row.medium == medium] for medium in (first, second))
-                    one, other = (_by_seed(part, way(direction, figure)) for part in parts)
+                    one, other = (by_seed(part, way(direction, figure)) for part in parts)
                     if one and other:
                         apart = difference(one, other, margin)
                         seeds = len(one), len(other)
@@ -118,7 +118,7 @@ def agreements(rows: Sequence[Row]) -> list[Agreement]:
     return found
 
 
-def _by_seed(rows: Sequence[Row], figure: Callable[[TrialFigures], float | None]) -> list[float]:
+def by_seed(rows: Sequence[Row], figure: Callable[[TrialFigures], float | None]) -> list[float]:
     """One number for each seed, the mean with and without haptics: an emulated link draws the same in both."""
     seeds = dict.fromkeys(row.trial.seed for row in rows)
     found = (values([row for row in rows if row.trial.seed == seed], figure) for seed in seeds)

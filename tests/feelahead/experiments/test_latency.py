@@ -95,7 +95,7 @@ def test_a_seed_counts_once_with_haptics_and_without() -> None:
     assert mean.difference == difference([50.0, 51.0, 52.0], [53.0, 54.0, 55.0], 2.0)
     said = printed(agreement_table(found))
     assert "virtual - loopback" in said
-    assert "equivalent [+0.00, +0.00] %" in said
+    assert "equivalent [+0.00, +0.00] %-points" in said
 
 
 def test_the_table_has_a_row_for_each_kind_and_json_has_every_trial() -> None:
