@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel test-containers lock clean
+.PHONY: demo test quick types test-kernel test-netem test-two-hosts test-containers latency-experiment soak lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -53,6 +53,9 @@ test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual
 # Needs Docker; in CI, root gets Debian's for the time being. It says so and is skipped elsewhere.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
 	$(BIN)/python -m tests.containers $(ARGS)
+
+soak: $(VENV)/.installed ## one owner and eight observers for ten minutes: does anything grow?
+	$(BIN)/feelahead try soak --observers 8 --minutes 10 $(ARGS)
 
 EXPORT = uv export --quiet --no-emit-project --no-header
 lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses

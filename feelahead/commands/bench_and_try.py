@@ -165,7 +165,7 @@ try_out = Menu(
             _BOTH_SIDES,
         ),
         "soak": Entry(
-            "feelahead.experiments.soak",
+            "feelahead.experiments.soak.command",
             "try_soak",
             "long runs: whether memory, descriptors and delays stay flat",
             _BOTH_SIDES,

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from feelahead.experiments.soak import Sample, flat, sample, try_soak
+from feelahead.experiments.soak.command import try_soak
+from feelahead.experiments.soak.sampling import Sample, flat, sample
 
 
 def series(*resident_mb: float, descriptors: int = 10) -> list[Sample]:
@@ -21,6 +22,7 @@ def test_what_fills_at_the_start_and_then_stays_is_flat() -> None:
 def test_what_keeps_growing_is_not() -> None:
     assert not flat(series(*range(100, 121)))
     assert not flat([*series(*[100] * 20), Sample(20.0, 102_400, 11)])
+    assert flat(series(*range(100, 121)), sides=2)
 
 
 def test_a_process_is_looked_at() -> None:
@@ -41,8 +43,27 @@ def test_a_short_one_in_virtual_time(capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.processes
+@pytest.mark.long
+def test_a_short_one_with_observers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert try_soak(["--minutes", "0.1", "--observers", "8"]) == 0
+    said = capsys.readouterr().out
+    assert "with 8 observers" in said
+    for name in ("robot side", "operator side", "observer 2", "this process"):
+        assert name in said
+    assert said.splitlines()[-1] == "flat"
+
+
+@pytest.mark.processes
 @pytest.mark.parametrize(
-    "arguments", [["--minutes", "0"], ["--minutes", "nan"], ["--link", "delay fast"], ["--seed", "-1"]]
+    "arguments",
+    [
+        ["--minutes", "0"],
+        ["--minutes", "nan"],
+        ["--link", "delay fast"],
+        ["--seed", "-1"],
+        ["--observers", "9"],
+        ["--observers", "1", "--virtual"],
+    ],
 )
 def test_bad_input_is_one_line(arguments: list[str]) -> None:
     done = subprocess.run(

@@ -1,0 +1,1 @@
+"""`feelahead try soak`: long runs."""

@@ -1,0 +1,118 @@
+"""The units of docs/systemd: systemd takes them, and their command lines are ones that the commands take."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from common.sockets.authentication import make_key_pair
+from common.sockets.keys import KeyFolder
+from tests.helpers.repository import ROOT
+
+pytestmark = pytest.mark.processes
+
+UNITS = ROOT / "docs" / "systemd"
+INSTALLED = "/opt/feelahead/bin/"
+ANALYZE = shutil.which("systemd-analyze")
+EXPOSURE = {"feelahead-robot": 2.0, "feelahead-operator": 7.0}
+"""At most so much, from 0 to 10, by systemd's own measure."""
+USER = {"feelahead-robot": [], "feelahead-operator": ["--user"]}
+
+needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not installed here")
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> KeyFolder:
+    """A folder with both sides' keys, each let in by the other."""
+    folder = KeyFolder(tmp_path / "keys")
+    for side in ("robot", "operator"):
+        folder.write_pair(side, *make_key_pair())
+    folder.allow("anna", folder.public_path("operator").read_text().splitlines()[-1])
+    return folder
+
+
+def analyzed(name: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """systemd-analyze on the unit, its program replaced by one that is there."""
+    text = (UNITS / f"{name}.service").read_text().replace(f"{INSTALLED}{name}", sys.executable)
+    unit = folder / f"{name}.service"
+    unit.write_text(text)
+    return subprocess.run(
+        [str(ANALYZE), *USER[name], "--no-pager", *arguments, str(unit)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "XDG_RUNTIME_DIR": str(folder)},
+        check=False,
+    )
+
+
+@needs_systemd
+@pytest.mark.parametrize("name", USER)
+def test_systemd_finds_nothing_wrong(name: str, tmp_path: Path) -> None:
+    verified = analyzed(name, tmp_path, "verify")
+    assert (verified.returncode, verified.stderr) == (0, "")
+
+
+@needs_systemd
+@pytest.mark.parametrize("name", USER)
+def test_little_is_left_open(name: str, tmp_path: Path) -> None:
+    judged = analyzed(name, tmp_path, "security", "--offline=true")
+    if "Unknown option" in judged.stderr or "unrecognized option" in judged.stderr:
+        pytest.skip("this systemd-analyze judges no unit files")
+    level = re.search(r"exposure level for .*: ([\d.]+)", judged.stdout)
+    assert level is not None, judged.stderr
+    assert float(level[1]) <= EXPOSURE[name]
+
+
+def command_line(name: str, **replaced: str) -> list[str]:
+    """The unit's ExecStart as systemd would split it, with its own Environment, and `replaced` in place of that."""
+    text = (UNITS / f"{name}.service").read_text()
+    variables = dict(
+        pair.split("=", 1) for line in re.findall(r"^Environment=(.*)$", text, re.MULTILINE) for pair in line.split()
+    )
+    variables |= replaced
+    [command] = re.findall(r"^ExecStart=(.*)$", text, re.MULTILINE)
+    program, *words = command.split()
+    assert program == INSTALLED + name
+    line: list[str] = []
+    for word in words:
+        if word.startswith("$") and not word.startswith("${"):
+            line += variables.get(word[1:], "").split()
+        else:
+            line.append(re.sub(r"\$\{(\w+)\}", lambda found: variables[found[1]], word))
+    return line
+
+
+def run(module: str, line: list[str]) -> subprocess.CompletedProcess[str]:
+    # Of a flag that is given twice the last one holds.
+    command = [sys.executable, "-P", "-m", module, *line, "--duration", "0.5", "--status", "none"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_the_robot_side_takes_its_flags(keys: KeyFolder) -> None:
+    line = command_line("feelahead-robot", FEELAHEAD_BIND="tcp://127.0.0.1:0", FEELAHEAD_FLAGS="--seed 3 --realtime")
+    line = [word.replace("/etc/feelahead/keys", str(keys.path)) for word in line]
+    assert str(keys.path) in line
+    ended = run("robot_side", line)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+
+
+def test_the_operator_side_takes_its_flags(keys: KeyFolder) -> None:
+    line = command_line(
+        "feelahead-operator", FEELAHEAD_CONNECT="tcp://127.0.0.1:9", FEELAHEAD_FLAGS="--device simulated"
+    )
+    line = [word.replace("%E/feelahead/keys", str(keys.path)) for word in line]
+    assert str(keys.public_path("robot")) in line
+    ended = run("operator_side", line)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+
+
+def test_what_a_unit_writes_to_is_what_it_may() -> None:
+    """Machine code and covers are kept below the one folder that is writable."""
+    text = (UNITS / "feelahead-robot.service").read_text()
+    assert "CacheDirectory=feelahead\n" in text
+    assert "NUMBA_CACHE_DIR=%C/feelahead/kernels XDG_CACHE_HOME=%C\n" in text  # covers: $XDG_CACHE_HOME/feelahead
+    assert "\nMemoryDenyWriteExecute" not in text
