@@ -50,9 +50,16 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(BIN)/python -m tests.kernel $(ARGS)
 
+test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
+	$(BIN)/python -m tests.netem $(ARGS)
+
 # Needs Docker; in CI, root gets Debian's for the time being. It says so and is skipped elsewhere.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
 	$(BIN)/python -m tests.containers $(ARGS)
+
+# Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
+latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
+	$(BIN)/feelahead try latency --compose --out latency $(ARGS)
 
 soak: $(VENV)/.installed ## one owner and eight observers for ten minutes: does anything grow?
 	$(BIN)/feelahead try soak --observers 8 --minutes 10 $(ARGS)

@@ -8,8 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from tests.kernel.debian import default_cache
 from tests.kernel.machine import MachineError, run_machine
-from tests.kernel.packages import default_cache, provide
+from tests.kernel.packages import provide
 from tests.kernel.ramdisk import WRITABLE, make_ramdisk, module_order
 from tests.kernel.skipped import SkippedError
 
@@ -20,7 +21,9 @@ _LAST_WORDS = 25
 def main() -> int:
     """0 when the test passed or was skipped, which the last line says."""
     parser = argparse.ArgumentParser(prog="python -m tests.kernel", description=__doc__)
-    parser.add_argument("--cache", type=Path, default=default_cache(), help="where the packages are kept (%(default)s)")
+    parser.add_argument(
+        "--cache", type=Path, default=default_cache("kernel-test"), help="where the packages are kept (%(default)s)"
+    )
     parser.add_argument("--limit", type=float, default=900.0, metavar="S", help="give up after so long (%(default)s s)")
     parser.add_argument("--console", type=Path, metavar="FILE", help="write the kernel's messages there")
     parser.add_argument("only", nargs="*", help="words: run only the checks whose names contain one of them")

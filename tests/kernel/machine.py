@@ -41,7 +41,7 @@ def run_machine(
         env=os.environ | parts.qemu_environment,
     )
     try:
-        code = _follow(machine, limit_s, say)
+        code = follow(machine, limit_s, say)
         machine.wait(timeout=20.0)
     except subprocess.TimeoutExpired:
         pass  # it has said its result
@@ -53,8 +53,8 @@ def run_machine(
     return code
 
 
-def _follow(machine: "subprocess.Popen[bytes]", limit_s: float, say: Callable[[str], None]) -> int:
-    """Read lines until the one with the exit code."""
+def follow(machine: "subprocess.Popen[bytes]", limit_s: float, say: Callable[[str], None]) -> int:
+    """Pass each line to `say` until the one with the exit code, and return that."""
     stream = machine.stdout
     assert stream is not None
     end_s = time.monotonic() + limit_s

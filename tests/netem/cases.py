@@ -1,0 +1,42 @@
+"""What is measured in the machine and compared outside of it."""
+
+from dataclasses import dataclass
+
+from common.emulation.clauses import LinkModel
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One link, in words that netem and we both read."""
+
+    name: str
+    netem: str
+    model: LinkModel
+    messages: int = 6000
+    judged: bool = True
+    """Else it is shown: the model is known to differ."""
+
+    @property
+    def file(self) -> str:
+        """The recording of it."""
+        return f"{self.name}.csv"
+
+
+_NORMAL = "delay 20ms 5ms distribution normal"
+
+PATH_CASE = Case("path", "delay 20ms", "datagram", messages=2000, judged=False)
+"""How much later than due messages arrive: the path's own time, which is none of netem's."""
+CASES = (
+    PATH_CASE,
+    Case("normal", _NORMAL, "datagram"),
+    Case("uniform", "delay 20ms 5ms", "datagram"),
+    Case("pareto", "delay 20ms 5ms distribution pareto", "datagram"),
+    Case("rate", f"{_NORMAL} rate 10mbit", "datagram"),
+    Case("loss", "loss 1%", "datagram"),
+    Case("gemodel", "loss gemodel 1% 25%", "datagram", messages=10_000),
+    Case("stream-fixed", "delay 20ms", "stream"),
+    Case("stream-normal", _NORMAL, "stream"),
+    Case("stream-loss", "delay 20ms loss 1%", "stream", messages=10_000, judged=False),
+)
+PAYLOAD_BYTES = 100
+PERIOD_NS = 1_000_000

@@ -1,0 +1,52 @@
+"""The program inside the machine: it records what netem does to messages."""
+
+import csv
+import ctypes
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.netem.cases import CASES
+from tests.netem.exchanges import Recording, exchange_datagrams, exchange_stream
+from tests.netem.namespaces import join_namespaces, set_netem
+
+_FINIT_MODULE = 313
+"""The system call's number on x86_64; insmod need not be installed."""
+
+
+def main(folder: Path, modules: Sequence[str], names: Sequence[str]) -> int:
+    """Record each case of `names` into `folder`."""
+    print(f"Linux {platform.release()} in User-Mode Linux, Python {platform.python_version()}")
+    for module in modules:
+        _load(module)
+    join_namespaces()
+    for case in CASES:
+        if case.name not in names:
+            continue
+        set_netem(case.netem)
+        exchange = exchange_datagrams if case.model == "datagram" else exchange_stream
+        _write(folder / case.file, exchange(case.messages))
+        print(f"recorded {case.name}: {case.messages} messages, {case.netem}")
+    return 0
+
+
+def _load(module: str) -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    with Path(module).open("rb") as file:
+        if libc.syscall(_FINIT_MODULE, file.fileno(), b"", 0) != 0:
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), module)
+
+
+def _write(path: Path, recording: Recording) -> None:
+    start_ns = recording[0][0]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["seq", "sent_ns", "delay_ns"])
+        for number, (sent_ns, arrived_ns) in enumerate(recording):
+            writer.writerow([number, sent_ns - start_ns, "" if arrived_ns is None else arrived_ns - sent_ns])
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]), sys.argv[2].split(","), sys.argv[3:]))
