@@ -12,6 +12,8 @@ from common.errors import ConfigurationError, FeelaheadError
 
 COMPOSE_FILE: Final = Path(__file__).parents[2] / "docker" / "compose.yaml"
 _LIMIT_S: Final = 60.0
+_LAST_WORDS: Final = 3
+"""Lines: compose ends with a summary, below the reason."""
 
 
 class EngineError(FeelaheadError):
@@ -97,5 +99,5 @@ class Engine:
             raise EngineError(f"{' '.join(words[:3])}: {error}") from error
         if done.returncode != 0:
             said = done.stderr.strip().splitlines() or done.stdout.strip().splitlines()
-            raise EngineError(said[-1] if said else f"{' '.join(words)}: code {done.returncode}")
+            raise EngineError(" / ".join(said[-_LAST_WORDS:]) or f"{' '.join(words)}: code {done.returncode}")
         return done.stdout

@@ -15,7 +15,8 @@ from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
 from feelahead.containers.engine import Engine
 from feelahead.containers.netem import Counted
 
-_PROJECT: Final = "feelahead-latency"
+PROJECT: Final = "feelahead-latency"
+"""How the projects' names begin, one for each link."""
 _BUILD_LIMIT_S: Final = 1500.0
 _SIDES: Final = ("robot", "operator")
 
@@ -42,7 +43,7 @@ class ContainerMedium:
         """`number`: for names that no other run of ours uses."""
         self._number = number
         self._cables: dict[str, Engine] = {}
-        Engine(_PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
+        Engine(PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
 
     def run(self, trial: Trial) -> TrialFigures:
         """Do it in real time; SideFailedError where a side fails, EngineError where the engine does."""
@@ -72,7 +73,7 @@ class ContainerMedium:
             engine.remove()
 
     def _lay_cable(self, trial: Trial) -> Engine:
-        engine = Engine(f"{_PROJECT}-{self._number}-{len(self._cables)}")
+        engine = Engine(f"{PROJECT}-{self._number}-{len(self._cables)}")
         self._cables[trial.link] = engine
         engine.compose("up", "--detach", "router", settings=self._settings(trial))
         return engine

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from common.errors import FeelaheadError
-from feelahead.containers.engine import Engine
+from feelahead.containers.engine import Engine, EngineError
 from tests.containers.checks import CHECKS
 from tests.containers.provide import Say, base_image, default_cache, provided_engine
 from tests.containers.watch import CheckFailedError
@@ -45,7 +45,11 @@ def _try_everything(engine: Engine, settings: dict[str, str], only: list[str], s
     failed = 0
     began_s = time.monotonic()
     engine.remove()
-    engine.compose("build", settings=settings, limit_s=_BUILD_LIMIT_S)
+    try:
+        engine.compose("build", settings=settings, limit_s=_BUILD_LIMIT_S)
+    except EngineError as error:
+        say(f"the images cannot be built: {error}")
+        return 1
     say(f"images built in {time.monotonic() - began_s:.0f} s")
     try:
         for tried in CHECKS:

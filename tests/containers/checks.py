@@ -2,11 +2,16 @@
 
 import json
 import re
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 from feelahead.containers.engine import Engine
+from feelahead.containers.medium import PROJECT as TRIALS
 from tests.containers.watch import Event, Watched, check, link_up, state_is
 
 SERVICES: Final = ("router", "robot", "operator")
@@ -111,12 +116,26 @@ def ended(engine: Engine, _: Mapping[str, str]) -> str:
     return f"codes 0, summaries written; the last robot process ticked {summary['ticks']} times, stops: {stops}"
 
 
+def one_trial(engine: Engine, settings: Mapping[str, str]) -> str:
+    """The latency experiment, as short as it can be: both media know of one contact, and leave nothing either."""
+    words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "4", "--media", "virtual", "--compose"]
+    with tempfile.TemporaryDirectory(prefix="feelahead-containers-") as folder:
+        command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, "--out", folder]
+        environment = {**engine.environment, **settings}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        check(done.returncode == 0, f"try latency: {done.stderr.strip().splitlines()[-1:]}")
+        trials = json.loads((Path(folder) / "latency.json").read_text())["trials"]
+    speeds = {trial["medium"]: trial["contact_speed_mm_s"] for trial in trials}
+    check(set(speeds) == {"virtual", "containers"}, f"media: {speeds}")
+    check(None not in speeds.values(), f"no contact without haptics: {speeds}")
+    return ", ".join(f"{medium}: contact at {speed:.0f} mm/s" for medium, speed in speeds.items())
+
+
 def nothing_left(engine: Engine, _: Mapping[str, str]) -> str:
     """`down --volumes` leaves neither containers nor networks nor volumes."""
     engine.remove()
-    label = f"label=com.docker.compose.project={engine.project}"
     left = [
-        engine.docker(*kind, "--quiet", "--filter", label).split()
+        engine.docker(*kind, "--quiet", "--filter", f"name={engine.project}", "--filter", f"name={TRIALS}").split()
         for kind in (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
     ]
     check(not any(left), f"left: {left}")
@@ -168,5 +187,6 @@ CHECKS: Final[tuple[Callable[[Engine, Mapping[str, str]], str], ...]] = (
     router_killed,
     network_taken,
     ended,
+    one_trial,
     nothing_left,
 )

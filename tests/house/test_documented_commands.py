@@ -72,6 +72,8 @@ RUN = {
     r"git clone|cd |make test$": (".ci/run", "make test\n"),
     r"make quick": ("Makefile", "quick: "),
     r"make test-kernel": (".ci/run", "make test-kernel"),
+    r"make test-containers": (".ci/run", "make test-containers"),
+    r"make latency-experiment": ("tests/containers/checks.py", '"--compose"'),
     r"make soak": ("tests/feelahead/experiments/test_soak.py", '"--observers", "8"'),
     r"make test-two-hosts": TWO_MACHINES,
     r"make demo( --duration \S+)?$": ("tests/feelahead/both_sides/test_processes.py", "test_the_demo_runs_both_sides"),

@@ -12,7 +12,7 @@ from feelahead.benchmarks.overlap.contact import contacts, exact_contact
 from feelahead.benchmarks.overlap.meshes import torus
 from feelahead.benchmarks.overlap.pairs import Pairs
 from feelahead.benchmarks.overlap.truth import Truth, true_mesh_overlap, true_overlap, true_overlaps
-from tests.helpers.overlap_reference import Polyhedron
+from tests.helpers.overlap.reference import Polyhedron
 
 CLASSES = frozen_classes(1)
 FLAT_FACED = [name for name in CLASSES if name.startswith(("tetrahedron", "box")) and "without volume" not in name]

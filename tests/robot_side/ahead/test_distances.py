@@ -24,7 +24,7 @@ from tests.helpers.ahead.nearest_point import (
     nearest_on_sphere,
     nearest_on_tetrahedron,
 )
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 ORIGIN = np.zeros(3)

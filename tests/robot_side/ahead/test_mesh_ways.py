@@ -16,7 +16,7 @@ from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import AHEAD, along, ball_pose, look
 from tests.helpers.ahead.ways_by_definition import Definition
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.scene_meshes import cup
 

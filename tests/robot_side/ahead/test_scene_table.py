@@ -18,7 +18,7 @@ from robot_side.objects.validity import require_valid
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from tests.helpers.ahead.fields import along, ball_pose, look
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 

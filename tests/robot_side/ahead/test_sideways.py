@@ -14,7 +14,7 @@ from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import RADIUS_M, ball_pose
 from tests.helpers.ahead.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene
 
 LOOP_S = 0.1

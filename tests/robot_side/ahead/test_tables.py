@@ -14,7 +14,7 @@ from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import AHEAD, along, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOKED = along(AHEAD, 0.007, reach_m=0.2)

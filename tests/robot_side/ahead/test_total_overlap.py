@@ -13,7 +13,7 @@ from robot_side.ahead.total_overlap import total_overlap_m3
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.ways_by_definition import overlap_of
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 TABLES = Tables()

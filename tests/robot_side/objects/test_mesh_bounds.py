@@ -4,7 +4,7 @@ import pytest
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.scene_meshes import CELL_M, cup
 

@@ -13,8 +13,8 @@ from mpmath import mpf
 
 from common.arrays import FloatArray
 from robot_side.overlap import sphere_box, sphere_tetrahedron
-from tests.helpers.overlap_classes import BOXES, TETRAHEDRA
-from tests.helpers.overlap_reference import Overlap, Polyhedron
+from tests.helpers.overlap.classes import BOXES, TETRAHEDRA
+from tests.helpers.overlap.reference import Overlap, Polyhedron
 
 WORST = {"volume": 1e-15, "gradient": 2e-15, "area": 1e-15}
 

@@ -6,7 +6,7 @@ from mpmath import mp, mpf
 
 from common.arrays import FloatArray
 from robot_side.overlap import sphere_box, sphere_half_space, sphere_sphere
-from tests.helpers.overlap_reference import Number, Polyhedron
+from tests.helpers.overlap.reference import Number, Polyhedron
 
 COUNT = 200
 

@@ -9,7 +9,7 @@ from mpmath import mpf
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap import Mesh, MeshLibrary, sphere_box, sphere_mesh, sphere_tetrahedron
 from robot_side.overlap.meshes.mesh_library import mesh_pairs
-from tests.helpers.overlap_meshes import (
+from tests.helpers.overlap.meshes import (
     CUBE_CORNERS,
     CUBE_TRIANGLES,
     TETRAHEDRON_TRIANGLES,
@@ -19,7 +19,7 @@ from tests.helpers.overlap_meshes import (
     sum_of_parts,
     surface_of,
 )
-from tests.helpers.overlap_reference import Overlap, Polyhedron
+from tests.helpers.overlap.reference import Overlap, Polyhedron
 
 WORST = 1e-15
 """Of the sphere's volume, surface and, for the gradient, great circle."""

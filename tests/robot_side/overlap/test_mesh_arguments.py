@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from robot_side.overlap import Mesh, MeshLibrary, sphere_mesh
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 WITH_NAN = np.where(np.arange(12).reshape(4, 3) == 7, np.nan, TETRAHEDRON)

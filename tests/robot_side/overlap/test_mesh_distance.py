@@ -7,7 +7,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
 from tests.helpers.ahead.nearest_point import nearest_on_box, nearest_on_tetrahedron
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, ring, round_mesh, surface_of
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, ring, round_mesh, surface_of
 
 Rng = np.random.Generator
 Surface = tuple[FloatArray, IntArray]

@@ -13,8 +13,8 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import Compiled
 from robot_side.overlap import sphere_half_space, sphere_sphere
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
-from tests.helpers.overlap_classes import BOXES, TETRAHEDRA
-from tests.helpers.overlap_reference import Number, Overlap, Polyhedron
+from tests.helpers.overlap.classes import BOXES, TETRAHEDRA
+from tests.helpers.overlap.reference import Number, Overlap, Polyhedron
 
 COUNT = 8
 Arrays = tuple[FloatArray, ...]

@@ -24,7 +24,7 @@ from robot_side.settings import RobotSettings
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import Scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.overlap_meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.repository import ROOT
 from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
 

@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from tests.helpers.overlap_reference import NOTHING, Coordinates, Overlap, Polyhedron
+from tests.helpers.overlap.reference import NOTHING, Coordinates, Overlap, Polyhedron
 
 CUBE_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 CUBE_TRIANGLES = np.array(
