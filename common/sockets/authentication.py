@@ -170,6 +170,6 @@ class HandshakeWatch:
             key = public_part(self._keys.secret)
             return f"the robot side does not let this key in; to be run there: feelahead keys allow NAME {key}"
         return (
-            "the robot side has no keys, or another key than --robot-key; "
+            "the robot side is still starting, has no keys, or another key than --robot-key; "
             "its own is shown there by: feelahead keys show robot"
         )
