@@ -2,41 +2,38 @@
 
 It passes what arrives at its ports 5555 and 5556 from the operator's network on to the robot side, under its own
 address, so that neither side needs a route or a right of its own; and it applies the link, one netem for each
-direction, to what leaves it. Where the kernel has no netem, or the link asks for more than that can do, it says so and
-leaves the emulation to the sides: they wait for the file `--said`, which has the link that they are to emulate.
+direction, to what leaves it. Where the kernel has no netem, a User-Mode Linux that has it routes in its place. Where
+that cannot be, or the link asks for more than netem can do, the sides emulate the link themselves: they wait for the
+file `--said`, which has what they are to emulate. Which of the three it is, is said aloud.
 
 Containers come and go, and so do addresses and interfaces: it looks twice a second, and sets up anew what changed.
 """
 
-import ipaddress
 import json
 import socket
-import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Final
 
 import tyro
 
+from common.clock import MonotonicClock
 from common.command.command_line import parse_settings, run_command
 from common.command.stop_signal import StopSignal
 from common.emulation.spec import Direction, LinkSpec
-from common.errors import FeelaheadError
 from common.files.output_file import output_file, write_json
+from feelahead.containers import guest
+from feelahead.containers.cable import Cable, delays, find_cable
 from feelahead.containers.netem import BeyondNetemError, count_packets, netem_words
+from feelahead.containers.system import CommandFailedError, run_system
 
 PROGRAM = "feelahead-router"
-PORTS = (5555, 5556)
-"""Control and view."""
-_PERIOD_S = 0.5
-_LIMIT_S = 10.0
-
-
-class CommandFailedError(FeelaheadError):
-    """A command of the system's ended with an error; the text is what it said."""
+_PERIOD_S: Final = 0.5
+_GUEST_LIMIT_S: Final = 60.0
+"""It boots in two seconds, and on a very busy machine in forty."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +48,8 @@ class RouterSettings:
     """Where to write what the sides have to emulate themselves: nothing, or the link."""
     packets: Annotated[Path, tyro.conf.arg(metavar="FILE.json")] = Path("/link/packets.json")
     """Where to write, twice a second, what netem has passed on and dropped in each direction."""
+    guest: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("/run/feelahead")
+    """For User-Mode Linux; on a file system that lets programs run."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """These settings from a file."""
 
@@ -58,118 +57,100 @@ class RouterSettings:
         LinkSpec.parse(self.link)
 
 
-@dataclass(frozen=True)
-class Cable:
-    """The way between the networks, as it is at the moment."""
-
-    robot_interface: str
-    operator_interface: str
-    robot_address: str
-
-    def rules(self) -> str:
-        """For nft, which applies all or nothing: pass the ports on, under our own address, and nothing else."""
-        ports = ", ".join(map(str, PORTS))
-        return f"""
-            table ip feelahead
-            delete table ip feelahead
-            table ip feelahead {{
-                chain there {{
-                    type nat hook prerouting priority dstnat;
-                    iifname "{self.operator_interface}" tcp dport {{ {ports} }} dnat to {self.robot_address}
-                }}
-                chain under_our_address {{
-                    type nat hook postrouting priority srcnat;
-                    oifname "{self.robot_interface}" masquerade
-                }}
-                chain only_these {{
-                    type filter hook forward priority filter; policy drop;
-                    iifname "{self.operator_interface}" oifname "{self.robot_interface}" tcp dport {{ {ports} }} accept
-                    iifname "{self.robot_interface}" ct state established accept
-                }}
-            }}
-            """
-
-    def delays(self, words: Mapping[Direction, str]) -> list[list[str]]:
-        """The arguments for tc: what leaves towards a side is what was sent to it."""
-        return [
-            ["tc", "qdisc", "replace", "dev", interface, "root", "netem", *words[direction].split()]
-            for direction, interface in self.leaves().items()
-        ]
-
-    def leaves(self) -> dict[Direction, str]:
-        """The interface by which each direction leaves us."""
-        return {"to_robot": self.robot_interface, "to_operator": self.operator_interface}
-
-
-def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> Cable | None:
-    """The cable among what `ip -json -4 address` shows; None unless there is one interface on each side."""
-    robots: list[str] = []
-    others: list[str] = []
-    for interface in interfaces:
-        name = interface["ifname"]
-        networks = [
-            ipaddress.ip_interface(f"{held['local']}/{held['prefixlen']}").network for held in interface["addr_info"]
-        ]
-        if name != "lo" and networks:
-            near = any(ipaddress.ip_address(robot_address) in network for network in networks)
-            (robots if near else others).append(name)
-    return Cable(robots[0], others[0], robot_address) if len(robots) == len(others) == 1 else None
-
-
 def command(arguments: Sequence[str]) -> int:
-    """Route until SIGTERM; 1 when the network may not be changed."""
+    """Route until SIGTERM; an error where the network may not be changed."""
     settings = parse_settings(RouterSettings, PROGRAM, arguments)
-    words = _netem_for(settings.link)
-    there: Cable | None = None
+    router, clock = Router(settings), MonotonicClock()
     with StopSignal() as stop:
-        while not stop.is_set:
-            cable = _look(settings.robot)
-            if cable is not None and cable != there:
-                _run(["nft", "-f", "-"], cable.rules())
-                for delay in cable.delays(words) if words is not None else ():
-                    _run(delay)
-                with output_file("--said", settings.said) as file:
-                    file.write("" if words is not None else settings.link)
-                _say(f"{cable.operator_interface} to {cable.robot_address} over {cable.robot_interface}")
-            there = cable
-            if cable is not None and words is not None:
-                queues = json.loads(_run(["tc", "-statistics", "-json", "qdisc", "show"]))
-                counted = count_packets(queues, cable.leaves())
-                write_json("--packets", settings.packets, {name: asdict(one) for name, one in counted.items()})
-            time.sleep(_PERIOD_S)
+        try:
+            while not stop.is_set:
+                router.look(clock.now())
+                time.sleep(_PERIOD_S)
+        finally:
+            router.guest.stop()
     return 0
 
 
-def _netem_for(link: str) -> Mapping[Direction, str] | None:
-    """netem's words; None where the sides have to emulate the link."""
-    try:
-        words = netem_words(LinkSpec.parse(link))
-        _run(["tc", "qdisc", "replace", "dev", "lo", "root", "netem", "delay", "0ms"])
-        _run(["tc", "qdisc", "del", "dev", "lo", "root"])
-    except (BeyondNetemError, CommandFailedError) as reason:
-        _say(f"NO netem ({reason}): the sides emulate the link themselves: {link!r}")
-        return None
-    _say(f"netem: {'; '.join(f'{direction}: {said}' for direction, said in words.items())}")
-    return words
+class Router:
+    """What is set up at the moment, and what has to be."""
+
+    def __init__(self, settings: RouterSettings) -> None:
+        self._settings = settings
+        self._cable: Cable | None = None
+        self._told = False
+        self._applied_s = 0.0
+        self.guest = guest.Guest(settings.guest)
+        self._words: Mapping[Direction, str] | None = None
+        self._apply: Callable[[Cable], None] = self._route
+        try:
+            words = self._words = netem_words(LinkSpec.parse(settings.link))
+            run_system(["tc", "qdisc", "replace", "dev", "lo", "root", "netem", "delay", "0ms"])
+            run_system(["tc", "qdisc", "del", "dev", "lo", "root"])
+            how = "the kernel's netem"
+        except BeyondNetemError as reason:
+            self._leave_it_to_the_sides(str(reason))
+            return
+        except CommandFailedError as reason:
+            if not guest.is_there():
+                self._leave_it_to_the_sides(str(reason))
+                return
+            self._apply, how = self._route_in_guest, "netem of User-Mode Linux, as this kernel has none"
+        _say(f"{how}: {'; '.join(f'{direction}: {said}' for direction, said in words.items())}")
+
+    def look(self, now_s: float) -> None:
+        """Set up anew what has changed, and count; CommandFailedError where it may not."""
+        cable = self._find()
+        in_guest = self._apply == self._route_in_guest
+        if cable is not None and (cable != self._cable or (in_guest and self._told and not self.guest.running)):
+            self._apply(cable)
+            self._applied_s = now_s
+        self._cable = cable
+        if cable is None or (in_guest and not self._guest_is_up(cable, now_s)):
+            return
+        if not self._told:
+            self._told = True
+            with output_file("--said", self._settings.said) as file:
+                file.write("" if self._words is not None else self._settings.link)
+            _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
+        if self._words is not None:
+            queues = self.guest.queues() if in_guest else json.loads(run_system(_COUNT))
+            counted = count_packets(queues, self.guest.leaves() if in_guest else cable.leaves())
+            write_json("--packets", self._settings.packets, {name: asdict(one) for name, one in counted.items()})
+
+    def _find(self) -> Cable | None:
+        try:
+            found = socket.getaddrinfo(self._settings.robot, None, socket.AF_INET, socket.SOCK_STREAM)
+        except socket.gaierror:
+            return None
+        shown = json.loads(run_system(["ip", "-json", "address"]))
+        return find_cable(map(self.guest.with_taken_addresses, shown), str(found[0][4][0]))
+
+    def _route(self, cable: Cable) -> None:
+        run_system(["nft", "-f", "-"], cable.rules())
+        for delay in delays(cable.leaves(), self._words) if self._words is not None else ():
+            run_system(delay)
+
+    def _route_in_guest(self, cable: Cable) -> None:
+        if self._words is not None:
+            self.guest.start(cable, self._words)
+
+    def _guest_is_up(self, cable: Cable, now_s: float) -> bool:
+        """Whether it routes; where it never will, the sides are told to emulate."""
+        if self.guest.up:
+            return True
+        gone = not self.guest.running or now_s - self._applied_s > _GUEST_LIMIT_S
+        if gone and not self._told:
+            self.guest.stop()
+            self._leave_it_to_the_sides("User-Mode Linux does not start here")
+            self._route(cable)
+        return False
+
+    def _leave_it_to_the_sides(self, why: str) -> None:
+        self._words, self._apply = None, self._route
+        _say(f"NO netem ({why}): the sides emulate the link themselves: {self._settings.link!r}")
 
 
-def _look(robot: str) -> Cable | None:
-    try:
-        found = socket.getaddrinfo(robot, None, socket.AF_INET, socket.SOCK_STREAM)
-    except socket.gaierror:
-        return None
-    return find_cable(json.loads(_run(["ip", "-json", "-4", "address"])), str(found[0][4][0]))
-
-
-def _run(words: Sequence[str], given: str | None = None) -> str:
-    try:
-        done = subprocess.run(words, input=given, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise CommandFailedError(f"{words[0]}: {error}") from error
-    if done.returncode != 0:
-        said = done.stderr.strip().splitlines()
-        raise CommandFailedError(f"{' '.join(words)}: {said[0] if said else f'code {done.returncode}'}")
-    return done.stdout
+_COUNT: Final = ("tc", "-statistics", "-json", "qdisc", "show")
 
 
 def _say(text: str) -> None:

@@ -34,7 +34,8 @@ def closed(engine: Engine, _: Mapping[str, str]) -> str:
         host, ports = known["HostConfig"], known["NetworkSettings"]["Ports"] or {}
         check(not any(ports.values()), f"{service} listens on the host: {ports}")
         added = [name.removeprefix("CAP_") for name in host["CapAdd"] or []]
-        check(added == (["NET_ADMIN"] if service == "router" else []), f"{service} may: {added}")
+        check(not added or service == "router", f"{service} may: {added}")
+        check(set(added) <= {"NET_ADMIN", "NET_RAW", "SYS_NICE"}, f"{service} may: {added}")
         check(host["CapDrop"] == ["ALL"], f"{service} keeps rights: {host['CapDrop']}")
         check(host["ReadonlyRootfs"], f"{service} can write to its own files")
         user = engine.docker("exec", known["Id"], "id", "-u").strip()

@@ -106,6 +106,7 @@ LIBRARIES = {
         "feelahead/approaches/progress.py",
         "feelahead/both_sides",
         "feelahead/commands",
+        "feelahead/containers",
         "feelahead/benchmarks",
         "feelahead/experiments",
     ),
