@@ -24,7 +24,8 @@ from feelahead.containers.system import CommandFailedError, run_system
 _KERNEL: Final = "linux.uml"
 _MODULES: Final = Path("/usr/lib/uml/modules")
 _INSERTED: Final = (
-    *("sched/sch_netem", "netfilter/x_tables", "ipv4/netfilter/nf_defrag_ipv4", "ipv6/netfilter/nf_defrag_ipv6"),
+    *("sched/sch_tbf", "sched/sch_netem", "netfilter/x_tables"),
+    *("ipv4/netfilter/nf_defrag_ipv4", "ipv6/netfilter/nf_defrag_ipv6"),
     *("netfilter/nf_conntrack", "netfilter/nf_nat", "ipv4/netfilter/ip_tables", "ipv4/netfilter/iptable_nat"),
     *("ipv4/netfilter/iptable_filter", "netfilter/xt_nat", "netfilter/xt_MASQUERADE", "netfilter/xt_tcpudp"),
     *("netfilter/xt_multiport", "netfilter/xt_conntrack"),
@@ -84,6 +85,8 @@ class Guest:
             f"vec{number}:transport=raw,ifname={end.name},mac={end.mac},depth=128,bpffile={filter_file}"
             for number, end in enumerate((cable.operator, cable.robot))
         ]
+        # What it prints is for whoever looks into the folder.
+        console = (self._folder / "console").open("wb")
         try:
             self._process = subprocess.Popen(
                 [
@@ -94,13 +97,15 @@ class Guest:
                     *interfaces,
                 ],
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
+                stdout=console,
+                stderr=subprocess.STDOUT,
                 env=os.environ | {"TMPDIR": str(self._folder)},
                 start_new_session=True,
             )
         except OSError as error:
             raise CommandFailedError(f"{_KERNEL}: {error}") from error
+        finally:
+            console.close()
 
     def stop(self) -> None:
         """End it, and take the addresses back, as far as their interfaces are still there."""
