@@ -10,6 +10,9 @@ from common.sockets.endpoints import following, parse_connect
 from common.sockets.shell import CONTROL_LIMIT_BYTES, Reader, SocketShell, connect_socket
 
 _RETRY_S = 0.5
+_ATTEMPT_LIMIT_S = 3.0
+"""An attempt to connect that nobody has answered by then is made anew, by the host's address of then. The system by
+itself asks again after 1, 2, 4... 64 s: a network that is back after a minute would stay unnoticed for another."""
 _HANDSHAKE_LIMIT_S = 10.0
 """A CURVE handshake takes three round trips, seen from here, and the robot side may still be starting."""
 
@@ -48,6 +51,7 @@ class OperatorSockets(SocketShell):
             self._watched = []
             self._next_look_s = 0.0
             for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
+                part.setsockopt(zmq.CONNECT_TIMEOUT, round(1e3 * _ATTEMPT_LIMIT_S))
                 if keys is not None:
                     keys.secure(part)
                 self._watched.append((part, endpoint, HandshakeWatch(part, keys)))
