@@ -49,7 +49,7 @@ class SocketShell:
         self.rejected = 0
         """Messages received with a wrong number of frames."""
         self._clock = MonotonicClock()
-        # A thread each: the view's connection resolves its host's name anew each time it is made, and a name server that
+        # A thread each: the view's connection resolves its host's name whenever it is made, and a name server that
         # does not answer holds up the thread that asks.
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)

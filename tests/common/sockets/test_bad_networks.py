@@ -2,6 +2,7 @@
 
 import socket
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -53,3 +54,23 @@ def test_control_and_view_are_served_by_threads_of_their_own() -> None:
         for end in (robot, operator):
             assert end._context.get(zmq.IO_THREADS) == 2
             assert {end._control.getsockopt(zmq.AFFINITY), end._view.getsockopt(zmq.AFFINITY)} == {1, 2}
+
+
+def test_the_end_waits_for_no_name_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    operator = OperatorSockets("tcp://127.0.0.1:9")
+    answered, ended = threading.Event(), threading.Event()
+    destroy = operator._context.destroy
+
+    def stuck(context: "zmq.Context[zmq.Socket[bytes]]", linger: int) -> None:
+        assert context is operator._context
+        answered.wait(60.0)
+        destroy(linger)
+        ended.set()
+
+    with monkeypatch.context() as patched:
+        patched.setattr(zmq.Context, "destroy", stuck)
+        operator.close()
+        was_ended = ended.is_set()
+        answered.set()
+        assert ended.wait(60.0)
+    assert not was_ended
