@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel lock clean
+.PHONY: demo test quick types test-kernel test-two-hosts lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -49,6 +49,10 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 # Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(BIN)/python -m tests.kernel $(ARGS)
+
+# Needs root and iproute2; it says so and is skipped elsewhere.
+test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## the guide docs/two-machines.md, followed on two machines in network namespaces
+	$(BIN)/python -m tests.two_hosts $(ARGS)
 
 lock: ## pin every dependency anew (needs uv); the file holds hashes and no addresses
 	rm -f uv.lock && uv export --quiet --all-extras --no-emit-project --no-header -o requirements.lock && rm -f uv.lock
