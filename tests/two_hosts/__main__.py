@@ -8,11 +8,12 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
-from feelahead.both_sides.processes import SideFailedError
+from common.errors import FeelaheadError
 from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
 from tests.kernel.waiting import CheckError
 from tests.two_hosts import network_rows, people_rows
@@ -44,7 +45,7 @@ def main() -> int:
     parser.add_argument("only", nargs="*", help="words: only rows with one of these in their names")
     words = [word.lower() for word in parser.parse_args().only]
     rows = [row for row in ROWS[1:] if not words or any(word in row[0] for word in words)]
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _leave)
     began_s = time.monotonic()
     try:
@@ -64,17 +65,18 @@ def _try_all(lan: Lan, rows: list[Row]) -> list[str]:
         for name, row in rows:
             began_s = time.monotonic()
             try:
+                if failed:
+                    lan.mend()
                 verdict, measured = "holds", row(lan)
             except network_rows.NotJudgedError as reason:
                 verdict, measured = "not judged", str(reason)
-            except (CheckError, GuideError, SideFailedError) as error:
-                verdict, measured = "FAILED", str(error)
+            except Exception as error:
+                known = isinstance(error, (CheckError, GuideError, FeelaheadError))
+                verdict, measured = "FAILED", str(error) if known else traceback.format_exc()
                 failed.append(name)
             print(f"{time.monotonic() - began_s:4.0f} s  {verdict:<10}  {name:<28}  {measured}", flush=True)
-            if verdict == "FAILED":
-                if row is ROWS[0][1]:
-                    break  # nothing after it means anything
-                lan.mend()
+            if failed == [ROWS[0][0]]:
+                break  # nothing after it means anything
     finally:
         lan.end_all()
     return failed

@@ -94,7 +94,7 @@ def silent_name_server(lan: Lan) -> str:
 
     Then both sides end in good time, one of them in the middle of asking.
     """
-    key = lan.words["OPERATOR-KEY"][:-4]
+    key, why = lan.words["OPERATOR-KEY"][:-4], None
     for attempt in range(ATTEMPTS):
         lan.robot_host.run(f"feelahead keys allow carol{attempt} {key}{attempt:04d}")
         lan.moving()
@@ -103,9 +103,10 @@ def silent_name_server(lan: Lan) -> str:
         armed = all(is_armed(lan.robot.status) for _ in lan.watch(2.0))
         if armed:
             break
+        why = lan.robot.status["stopped_because"]
         lan.tell_name(lan.robot_host.machine.address)
         lan.back()
-    require(armed, f"the arm was stopped each time: {lan.robot.status['stopped_because']}")
+    require(armed, f"the arm was stopped each time: {why}")
     lan.end("robot")
     lan.until("operator", "the link is lost", lambda status: status["link"] != "up")
     took_s = lan.end("operator")

@@ -114,16 +114,18 @@ def wall_clock(lan: Lan) -> str:
 
     step(0)
     lan.restart(under_it)
+    why = None
     for _ in range(ATTEMPTS):
         lan.moving()
         before_s = step(0)
         stepped_s = step(_AN_HOUR_S) - before_s
         armed = all(is_armed(lan.robot.status) for _ in lan.watch(1.5))
+        why = lan.robot.status["stopped_because"]
         step(0)
-        armed = armed and all(is_armed(lan.robot.status) for _ in lan.watch(1.5))
-        if armed:
+        if armed and all(is_armed(lan.robot.status) for _ in lan.watch(1.5)):
             break
+        armed, why = False, why or lan.robot.status["stopped_because"]
     require(_AN_HOUR_S <= stepped_s < _AN_HOUR_S + 60, f"the clock was stepped by {stepped_s} s")
-    require(armed, f"the arm was stopped each time: {lan.robot.status['stopped_because']}")
+    require(armed, f"the arm was stopped each time: {why}")
     lan.restart()
     return f"stepped by {stepped_s} s and back: 0 trips"

@@ -66,27 +66,31 @@ def two_machines(robot: str = "198.18.0.1", operator: str = "198.18.0.2") -> Ite
     """The robot's and the operator's, with these addresses, both gone afterwards; NotPermittedError."""
     if shutil.which("ip") is None or os.geteuid() != 0:
         raise NotPermittedError("network namespaces need root and iproute2 (apt install iproute2)")
-    machines = tuple(
-        Machine(f"feelahead-{side}-{os.getpid()}", f"{side}0", address)
-        for side, address in (("robot", robot), ("operator", operator))
+    machines = one, other = (
+        Machine(f"feelahead-robot-{os.getpid()}", "robot0", robot),
+        Machine(f"feelahead-operator-{os.getpid()}", "operator0", operator),
     )
     try:
         _delete_left_behind()
-        for machine in machines:
-            added = _run_ip("netns", "add", machine.namespace)
-            if added is not None:
-                raise NotPermittedError(added)
-        one, other = machines
-        _ip("-n", one.namespace, "link", "add", one.device, "type", "veth", "peer", "name", other.device)
-        _ip("-n", one.namespace, "link", "set", other.device, "netns", other.namespace)
-        for machine in machines:
-            machine.readdress(machine.address)
-            machine.plug_in()
-            _ip("-n", machine.namespace, "link", "set", "lo", "up")
+        try:
+            _connect(*machines)
+        except RigError as error:
+            raise NotPermittedError(str(error)) from error
         yield one, other
     finally:
         for machine in machines:
             _delete(machine.namespace)
+
+
+def _connect(one: Machine, other: Machine) -> None:
+    for machine in (one, other):
+        _ip("netns", "add", machine.namespace)
+    _ip("-n", one.namespace, "link", "add", one.device, "type", "veth", "peer", "name", other.device)
+    _ip("-n", one.namespace, "link", "set", other.device, "netns", other.namespace)
+    for machine in (one, other):
+        machine.readdress(machine.address)
+        machine.plug_in()
+        _ip("-n", machine.namespace, "link", "set", "lo", "up")
 
 
 def _delete_left_behind() -> None:
@@ -100,11 +104,14 @@ def _delete_left_behind() -> None:
 
 def _delete(namespace: str) -> None:
     _run_ip("netns", "del", namespace)
-    shutil.rmtree(Path("/etc/netns") / namespace, ignore_errors=True)
+    for files in Path("/etc/netns").glob(namespace):
+        shutil.rmtree(files, ignore_errors=True)
+        with contextlib.suppress(OSError):  # others have theirs there
+            files.parent.rmdir()
 
 
 def _ip(*arguments: str) -> None:
-    """RigError when it fails: what may be missing was asked for before."""
+    """RigError when it fails."""
     failed = _run_ip(*arguments)
     if failed is not None:
         raise RigError(failed)
