@@ -50,6 +50,10 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(BIN)/python -m tests.kernel $(ARGS)
 
+# Needs root and iproute2; it says so and is skipped elsewhere.
+test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, followed on two hosts in network namespaces
+	$(BIN)/python -m tests.two_hosts $(ARGS)
+
 test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
 	$(BIN)/python -m tests.netem $(ARGS)
 

@@ -246,6 +246,8 @@ class _Loop:
             if self._sockets.trouble is not None and values.get("link") != "up":
                 values["link"] = self._sockets.trouble
             values["controller"] = self._connection.state
+            controller = self._connection.controller
+            values["triggers_released"] = None if controller is None else controller.device.released
             if self._person is not None:
                 values["person"] = self._person.doing
             values["motion_overruns"] = self._pacer.overruns

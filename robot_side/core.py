@@ -187,7 +187,8 @@ class RobotSide:
         if command is None:
             self._told_m_s = 0.0
             still = np.zeros(self._arm.joint_count)
-            self._arm.command(still, now_s)
+            # No longer valid: a command that runs out between two physics steps would let a load sink, each time anew.
+            self._arm.command(still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
         if self._assists and self._last is not None:

@@ -1,15 +1,20 @@
 """The operator side's end: it connects, and reconnects by itself."""
 
 import contextlib
+import threading
 from collections.abc import Iterator, Sequence
 
 import zmq
 
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
-from common.sockets.endpoints import following, parse_connect
+from common.sockets.endpoints import Endpoint, following, parse_connect
 from common.sockets.shell import CONTROL_LIMIT_BYTES, Reader, SocketShell, connect_socket
 
 _RETRY_S = 0.5
+_ATTEMPT_LIMIT_S = 3.0
+"""An attempt to connect that nobody has answered by then is made anew, by the host's address of then. The system by
+itself asks again after 1, 2, 4... 64 s: a network that is back after a minute would stay unnoticed for another."""
+_CLOSE_LIMIT_S = 0.5
 _HANDSHAKE_LIMIT_S = 10.0
 """A CURVE handshake takes three round trips, seen from here, and the robot side may still be starting."""
 
@@ -38,6 +43,8 @@ class OperatorSockets(SocketShell):
             if view_connect is None
             else parse_connect(view_connect, "--view-connect")
         )
+        self._closing: threading.Thread | None = None
+        self._watched: list[tuple[zmq.Socket[bytes], Endpoint, HandshakeWatch]] = []
         super().__init__(zmq.DEALER, zmq.SUB, heartbeat_timeout_s, _HANDSHAKE_LIMIT_S)
         try:
             # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
@@ -45,9 +52,9 @@ class OperatorSockets(SocketShell):
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)
             self._reader, self._view_reader = Reader(frames=1), Reader(frames=2)
-            self._watched = []
             self._next_look_s = 0.0
             for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
+                part.setsockopt(zmq.CONNECT_TIMEOUT, round(1e3 * _ATTEMPT_LIMIT_S))
                 if keys is not None:
                     keys.secure(part)
                 self._watched.append((part, endpoint, HandshakeWatch(part, keys)))
@@ -89,9 +96,16 @@ class OperatorSockets(SocketShell):
 
     def close(self) -> None:
         """Close at once, whatever has not left yet; closing twice does no harm."""
-        if not self._context.closed:
-            for _, _, watch in self._watched:
-                watch.close()
+        if self._closing is not None:
+            return
+        # ZeroMQ would wait for its own threads, and they for a name server that does not answer.
+        self._closing = threading.Thread(target=self._end, daemon=True)
+        self._closing.start()
+        self._closing.join(_CLOSE_LIMIT_S)
+
+    def _end(self) -> None:
+        for _, _, watch in self._watched:
+            watch.close()
         super().close()
 
     def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:

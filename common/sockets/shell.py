@@ -31,6 +31,8 @@ heartbeat before the end of the connection (libzmq issues 3937, 4364 and 4767).
 CONTROL_LIMIT_BYTES = 4096
 """The codec looks into nothing larger."""
 VIEW_LIMIT_BYTES = 4 * 1024 * 1024
+_CONTROL_THREAD, _VIEW_THREAD = 0b01, 0b10
+"""Masks of ZeroMQ's own threads."""
 MESSAGES_PER_RECEIVE = 64
 """At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
 
@@ -47,7 +49,9 @@ class SocketShell:
         self.rejected = 0
         """Messages received with a wrong number of frames."""
         self._clock = MonotonicClock()
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        # A thread each: the view's connection resolves its host's name whenever it is made, and a name server that
+        # does not answer holds up the thread that asks.
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
         self._handshake_ms = round(1e3 * handshake_limit_s)
         self._descriptors: dict[zmq.Socket[bytes], int] = {}
@@ -57,6 +61,7 @@ class SocketShell:
     def _open_control(self, control_type: int) -> "zmq.Socket[bytes]":
         part = self._context.socket(control_type)
         for option, value in (
+            (zmq.AFFINITY, _CONTROL_THREAD),
             (zmq.SNDHWM, CONTROL_HIGH_WATER_MARK),
             (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK),
             (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES),
@@ -73,6 +78,7 @@ class SocketShell:
         part = self._context.socket(view_type)
         publishes = view_type == zmq.PUB
         for option, value in (
+            (zmq.AFFINITY, _VIEW_THREAD),
             (zmq.SNDHWM, VIEW_HIGH_WATER_MARK),
             # What viewers send, subscriptions, is little, but hitting the mark could end the process.
             (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK if publishes else VIEW_HIGH_WATER_MARK),

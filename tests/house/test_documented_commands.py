@@ -89,6 +89,7 @@ RUN = {
         "tests/feelahead/commands/test_keys.py",
         "lead_from_nothing_to_an_allowed_operator",
     ),
+    r"feelahead doctor --connect": ("tests/two_hosts/following.py", "_doctor_on_the_way"),
     r"feelahead doctor": ("tests/feelahead/commands/test_doctor.py", "command"),
     r"feelahead-robot( --bind \S+ --keys \S+)?$": (
         "tests/house/test_systemd_units.py",

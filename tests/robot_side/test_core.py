@@ -10,9 +10,11 @@ from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
 from feelahead.experiments.faults.session_bench import Bench, Operator
 from robot_side.ahead.law import Law, LawName, Sensed, Situation
+from robot_side.assembly import build_robot_side
 from robot_side.gripper.held_object import grip
 from robot_side.objects.perceived import Role
 from robot_side.settings import RobotSettings
+from robot_side.simulation.scene import load_scene
 
 
 @pytest.fixture
@@ -42,6 +44,20 @@ def test_an_unarmed_robot_does_not_move(bench: Bench) -> None:
     start = bench.tool_m
     bench.drive(0.5, operator, r2=1.0)
     assert np.linalg.norm(bench.tool_m - start) < 2e-3
+
+
+def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
+    scene = load_scene()
+    robot = build_robot_side(RobotSettings(), epoch=1, clock_domain="test", scene=scene)
+    scene.data.xfrc_applied[scene.model.site_bodyid[scene.robot.site], 2] = -3.0  # what a held thing weighs
+    generator = np.random.default_rng(0)
+    now_s, height_m = 0.0, []
+    for _ in range(2):
+        for _ in range(600):
+            now_s += float(generator.uniform(0.5e-3, 3.5e-3))
+            robot.tick(now_s)
+        height_m.append(float(scene.data.site_xpos[scene.robot.site, 2]))
+    assert height_m[0] - height_m[1] < 1e-4
 
 
 def test_an_operator_unknown_to_a_restarted_robot_is_told_so(bench: Bench) -> None:

@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 
-from feelahead.experiments.faults.unplugged import ROBOT, NotPermittedError, namespaces
+from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.processes
 
 LIMIT_S = 600.0
+ROBOT, OPERATOR = "10.91.83.1", "10.91.83.2"
 CONTROL = f"tcp://{ROBOT}:5555"
 FIREWALL = """
 add table inet doctor
@@ -69,10 +70,10 @@ class Desk:
 def desk() -> Iterator[Desk]:
     with contextlib.ExitStack() as stack:
         try:
-            robot, operator = stack.enter_context(namespaces())
+            robot, operator = stack.enter_context(two_machines(ROBOT, OPERATOR))
         except NotPermittedError as error:
             pytest.skip(str(error))
-        yield Desk(robot, operator)
+        yield Desk(robot.surroundings, operator.surroundings)
 
 
 def test_no_network_there(desk: Desk) -> None:

@@ -1,0 +1,276 @@
+"""Two hosts on a cable, each with a home, a clock and names of its own, and the sides that run on them."""
+
+import contextlib
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from feelahead.both_sides.processes import SideProcess
+from feelahead.experiments.faults.two_machines import Machine
+from tests.helpers.repository import ROOT
+from tests.kernel.waiting import CheckError, require, wait_until
+
+PATIENCE_S = 60.0
+NAME = "robot.lan"
+"""What the operator's host calls the robot's."""
+NOBODY = "198.18.0.99"
+"""An address without a machine."""
+_CLOCK_AHEAD_S = 100_000
+_MODULES = {"feelahead-robot": "robot_side", "feelahead-operator": "operator_side"}
+
+Status = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Host:
+    """A user's account on one of the machines."""
+
+    machine: Machine
+    home: Path
+    clock: tuple[str, ...] = ()
+    """The command that gives programs there a monotonic clock of their own."""
+    also: dict[str, str] = field(default_factory=dict)
+    """More of the environment."""
+
+    def surroundings(self) -> list[str]:
+        """The command that runs a program there."""
+        self.home.mkdir(exist_ok=True)
+        folders = {f"XDG_{kind}_HOME": f"{self.home}/{place}" for kind, place in _FOLDERS}
+        variables = {
+            "HOME": str(self.home),
+            "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",
+            "PYTHONPATH": str(ROOT),
+        }
+        given = folders | variables | self.also
+        return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]
+
+    def user(self, name: str) -> "Host":
+        """Somebody else on the same machine."""
+        return replace(self, home=self.home.with_name(f"{self.home.name}-{name}"))
+
+    def run(self, command: str, *, codes: tuple[int, ...] = (0,)) -> str:
+        """What a shell there prints; CheckError when it ends with another code."""
+        done = subprocess.run(
+            [*self.surroundings(), "sh", "-c", command],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=self.home,
+            timeout=PATIENCE_S,
+        )
+        require(done.returncode in codes, f"{command}: code {done.returncode}: {done.stderr.strip()[-300:]}")
+        return done.stdout
+
+
+_FOLDERS = (("CONFIG", ".config"), ("CACHE", ".cache"), ("DATA", ".local/share"), ("STATE", ".local/state"))
+
+
+class Side:
+    """One side that runs, and what it has said."""
+
+    def __init__(self, command: str, host: Host, more: tuple[str, ...] = ()) -> None:
+        """`command` is a line of the guide that starts a side; `more`: what the test adds."""
+        program, *arguments = shlex.split(command.replace("~/", f"{host.home}/"))
+        self.name = program.removeprefix("feelahead-")
+        self.process = SideProcess(_MODULES[program], self.name, [*arguments, *more], host.surroundings())
+        self.said: list[Status] = []
+        """Every status, the newest last."""
+        self.notes: list[str] = []
+
+    @property
+    def status(self) -> Status:
+        """The newest one."""
+        return self.said[-1] if self.said else {}
+
+    def listen(self) -> None:
+        """Take note of what it has said; SideFailedError when it has failed."""
+        for event in self.process.events():
+            if event["event"] == "status":
+                self.said.append(event)
+            elif event["event"] == "note":
+                self.notes.append(event["text"])
+        self.process.check()
+
+
+class Lan:
+    """Both hosts and the present sides; whoever is not told otherwise is robot or operator as the guide starts them."""
+
+    def __init__(self, robot: Machine, operator: Machine, folder: Path) -> None:
+        clock = ("unshare", "--time", "--monotonic", str(_CLOCK_AHEAD_S), "--boottime", str(_CLOCK_AHEAD_S))
+        self.own_clocks = shutil.which("unshare") is not None and (
+            subprocess.run([*clock, "true"], capture_output=True, check=False).returncode == 0
+        )
+        self.robot_host = Host(robot, folder / "robot", clock if self.own_clocks else ())
+        self.operator_host = Host(operator, folder / "operator")
+        self.starts: dict[str, str] = {}
+        """The guide's command lines that start the sides."""
+        self.doctor: str | None = None
+        """The guide's command line that looks at the way."""
+        self.words: dict[str, str] = {"ROBOT": NAME}
+        """What stands for the guide's words in capitals."""
+        self._addresses = (robot.address, operator.address)
+        self._sides: dict[str, Side] = {}
+        operator.own_files.mkdir(parents=True)
+        (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
+        self.tell_name(robot.address)
+
+    def tell_name(self, address: str | None) -> None:
+        """What the operator's host takes the robot's name for; None: it does not know, and no name server answers."""
+        names = "127.0.0.1 localhost\n" + (f"{address} {NAME}\n" if address else "")
+        # In its place: the running programs have this very file for /etc/hosts.
+        with (self.operator_host.machine.own_files / "hosts").open("w", encoding="ascii") as hosts:
+            hosts.write(names)
+
+    def ask_doctor(self, code: int, words: str) -> None:
+        """CheckError unless the doctor ends with this code and says these words."""
+        assert self.doctor is not None
+        said = self.operator_host.run(self.doctor, codes=(code,))
+        require(words in said, f"{self.doctor}: {said.strip()}; not {words!r}")
+
+    # Sides
+
+    @property
+    def robot(self) -> Side:
+        """The robot side that runs."""
+        return self._sides["robot"]
+
+    @property
+    def operator(self) -> Side:
+        """The operator side that runs."""
+        return self._sides["operator"]
+
+    def start(self, name: str, host: Host | None = None, *more: str, called: str | None = None) -> Side:
+        """Start a side as the guide does, `called` something else where there is one already."""
+        ours = self.robot_host if name == "robot" else self.operator_host
+        flags = () if name == "robot" else ("--device=simulated",)
+        side = Side(self.starts[name], host or ours, (*flags, *more))
+        self._sides[called or name] = side
+        return side
+
+    def end(self, called: str) -> float:
+        """End it as Ctrl-C does, and how long that took; CheckError unless it ends well."""
+        side = self._sides.pop(called)
+        began_s = time.monotonic()
+        code = side.process.stop()
+        took_s = time.monotonic() - began_s
+        side.process.__exit__(None, None, None)
+        require(code == 0, f"the {called} side ended with code {code}")
+        return took_s
+
+    def kill(self, called: str) -> None:
+        """End it with kill -9."""
+        side = self._sides.pop(called)
+        os.kill(side.process.process_id, signal.SIGKILL)
+        side.process.__exit__(None, None, None)
+
+    def restart(self, host: Callable[[Host], Host] = lambda host: host) -> None:
+        """Both sides anew, the robot side first, with a fresh scene; `host` may change their surroundings."""
+        self.end_all()
+        self.start("robot", host(self.robot_host))
+        self.until("robot", "it listens", bool)
+        self.start("operator", host(self.operator_host))
+
+    def end_all(self) -> None:
+        """End every side, however."""
+        for side in self._sides.values():
+            side.process.__exit__(None, None, None)
+        self._sides.clear()
+
+    def mend(self) -> None:
+        """The network as it was, after a row that has failed, and both sides anew."""
+        for host, address in zip((self.robot_host, self.operator_host), self._addresses, strict=True):
+            host.machine.plug_in()
+            host.machine.set_link("mtu", "1500")
+            host.machine.readdress(address)
+        self.tell_name(self._addresses[0])
+        self.swallow(False)
+        self.restart()
+
+    def swallow(self, everything: bool) -> None:
+        """Let the robot's host drop all that comes, without a word; or no more."""
+        run = self.robot_host.run
+        if everything:
+            run("nft add table inet swallow")
+            run("nft add chain inet swallow input '{ type filter hook input priority -10; policy drop; }'")
+        else:
+            run("nft delete table inet swallow", codes=(0, 1, 127))
+
+    # Waiting
+
+    def listen(self) -> None:
+        """Take note of what all of them have said."""
+        for side in list(self._sides.values()):
+            side.listen()
+
+    def until(self, called: str, what: str, condition: Callable[[Status], bool], limit_s: float = PATIENCE_S) -> Status:
+        """The first status from now on for which `condition` holds; CheckError when none comes."""
+        self.listen()
+        side = self._sides[called]
+        seen = len(side.said)
+
+        def found() -> Status | None:
+            nonlocal seen
+            self.listen()
+            fresh, seen = side.said[seen:], len(side.said)
+            return next((status for status in fresh if condition(status)), None)
+
+        return wait_until(f"{called}: {what}", found, limit_s, instead=lambda: _short(side.status))
+
+    def watch(self, for_s: float) -> Iterator[None]:
+        """Let time pass, listening; whoever asks looks in between."""
+        end_s = time.monotonic() + for_s
+        while time.monotonic() < end_s:
+            with contextlib.suppress(CheckError):
+                wait_until("time", lambda: False, 0.1)
+            self.listen()
+            yield
+
+    def moving(self) -> None:
+        """Wait until the person has the arm armed and moves it; who is done begins anew."""
+        for attempt in range(4):
+            status = self.until("operator", "armed and moving", lambda status: is_done(status) or is_moving(status))
+            if is_moving(status):
+                return
+            if attempt < 2:
+                self.end("operator")
+                self.start("operator")
+            else:
+                self.restart()
+        raise CheckError("the person is done each time before anything moves")
+
+    def back(self) -> float:
+        """Wait until the link is up, disarmed, with hands at rest; then armed anew. The seconds until it was up."""
+        began_s = time.monotonic()
+        status = self.until("operator", "the link is up", lambda status: status["link"] == "up")
+        took_s = time.monotonic() - began_s
+        require(status["state"] == "disarmed", f"it came back {status['state']}, not disarmed")
+        self.until("robot", "armed anew", is_armed)
+        self.until("operator", "armed anew", lambda status: is_armed(status) and "target_centre_mm" in status)
+        return took_s
+
+
+def is_armed(status: Status) -> bool:
+    """Whether the arm may move, as this side knows."""
+    return bool(status["state"] == "armed")
+
+
+def is_moving(status: Status) -> bool:
+    """Whether the arm is told to."""
+    return is_armed(status) and max(status["L2_pulled"] or 0.0, status["R2_pulled"] or 0.0) > 0.05
+
+
+def is_done(status: Status) -> bool:
+    """Whether the scripted person will not do anything any more."""
+    return status.get("person") in ("done", "no target")
+
+
+def _short(status: Status) -> Status:
+    return {name: status.get(name) for name in ("link", "state", "stopped_because", "feel", "person")}
