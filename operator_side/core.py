@@ -59,6 +59,8 @@ class OperatorSide:
         """What the robot side's messages said when they were of another version; None once they are not."""
         self.stiffness_received = 0
         self.motion_sent = 0
+        self.driving_delay = RunningStatistics(seed)
+        """One-way delay in seconds of what an armed robot side sent: a link's first moments are not in it."""
         self.applied_age = RunningStatistics(seed)
         self._haptics_enabled = haptics
         self._calibration = calibration or TravelCalibration()
@@ -115,6 +117,8 @@ class OperatorSide:
                 self._blindness.end()
         if isinstance(message, StiffnessUpdate):
             self.stiffness_received += 1
+            if message.state == "armed" and arrival.one_way_s is not None:
+                self.driving_delay.add(arrival.one_way_s)
             if arrival.fresh:
                 self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
                 self._blindness.end()
@@ -298,6 +302,7 @@ class OperatorSide:
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),
             },
+            "driving_delay_ms": {"to_operator": self.driving_delay.summary_ms()},
             "applied_age_ms": {"to_operator": self.applied_age.summary_ms()},
             "offset_ms": {"operator": self.link.offset_summary_ms()},
         }

@@ -298,6 +298,7 @@ class RobotSide:
             },
             "lease": self.session.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
+            "driving_delay_ms": {"to_robot": self.session.driving_delay.summary_ms()},
             "loop_age_ms": self._loop_age_s.summary_ms(),
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},

@@ -42,6 +42,8 @@ class OperatorSession:
         """Commands that were not the owner's, or not under its present lease; never applied."""
         self.motion_received = 0
         """All motion commands, whoever sent them."""
+        self.driving_delay = RunningStatistics(seed)
+        """One-way delay in seconds of what arrives from the owner while the arm is armed."""
         self.applied_age = RunningStatistics(seed)
         """Age in seconds of the command that moves the arm, in every tick in which one does."""
         self.leases_granted = 0
@@ -100,6 +102,8 @@ class OperatorSession:
                 self._follow_owner()
         if isinstance(message, MotionCommand):
             self.motion_received += 1
+            if participant is self.lease.owner and self.safety.state == "armed" and arrival.one_way_s is not None:
+                self.driving_delay.add(arrival.one_way_s)
             self._judge(participant, message, arrival, now_s)
         elif arrival.fresh:
             self._announcements.answer(participant, now_s)

@@ -118,7 +118,7 @@ def summary(retransmitted: int = 0, lost: int = 0) -> dict[str, Any]:
     delay = {"mean": 50.0, "sd": 4.0, "p50": 50.0, "p95": 57.0, "p99": 62.0}
     counts = {"sent": 90, "duplicated": 0, "retransmitted": retransmitted, "lost": lost, "outage": 0, "dropped": 0}
     return {
-        "delay_ms": {"to_robot": delay, "to_operator": delay | {"mean": 60.0}},
+        "driving_delay_ms": {"to_robot": delay, "to_operator": delay | {"mean": 60.0}},
         "link": {"to_robot": {"achieved": counts}, "to_operator": {"achieved": counts}},
         "messages": {"motion_received": 2000, "stiffness_received": 2000},
         "first_contact": {"with": "wall", "speed_mm_s": 32.0, "time_s": 3.0},
