@@ -63,6 +63,7 @@ class WayFigures:
 
     mean_ms: float | None
     sd_ms: float | None
+    p50_ms: float | None
     p99_ms: float | None
     samples: int
     """Messages that arrived, in the whole run"""
@@ -109,7 +110,7 @@ def figures_of(summary: Mapping[str, Any], loss_shares: Mapping[Direction, float
         delay_ms = summary["driving_delay_ms"][direction]
         lost = _lost_share(summary["link"][direction]["achieved"]) if loss_shares is None else loss_shares[direction]
         samples = int(summary["messages"][received[direction]])
-        return WayFigures(delay_ms["mean"], delay_ms["sd"], delay_ms["p99"], samples, lost)
+        return WayFigures(delay_ms["mean"], delay_ms["sd"], delay_ms["p50"], delay_ms["p99"], samples, lost)
 
     contact = summary["first_contact"]
     return TrialFigures(

@@ -65,8 +65,8 @@ def figures_table(rows: Sequence[Row]) -> Table:
     """A row for each link, haptics and medium; means with 95 % intervals over trials."""
     shown = Table(title="latency: a constant finger towards a wall", box=MARKDOWN)
     for heading in (
-        *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p99", "lost, %"),
-        *("to operator, ms", "sd", "p99", "lost, %"),
+        *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
+        *("to operator, ms", "sd", "p50", "p99", "lost, %"),
         *("contacts", "mm/s, median (most)", "nearest, mm", "stiffness", "tick p99, us", "stops"),
     ):
         shown.add_column(heading, justify="left" if heading in ("link", "haptics", "medium") else "right")
@@ -93,6 +93,7 @@ def _way_cells(group: Sequence[Row], direction: Direction) -> Iterator[str]:
     half = mean_half_width(means)
     yield _mean(means, 2) + ("" if half is None else f" ± {half:.2f}")
     yield _mean(values(group, way(direction, lambda one: one.sd_ms)), 2)
+    yield _mean(values(group, way(direction, lambda one: one.p50_ms)), 1)
     yield _mean(values(group, way(direction, lambda one: one.p99_ms)), 1)
     yield _mean([100.0 * share for share in values(group, way(direction, lambda one: one.loss_share))], 3)
 

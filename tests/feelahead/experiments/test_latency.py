@@ -30,7 +30,7 @@ from feelahead.experiments.latency.tables import agreement_table, agreements, as
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
-WAY = WayFigures(50.0, 4.0, 62.0, 2000, 0.01)
+WAY = WayFigures(50.0, 4.0, 50.0, 62.0, 2000, 0.01)
 FIGURES = TrialFigures(WAY, replace(WAY, mean_ms=60.0), "wall", 32.0, -0.4, 1.0, 130.0, 0)
 STILL = replace(FIGURES, first_contact=None, contact_speed_mm_s=None, min_distance_mm=3.0)
 
@@ -103,8 +103,8 @@ def test_the_table_has_a_row_for_each_kind_and_json_has_every_trial() -> None:
     lines = [line for line in printed(figures_table(rows)).splitlines() if "wifi" in line]
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     assert [line[:4] for line in cells] == [["wifi", "on", "virtual", "2"], ["wifi", "off", "virtual", "2"]]
-    assert cells[0][4:8] == ["50.50 ± 6.35", "4.00", "62.0", "1.000"]
-    assert [line[12:14] for line in cells] == [["2/2", "32 (32)"], ["0/2", ""]]
+    assert cells[0][4:9] == ["50.50 ± 6.35", "4.00", "50.0", "62.0", "1.000"]
+    assert [line[14:16] for line in cells] == [["2/2", "32 (32)"], ["0/2", ""]]
     told = json.loads(json.dumps(as_json([*rows, row("loopback", 0, 50.0)], ["one"]), allow_nan=False))
     assert len(told["trials"]) == 5
     assert told["agreements"][0]["difference"]["interval"] is None
