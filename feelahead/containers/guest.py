@@ -74,6 +74,7 @@ class Guest:
         self.stop()
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
+        self.pass_on_to(cable.robot_address)
         filter_file, init = self._folder / "incoming.bpf", self._folder / "init"
         filter_file.write_bytes(_INCOMING)
         init.write_text(_init_script(self._folder, cable, words))
@@ -106,6 +107,12 @@ class Guest:
             raise CommandFailedError(f"{_KERNEL}: {error}") from error
         finally:
             console.close()
+
+    def pass_on_to(self, robot_address: str) -> None:
+        """From now on, within a second, the robot side is there."""
+        new = self._folder / "robot.new"
+        new.write_text(f"{robot_address}\n")
+        new.replace(self._folder / "robot")
 
     def stop(self) -> None:
         """End it, and take the addresses back, as far as their interfaces are still there."""
@@ -144,16 +151,25 @@ class Guest:
 
 
 def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> str:
-    """What its first process does: interfaces, rules, delays, and then counting for ever."""
-    ports = ",".join(map(str, PORTS))
-    there = f"-i vec0 -p tcp -m multiport --dports {ports} -j"
+    """What its first process does: interfaces, rules, delays, and then looking for the robot and counting for ever."""
+    there = f"-i vec0 -p tcp -m multiport --dports {','.join(map(str, PORTS))} -j"
     rules = [
-        f"-t nat -A PREROUTING {there} DNAT --to-destination {cable.robot_address}",
         "-t nat -A POSTROUTING -o vec1 -j MASQUERADE",
         "-P FORWARD DROP",
         f"-A FORWARD -o vec1 {there} ACCEPT",
         "-A FORWARD -i vec1 -o vec0 -m conntrack --ctstate ESTABLISHED -j ACCEPT",
     ]
+    for_ever = f"""
+        while read -r now < /mnt/robot && tc -statistics -json qdisc show > /mnt/new; do
+            if [ "$now" != "$robot" ]; then
+                iptables-legacy -t nat -F PREROUTING
+                iptables-legacy -t nat -A PREROUTING {there} DNAT --to-destination $now
+                robot=$now; echo up > /mnt/up
+            fi
+            mv /mnt/new /mnt/queues
+            sleep 0.5
+        done
+        """
     return "\n".join(
         [
             "#!/bin/sh",
@@ -168,9 +184,7 @@ def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> 
             "echo 1 > /proc/sys/net/ipv4/ip_forward",
             *(f"iptables-legacy {rule}" for rule in rules),
             *(shlex.join(command) for command in delays(_LEAVES, words)),
-            "echo up > /mnt/up",
-            "while tc -statistics -json qdisc show > /mnt/new; do mv /mnt/new /mnt/queues; sleep 0.5; done",
-            "",
+            for_ever,
         ]
     )
 

@@ -14,7 +14,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -101,11 +101,12 @@ class Router:
         """Set up anew what has changed, and count; CommandFailedError where it may not."""
         cable = self._find()
         in_guest = self._apply == self._route_in_guest
-        if cable is not None and (cable != self._cable or (in_guest and self._told and not self.guest.running)):
+        if cable is None:
+            return  # whoever is away comes back, most often to the same place
+        if cable != self._cable or (in_guest and self._told and not self.guest.running):
             self._apply(cable)
-            self._applied_s = now_s
-        self._cable = cable
-        if cable is None or (in_guest and not self._guest_is_up(cable, now_s)):
+            self._cable, self._applied_s = cable, now_s
+        if in_guest and not self._guest_is_up(cable, now_s):
             return
         if not self._told:
             self._told = True
@@ -131,7 +132,10 @@ class Router:
             run_system(delay)
 
     def _route_in_guest(self, cable: Cable) -> None:
-        if self._words is not None:
+        known = self._cable
+        if self.guest.running and known is not None and replace(known, robot_address=cable.robot_address) == cable:
+            self.guest.pass_on_to(cable.robot_address)
+        elif self._words is not None:
             self.guest.start(cable, self._words)
 
     def _guest_is_up(self, cable: Cable, now_s: float) -> bool:
