@@ -136,12 +136,15 @@ class Guest:
         local, _, length = address.partition("/")
         return {**shown, "addr_info": [{"family": "inet", "local": local, "prefixlen": int(length)}]}
 
-    def queues(self) -> list[dict[str, Any]]:
-        """What its tc counts; empty where it has said nothing yet."""
-        try:
-            counted: list[dict[str, Any]] = json.loads((self._folder / "queues").read_text())
-        except (OSError, json.JSONDecodeError):
-            return []
+    def ask_for_queues(self) -> None:
+        """Let it count."""
+        (self._folder / "count").touch()
+
+    def queues(self) -> list[dict[str, Any]] | None:
+        """What its tc has counted since it was asked; None as long as it has not."""
+        if (self._folder / "count").exists():
+            return None
+        counted: list[dict[str, Any]] = json.loads((self._folder / "queues").read_text())
         return counted
 
     @staticmethod
@@ -159,20 +162,23 @@ def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> 
         f"-A FORWARD -o vec1 {there} ACCEPT",
         "-A FORWARD -i vec1 -o vec0 -m conntrack --ctstate ESTABLISHED -j ACCEPT",
     ]
+    # No program runs unless something is asked for: starting one holds this kernel up for milliseconds.
     for_ever = f"""
-        while read -r now < /mnt/robot && tc -statistics -json qdisc show > /mnt/new; do
+        mkfifo /run/never
+        exec 3<> /run/never
+        while read -r now < /mnt/robot; do
             if [ "$now" != "$robot" ]; then
                 iptables-legacy -t nat -F PREROUTING
                 iptables-legacy -t nat -A PREROUTING {there} DNAT --to-destination $now
                 robot=$now; echo up > /mnt/up
             fi
-            mv /mnt/new /mnt/queues
-            sleep 0.5
+            if [ -e /mnt/count ]; then tc -statistics -json qdisc show > /mnt/queues; rm /mnt/count; fi
+            read -t 0.5 -r nothing <&3 || true
         done
         """
     return "\n".join(
         [
-            "#!/bin/sh",
+            "#!/bin/busybox sh",
             "set -e",
             "export PATH=/usr/sbin:/usr/bin:/sbin:/bin",
             "mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t tmpfs tmpfs /run",

@@ -83,7 +83,8 @@ class ContainerMedium:
 
     def _packets(self, engine: Engine) -> Mapping[Direction, Counted]:
         """What netem has counted so far; empty where it is the sides that emulate."""
-        command = "test ! -e /link/packets.json || cat /link/packets.json"
+        ask = "touch /link/count; while test -e /link/count; do sleep 0.1; done"
+        command = f"{ask}; test ! -e /link/packets.json || cat /link/packets.json"
         said = engine.docker("exec", engine.container("router"), "sh", "-c", command)
         counted: dict[Direction, Counted] = {name: Counted(**one) for name, one in json.loads(said or "{}").items()}
         return counted

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import tyro
 
@@ -32,6 +32,7 @@ from feelahead.containers.system import CommandFailedError, run_system
 
 PROGRAM = "feelahead-router"
 _PERIOD_S: Final = 0.5
+_COUNT: Final = ("tc", "-statistics", "-json", "qdisc", "show")
 _GUEST_LIMIT_S: Final = 60.0
 """It boots in two seconds, and on a very busy machine in forty."""
 
@@ -47,7 +48,9 @@ class RouterSettings:
     said: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/emulated")
     """Where to write what the sides have to emulate themselves: nothing, or the link."""
     packets: Annotated[Path, tyro.conf.arg(metavar="FILE.json")] = Path("/link/packets.json")
-    """Where to write, twice a second, what netem has passed on and dropped in each direction."""
+    """Where to write what netem has passed on and dropped in each direction, when --count asks for it."""
+    count: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/count")
+    """Whoever makes this file asks for it; it goes when it is answered."""
     guest: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("/run/feelahead")
     """For User-Mode Linux; on a file system that lets programs run."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -77,7 +80,7 @@ class Router:
     def __init__(self, settings: RouterSettings) -> None:
         self._settings = settings
         self._cable: Cable | None = None
-        self._told = False
+        self._told = self._asked = False
         self._applied_s = 0.0
         self.guest = guest.Guest(settings.guest)
         self._words: Mapping[Direction, str] | None = None
@@ -113,10 +116,26 @@ class Router:
             with output_file("--said", self._settings.said) as file:
                 file.write("" if self._words is not None else self._settings.link)
             _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
+        if self._settings.count.exists():
+            self._count(cable, in_guest=in_guest)
+
+    def _count(self, cable: Cable, *, in_guest: bool) -> None:
+        """What netem has passed on and dropped, where there is one, and take away the file that asked for it."""
         if self._words is not None:
-            queues = self.guest.queues() if in_guest else json.loads(run_system(_COUNT))
+            queues = self._queues_of_guest() if in_guest else json.loads(run_system(_COUNT))
+            if queues is None:
+                return
             counted = count_packets(queues, self.guest.leaves() if in_guest else cable.leaves())
             write_json("--packets", self._settings.packets, {name: asdict(one) for name, one in counted.items()})
+        self._asked = False
+        self._settings.count.unlink()
+
+    def _queues_of_guest(self) -> list[dict[str, Any]] | None:
+        if not self._asked:
+            self._asked = True
+            self.guest.ask_for_queues()
+            return None
+        return self.guest.queues()
 
     def _find(self) -> Cable | None:
         try:
@@ -152,9 +171,6 @@ class Router:
     def _leave_it_to_the_sides(self, why: str) -> None:
         self._words, self._apply = None, self._route
         _say(f"NO netem ({why}): the sides emulate the link themselves: {self._settings.link!r}")
-
-
-_COUNT: Final = ("tc", "-statistics", "-json", "qdisc", "show")
 
 
 def _say(text: str) -> None:
