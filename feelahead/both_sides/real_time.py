@@ -18,8 +18,11 @@ _PAUSE_S: Final = 0.1
 def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> None:
     """Let them run for so long once their link is up, and end both; SideFailedError where one fails."""
     clock, pause = MonotonicClock(), threading.Event()
+    limit_s = clock.now() + LINK_S
     while operator.wait_for("status", LINK_S).get("link") != LINK_UP:
-        pass
+        robot.check()
+        if clock.now() > limit_s or not robot.running:
+            raise FeelaheadError(f"no link within {LINK_S:g} s")
     end_s = clock.now() + duration_s
     while (left_s := end_s - clock.now()) > 0.0:
         pause.wait(min(left_s, _PAUSE_S))

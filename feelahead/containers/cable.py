@@ -9,8 +9,10 @@ from common.emulation.spec import Direction
 
 PORTS: Final = (5555, 5556)
 """Control and view."""
-_SEGMENTING: Final = "tbf rate 2gbit burst 1600 limit 10mb"
+_SEGMENTING: Final = "tbf rate 2gbit burst {burst} limit 10mb"
 """Cuts what a sender left to its interface to cut: netem is to see packets as a wire has them."""
+_HEADERS_BYTES: Final = 100
+"""Of the frame, around what the interface's limit counts."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class End:
     mac: str
     address: str
     """With the length of the network's prefix."""
+    mtu: int = 1500
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,11 @@ class Cable:
     operator: End
     robot_address: str
     """Of the robot side itself."""
+
+    @property
+    def mtu(self) -> int:
+        """The largest packet of either network, in bytes."""
+        return max(self.robot.mtu, self.operator.mtu)
 
     def leaves(self) -> dict[Direction, str]:
         """The interface by which each direction leaves the router."""
@@ -62,12 +70,13 @@ class Cable:
             """
 
 
-def delays(leaves: Mapping[Direction, str], words: Mapping[Direction, str]) -> list[list[str]]:
+def delays(leaves: Mapping[Direction, str], words: Mapping[Direction, str], mtu: int = 1500) -> list[list[str]]:
     """The commands that delay what leaves towards each side: a cutter, and netem behind it."""
     commands = []
     for direction, interface in leaves.items():
         queue = ["tc", "qdisc", "replace", "dev", interface]
-        commands.append([*queue, "root", "handle", "1:", *_SEGMENTING.split()])
+        cutter = _SEGMENTING.format(burst=mtu + _HEADERS_BYTES).split()
+        commands.append([*queue, "root", "handle", "1:", *cutter])
         commands.append([*queue, "parent", "1:", "handle", "2:", "netem", *words[direction].split()])
     return commands
 
@@ -80,7 +89,8 @@ def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> C
         for held in shown["addr_info"]:
             if held["family"] != "inet" or shown["ifname"] == "lo":
                 continue
-            end = End(shown["ifname"], shown["ifindex"], shown["address"], f"{held['local']}/{held['prefixlen']}")
+            address = f"{held['local']}/{held['prefixlen']}"
+            end = End(shown["ifname"], shown["ifindex"], shown["address"], address, shown["mtu"])
             near = ipaddress.ip_address(robot_address) in ipaddress.ip_interface(end.address).network
             (robots if near else others).append(end)
     return Cable(robots[0], others[0], robot_address) if len(robots) == len(others) == 1 else None

@@ -189,7 +189,7 @@ def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> 
             *_address(1, cable.robot),
             "echo 1 > /proc/sys/net/ipv4/ip_forward",
             *(f"iptables-legacy {rule}" for rule in rules),
-            *(shlex.join(command) for command in delays(_LEAVES, words)),
+            *(shlex.join(command) for command in delays(_LEAVES, words, cable.mtu)),
             for_ever,
         ]
     )

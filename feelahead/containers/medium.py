@@ -3,16 +3,17 @@
 import json
 import os
 import shlex
+import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from typing import Any, Final
+from contextlib import ExitStack, contextmanager
+from typing import Final
 
 from common.emulation.spec import Direction
 from feelahead.both_sides.processes import StartedSide
 from feelahead.both_sides.real_time import START_S, run_for
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
-from feelahead.containers.engine import Engine
+from feelahead.containers.engine import Engine, EngineError
 from feelahead.containers.netem import Counted
 
 PROJECT: Final = "feelahead-latency"
@@ -27,11 +28,8 @@ def open_medium() -> Iterator["ContainerMedium"]:
 
     ConfigurationError where there is no engine, EngineError where an image cannot be built.
     """
-    medium = ContainerMedium(os.getpid())
-    try:
-        yield medium
-    finally:
-        medium.close()
+    with ExitStack() as stack:
+        yield ContainerMedium(stack, os.getpid())
 
 
 class ContainerMedium:
@@ -39,58 +37,58 @@ class ContainerMedium:
 
     name = "containers"
 
-    def __init__(self, number: int) -> None:
-        """`number`: for names that no other run of ours uses."""
+    def __init__(self, stack: ExitStack, number: int) -> None:
+        """`stack` removes it all at the end; `number`: for names that no other run of ours uses."""
+        self._stack = stack
         self._number = number
         self._cables: dict[str, Engine] = {}
+        self._trials = 0
+        sys.stderr.write("building the images, minutes the first time\n")
         Engine(PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
 
     def run(self, trial: Trial) -> TrialFigures:
-        """Do it in real time; SideFailedError where a side fails, EngineError where the engine does."""
+        """Do it in real time; SideFailedError where a side fails, EngineError where the engine does.
+
+        EngineError, too, where there is no netem for this link: that the sides emulate it is what loopback shows.
+        """
         engine = self._cables.get(trial.link) or self._lay_cable(trial)
+        self._trials += 1
+        summaries = {side: f"/results/{side}-{self._trials}.json" for side in _SIDES}
         options = {
-            "ROBOT_OPTIONS": trial.robot_arguments(),
-            "OPERATOR_OPTIONS": [word for word in trial.operator_arguments() if word != "--device=simulated"],
+            "ROBOT_OPTIONS": [*trial.robot_arguments(), f"--summary={summaries['robot']}"],
+            "OPERATOR_OPTIONS": [*trial.operator_arguments(), f"--summary={summaries['operator']}"],
         }
         settings = {name: shlex.join(["--status=json", *words]) for name, words in options.items()}
         engine.compose(
             *("up", "--no-start", "--no-deps", "--force-recreate", *_SIDES),
             settings=self._settings(trial) | settings,
         )
-        before = self._packets(engine)
         with StartedSide("robot", engine.attached(engine.container("robot"))) as robot:
             robot.wait_for("listening", START_S)
+            if self._in_router(engine, "while ! test -e /link/emulated; do sleep 0.1; done; cat /link/emulated"):
+                raise EngineError(f"no netem here for --link {trial.link!r}; the router's log says why")
+            before = self._packets(engine)
             with StartedSide("operator", engine.attached(engine.container("operator"))) as operator:
                 run_for(robot, operator, trial.duration_s)
-        robot_said, operator_said = (self._summary(engine, side) for side in _SIDES)
         after = self._packets(engine)
-        lost = {direction: after[direction].lost_share_since(before[direction]) for direction in before}
-        return figures_of(merge_summaries(robot_said, operator_said, []), lost or None)
-
-    def close(self) -> None:
-        """Remove all of it."""
-        for engine in self._cables.values():
-            engine.remove()
+        lost = {direction: now.lost_share_since(before.get(direction, now)) for direction, now in after.items()}
+        robot_said, operator_said = (engine.read_json(engine.container(side), path) for side, path in summaries.items())
+        return figures_of(merge_summaries(robot_said, operator_said, []), lost)
 
     def _lay_cable(self, trial: Trial) -> Engine:
         engine = Engine(f"{PROJECT}-{self._number}-{len(self._cables)}")
-        self._cables[trial.link] = engine
+        self._stack.callback(engine.remove)
         engine.compose("up", "--detach", "router", settings=self._settings(trial))
+        self._cables[trial.link] = engine
         return engine
 
     def _settings(self, trial: Trial) -> dict[str, str]:
         return {"LINK": trial.link, "LINK_MODEL": trial.link_model, "RESTART": "no"}
 
     def _packets(self, engine: Engine) -> Mapping[Direction, Counted]:
-        """What netem has counted so far; empty where it is the sides that emulate."""
-        ask = "touch /link/count; while test -e /link/count; do sleep 0.1; done"
-        command = f"{ask}; test ! -e /link/packets.json || cat /link/packets.json"
-        said = engine.docker("exec", engine.container("router"), "sh", "-c", command)
-        counted: dict[Direction, Counted] = {name: Counted(**one) for name, one in json.loads(said or "{}").items()}
-        return counted
+        """What netem has counted so far."""
+        ask = "touch /link/count; while test -e /link/count; do sleep 0.1; done; cat /link/packets.json"
+        return {name: Counted(**one) for name, one in json.loads(self._in_router(engine, ask)).items()}
 
-    def _summary(self, engine: Engine, side: str) -> dict[str, Any]:
-        packed = engine.docker("cp", f"{engine.container(side)}:/results/{side}.json", "-")
-        # A tar of one file, whose text goes from the first brace to the last.
-        summary: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
-        return summary
+    def _in_router(self, engine: Engine, command: str) -> str:
+        return engine.docker("exec", engine.container("router"), "sh", "-c", command)

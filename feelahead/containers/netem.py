@@ -34,7 +34,9 @@ class Counted:
     dropped: int
 
     def lost_share_since(self, before: "Counted") -> float | None:
-        """Of everything that came since `before`; None where nothing did."""
+        """Of everything that came since `before`; None where nothing did, or netem was set up anew meanwhile."""
+        if self.sent < before.sent or self.dropped < before.dropped:
+            return None
         dropped = self.dropped - before.dropped
         came = self.sent - before.sent + dropped
         return dropped / came if came > 0 else None
@@ -63,10 +65,11 @@ def _beyond(profile: LinkProfile) -> str | None:
     if isinstance(profile.distribution, DelayTable) or profile.distribution == "exponential":
         return "a distribution that tc has no table of"
     for name, there in (
+        ("slot distribution", profile.slot is not None and profile.slot.shape is not None),
         ("trace", profile.trace is not None),
         ("outage", bool(profile.outages)),
         ("retransmit", profile.retransmit_s is not None),
     ):
         if there:
-            return f"{name} is not one of netem's words"
+            return f"{name} is not among tc's words, or not with its tables"
     return None

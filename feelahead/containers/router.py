@@ -32,7 +32,10 @@ from feelahead.containers.system import CommandFailedError, run_system
 
 PROGRAM = "feelahead-router"
 _PERIOD_S: Final = 0.5
+_AWAY: Final = ("tc", "qdisc", "del", "dev", "lo", "root")
 _COUNT: Final = ("tc", "-statistics", "-json", "qdisc", "show")
+_MOST_FAILED: Final = 10
+"""Looks in a row."""
 _GUEST_LIMIT_S: Final = 60.0
 """It boots in two seconds, and on a very busy machine in forty."""
 
@@ -63,11 +66,19 @@ class RouterSettings:
 def command(arguments: Sequence[str]) -> int:
     """Route until SIGTERM; an error where the network may not be changed."""
     settings = parse_settings(RouterSettings, PROGRAM, arguments)
-    router, clock = Router(settings), MonotonicClock()
+    router, clock, failed = Router(settings), MonotonicClock(), 0
     with StopSignal() as stop:
         try:
             while not stop.is_set:
-                router.look(clock.now())
+                try:
+                    router.look(clock.now())
+                    failed = 0
+                except CommandFailedError as error:
+                    # As when a network goes in the middle of it.
+                    failed += 1
+                    _say(str(error))
+                    if failed == _MOST_FAILED:
+                        raise
                 time.sleep(_PERIOD_S)
         finally:
             router.guest.stop()
@@ -87,8 +98,9 @@ class Router:
         self._apply: Callable[[Cable], None] = self._route
         try:
             words = self._words = netem_words(LinkSpec.parse(settings.link))
-            run_system(["tc", "qdisc", "replace", "dev", "lo", "root", "netem", "delay", "0ms"])
-            run_system(["tc", "qdisc", "del", "dev", "lo", "root"])
+            for direction in words:
+                for asked in (*delays({direction: "lo"}, words), _AWAY):
+                    run_system(asked)
             how = "the kernel's netem"
         except BeyondNetemError as reason:
             self._leave_it_to_the_sides(str(reason))
@@ -102,19 +114,20 @@ class Router:
 
     def look(self, now_s: float) -> None:
         """Set up anew what has changed, and count; CommandFailedError where it may not."""
-        cable = self._find()
+        cable = self._find() or self._cable  # whoever is away comes back, most often to the same place
         in_guest = self._apply == self._route_in_guest
         if cable is None:
-            return  # whoever is away comes back, most often to the same place
+            return
         if cable != self._cable or (in_guest and self._told and not self.guest.running):
             self._apply(cable)
             self._cable, self._applied_s = cable, now_s
         if in_guest and not self._guest_is_up(cable, now_s):
             return
-        if not self._told:
-            self._told = True
+        if not self._settings.said.exists():  # the service `keys`, which each `up` runs anew, takes it away
             with output_file("--said", self._settings.said) as file:
                 file.write("" if self._words is not None else self._settings.link)
+        if not self._told:
+            self._told = True
             _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
         if self._settings.count.exists():
             self._count(cable, in_guest=in_guest)
@@ -147,7 +160,7 @@ class Router:
 
     def _route(self, cable: Cable) -> None:
         run_system(["nft", "-f", "-"], cable.rules())
-        for delay in delays(cable.leaves(), self._words) if self._words is not None else ():
+        for delay in delays(cable.leaves(), self._words, cable.mtu) if self._words is not None else ():
             run_system(delay)
 
     def _route_in_guest(self, cable: Cable) -> None:

@@ -33,6 +33,7 @@ def test_nothing_asked_for_is_no_delay() -> None:
         ("delay 10ms outage 1s at 2s", "outage"),
         ("to_operator.telemetry: delay 5ms", "streams"),
         ("to_robot: outage 1s at 2s", "to_robot: outage"),
+        ("slot distribution uniform 20ms 5ms", "slot"),
     ],
 )
 def test_what_netem_cannot_do_is_left_to_the_sides(spec: str, why: str) -> None:
@@ -65,3 +66,8 @@ def test_the_share_that_was_lost_is_of_what_came_since() -> None:
     assert Counted(990, 10).lost_share_since(Counted(0, 0)) == 0.01
     assert Counted(1089, 11).lost_share_since(Counted(990, 10)) == 0.01
     assert Counted(990, 10).lost_share_since(Counted(990, 10)) is None
+
+
+def test_what_was_set_up_anew_meanwhile_tells_nothing() -> None:
+    assert Counted(5, 0).lost_share_since(Counted(990, 0)) is None
+    assert Counted(2000, 0).lost_share_since(Counted(990, 10)) is None

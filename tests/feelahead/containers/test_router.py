@@ -17,6 +17,7 @@ def interface(name: str, number: int, *addresses: str) -> dict[str, Any]:
     return {
         "ifname": name,
         "ifindex": number,
+        "mtu": 1500,
         "address": f"02:42:00:00:00:{number:02x}",
         "addr_info": [{"family": "inet", "local": local, "prefixlen": int(length)} for local, length in held],
     }
