@@ -162,8 +162,11 @@ def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> 
         f"-A FORWARD -o vec1 {there} ACCEPT",
         "-A FORWARD -i vec1 -o vec0 -m conntrack --ctstate ESTABLISHED -j ACCEPT",
     ]
-    # No program runs unless something is asked for: starting one holds this kernel up for milliseconds.
+    # No program runs unless something is asked for, as starting one holds this kernel up for milliseconds: busybox's
+    # shell can wait by itself.
     for_ever = f"""
+        export tc=$(command -v tc)  # not busybox's own
+        exec busybox sh -e -c '
         mkfifo /run/never
         exec 3<> /run/never
         while read -r now < /mnt/robot; do
@@ -172,13 +175,13 @@ def _init_script(folder: Path, cable: Cable, words: Mapping[Direction, str]) -> 
                 iptables-legacy -t nat -A PREROUTING {there} DNAT --to-destination $now
                 robot=$now; echo up > /mnt/up
             fi
-            if [ -e /mnt/count ]; then tc -statistics -json qdisc show > /mnt/queues; rm /mnt/count; fi
+            if [ -e /mnt/count ]; then $tc -statistics -json qdisc show > /mnt/queues; rm /mnt/count; fi
             read -t 0.5 -r nothing <&3 || true
-        done
+        done'
         """
     return "\n".join(
         [
-            "#!/bin/busybox sh",
+            "#!/bin/sh",
             "set -e",
             "export PATH=/usr/sbin:/usr/bin:/sbin:/bin",
             "mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t tmpfs tmpfs /run",
