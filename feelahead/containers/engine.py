@@ -66,6 +66,13 @@ class Engine:
         [known] = json.loads(self.docker("inspect", container))
         return dict(known)
 
+    def read_json(self, container: str, path: str) -> dict[str, Any]:
+        """A file of JSON out of a container, which need not run."""
+        packed = self.docker("cp", f"{container}:{path}", "-")
+        # A tar of one file, whose text goes from the first brace to the last.
+        content: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
+        return content
+
     def attached(self, container: str) -> list[str]:
         """The command that starts a container, shows what it prints, hands signals on and ends with its exit code."""
         return ["docker", "start", "--attach", container]
