@@ -1,9 +1,11 @@
 """Build the images and try the containers: `python -m tests.containers`."""
 
 import argparse
+import signal
 import sys
 import time
 from pathlib import Path
+from types import FrameType
 
 from common.errors import FeelaheadError
 from feelahead.containers.engine import Engine, EngineError
@@ -23,6 +25,8 @@ def main() -> int:
     parser.add_argument("--link", default="delay 20ms 2ms distribution normal rate 100mbit", metavar="NAME|SPEC")
     parser.add_argument("only", nargs="*", help="words: run only the checks whose names contain one of them")
     given = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _leave)
     started_s = time.monotonic()
 
     def say(line: str) -> None:
@@ -36,6 +40,9 @@ def main() -> int:
     except SkippedError as reason:
         print(f"skipped: {reason}")
         return 0
+    except FeelaheadError as error:
+        print(f"failed: {error}")
+        return 1
     print(f"{'failed' if failed else 'passed'} in {time.monotonic() - started_s:.0f} s")
     return 1 if failed else 0
 
@@ -44,7 +51,8 @@ def _try_everything(engine: Engine, settings: dict[str, str], only: list[str], s
     """How many checks failed; what the project has is removed on every way out."""
     failed = 0
     began_s = time.monotonic()
-    engine.remove()
+    if _remove(engine, say):
+        return 1
     try:
         engine.compose("build", settings=settings, limit_s=_BUILD_LIMIT_S)
     except EngineError as error:
@@ -61,8 +69,24 @@ def _try_everything(engine: Engine, settings: dict[str, str], only: list[str], s
                 failed += 1
                 say(f"{tried.__name__}: FAILED: {error}")
     finally:
-        engine.remove()
+        failed += _remove(engine, say)
     return failed
+
+
+def _remove(engine: Engine, say: Say) -> int:
+    """1 where it fails, and a line that says why."""
+    try:
+        engine.remove()
+    except EngineError as error:
+        say(f"FAILED: what {engine.project} has cannot be removed: {error}")
+        return 1
+    return 0
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """By way of everything that has to be put in order."""
+    del frame
+    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

@@ -8,14 +8,16 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from feelahead.containers.engine import Engine
 from feelahead.containers.medium import PROJECT as TRIALS
-from tests.containers.watch import Event, Watched, check, link_up, state_is
+from tests.containers.watch import Watched, check, link_up, state_is
 
 SERVICES: Final = ("router", "robot", "operator")
-_DISTURBED: Final = re.compile(r"warning|traceback|error|exception|refused|denied", re.IGNORECASE)
+_DISTURBED: Final = re.compile(r"warning|traceback|error|exception|refused|denied|failed|cannot", re.IGNORECASE)
+_MOST_GAP_MS: Final = 1000.0
+"""100 ms are promised, and 20 more in the worst case; only a quiet machine can be held to that."""
 
 
 def first_stiffness(engine: Engine, settings: Mapping[str, str]) -> str:
@@ -98,8 +100,8 @@ def robot_killed(engine: Engine, _: Mapping[str, str]) -> str:
     stiff = [event["R2"] for event in heard if event.get("event") == "status" and event.get("link") != "up"]
     check(not any(stiff), f"R2 stiff without a link: {stiff}")
     began_s = time.monotonic()
-    back = robot.wait_for("armed", state_is("armed"))
-    _came_back_disarmed(back)
+    robot.wait_for("started anew", lambda event: event.get("event") == "listening")
+    _came_back_disarmed(robot)
     return (
         f"triggers free while it was away; disarmed, then armed by the person {time.monotonic() - began_s:.0f} s later"
     )
@@ -112,7 +114,7 @@ def ended(engine: Engine, _: Mapping[str, str]) -> str:
     for service, container in containers.items():
         code = engine.inspect(container)["State"]["ExitCode"]
         check(code == 0, f"{service} ended with code {code}")
-    summary = read_summary(engine, "robot")
+    summary = engine.read_json(containers["robot"], "/results/robot.json")
     stops = [stop["reason"] for stop in summary["stops"]]
     return f"codes 0, summaries written; the last robot process ticked {summary['ticks']} times, stops: {stops}"
 
@@ -120,6 +122,8 @@ def ended(engine: Engine, _: Mapping[str, str]) -> str:
 def one_trial(engine: Engine, settings: Mapping[str, str]) -> str:
     """The latency experiment, as short as it can be: both media know of one contact, and leave nothing either."""
     words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "4", "--media", "virtual", "--compose"]
+    # Others' trials, and what older ones left, are not ours to judge.
+    before = _existing(engine, f"name={TRIALS}")
     with tempfile.TemporaryDirectory(prefix="feelahead-containers-") as folder:
         command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, "--out", folder]
         environment = {**engine.environment, **settings}
@@ -129,37 +133,36 @@ def one_trial(engine: Engine, settings: Mapping[str, str]) -> str:
     speeds = {trial["medium"]: trial["contact_speed_mm_s"] for trial in trials}
     check(set(speeds) == {"virtual", "containers"}, f"media: {speeds}")
     check(None not in speeds.values(), f"no contact without haptics: {speeds}")
+    left = _existing(engine, f"name={TRIALS}") - before
+    check(not left, f"left by the trial: {sorted(left)}")
     return ", ".join(f"{medium}: contact at {speed:.0f} mm/s" for medium, speed in speeds.items())
 
 
 def nothing_left(engine: Engine, _: Mapping[str, str]) -> str:
     """`down --volumes` leaves neither containers nor networks nor volumes."""
     engine.remove()
-    left = [
-        engine.docker(*kind, "--quiet", "--filter", f"name={engine.project}", "--filter", f"name={TRIALS}").split()
-        for kind in (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
-    ]
-    check(not any(left), f"left: {left}")
+    left = _existing(engine, f"label=com.docker.compose.project={engine.project}")
+    check(not left, f"left: {sorted(left)}")
     return "no container, no network, no volume"
 
 
-def read_summary(engine: Engine, service: str) -> dict[str, Any]:
-    """The summary that a side has written."""
-    packed = engine.docker("cp", f"{engine.container(service)}:/results/{service}.json", "-")
-    # A tar of one file: its text begins at the first brace and ends at the last.
-    summary: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
-    return summary
+def _existing(engine: Engine, which: str) -> set[str]:
+    """The containers, networks and volumes that a filter of the engine lets through."""
+    kinds = (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
+    return {one for kind in kinds for one in engine.docker(*kind, "--quiet", "--filter", which).split()}
 
 
 def _disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> str:
     robot = Watched(engine, "robot")
     _armed(robot)
+    robot.new_events()
     disturb()
-    stopped = robot.wait_for("disarmed", state_is("disarmed", "ready"))
-    because = next((event["stopped_because"] for event in stopped if event.get("stopped_because")), "its owner is away")
+    *_, stop = robot.wait_for("disarmed", state_is("disarmed", "ready"))
+    because = stop.get("stopped_because") or "its owner is away"
+    gap = re.fullmatch(r"no command for (\d+) ms", because)
+    check(gap is None or float(gap[1]) <= _MOST_GAP_MS, f"stopped too late: {because}")
     began_s = time.monotonic()
-    back = stopped[-1:] + robot.wait_for("armed", state_is("armed"), 120.0)
-    _came_back_disarmed(back)
+    _came_back_disarmed(robot)
     return f"stopped: {because}; disarmed, then armed by the person {time.monotonic() - began_s:.0f} s later"
 
 
@@ -168,9 +171,12 @@ def _armed(robot: Watched) -> None:
     robot.wait_for("armed", state_is("armed"), 120.0)
 
 
-def _came_back_disarmed(events: list[Event]) -> None:
-    states = [event["state"] for event in events if event.get("event") == "status"]
-    check("disarmed" in states[:-1] or "ready" in states[:-1], f"armed at once: {states}")
+def _came_back_disarmed(robot: Watched) -> None:
+    """After a stop or a start: armed only after it was seen disarmed once more, and with a link."""
+    heard = [event for event in robot.wait_for("armed", state_is("armed"), 120.0) if event.get("event") == "status"]
+    # Five statuses fit into the healthy second that arming asks for.
+    disarmed = any(link_up(event) and state_is("disarmed", "ready")(event) for event in heard[-2:-1])
+    check(disarmed, f"armed at once: {[(event['link'], event['state']) for event in heard]}")
 
 
 def _without_figures(line: str) -> str:

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -30,15 +30,16 @@ def default_cache() -> Path:
 @contextmanager
 def provided_engine(cache: Path, say: Say) -> Iterator[Engine]:
     """The engine that runs here; else, in CI and as root, our own one, which ends with us. Else SkippedError."""
-    try:
-        yield Engine(PROJECT)
-    except ConfigurationError as missing:
-        if os.environ.get("CI") != "true" or os.geteuid() != 0:
-            raise SkippedError(f"{missing} (with CI=true, root gets one of Debian's)") from None
-        _install(_PACKAGES, "dockerd", say)
-        _install(("docker-compose",), "docker-compose", say)
-        with _own_engine(cache, say) as environment:
-            yield Engine(PROJECT, environment)
+    with ExitStack() as stack:
+        try:
+            engine = Engine(PROJECT)
+        except ConfigurationError as missing:
+            if os.environ.get("CI") != "true" or os.geteuid() != 0:
+                raise SkippedError(f"{missing} (with CI=true, root gets one of Debian's)") from None
+            _install(_PACKAGES, "dockerd", say)
+            _install(("docker-compose",), "docker-compose", say)
+            engine = Engine(PROJECT, stack.enter_context(_own_engine(cache, say)))
+        yield engine
 
 
 def base_image(engine: Engine, say: Say) -> Mapping[str, str]:
@@ -73,17 +74,24 @@ def _own_engine(cache: Path, say: Say) -> Iterator[Mapping[str, str]]:
     ]
     environment = {"DOCKER_HOST": f"unix://{place['docker.sock']}"}
     say("starting an engine of our own")
-    with (cache / "log").open("w") as log, subprocess.Popen(words, stdout=log, stderr=log) as daemon:
+    with (
+        (cache / "log").open("w") as log,
+        # Ctrl-C reaches this process alone, which needs the engine to remove what it made.
+        subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True) as daemon,
+    ):
         try:
             _wait_for_daemon(daemon, environment, cache / "log")
             yield environment
             # What older versions of the images were built of.
-            _run(["docker", "image", "prune", "--force", "--filter", "until=168h"], environment)
+            _tidy(["docker", "image", "prune", "--force", "--filter", "until=168h"], environment)
         finally:
             daemon.terminate()
-            daemon.wait(timeout=_PATIENCE_S)
+            try:
+                daemon.wait(timeout=_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                daemon.kill()
             if not had_bridge:
-                _run(["ip", "link", "delete", "docker0"], {})
+                _tidy(["ip", "link", "delete", "docker0"], {})
 
 
 def _wait_for_daemon(daemon: subprocess.Popen[bytes], environment: Mapping[str, str], log: Path) -> None:
@@ -107,6 +115,12 @@ def _install(packages: tuple[str, ...], program: str, say: Say) -> None:
         ["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages],
         {"DEBIAN_FRONTEND": "noninteractive"},
     )
+
+
+def _tidy(words: list[str], environment: Mapping[str, str]) -> None:
+    """On the way out, where a failure changes nothing about what was found."""
+    with suppress(OSError, subprocess.TimeoutExpired):
+        subprocess.run(words, env=os.environ | environment, capture_output=True, timeout=_PATIENCE_S, check=False)
 
 
 def _run(words: list[str], environment: Mapping[str, str]) -> None:

@@ -11,6 +11,8 @@ from tests.two_hosts.lan import Lan, Status, is_armed
 
 _MOST_GAP_MS = 1000.0
 """100 ms are promised, and 20 more in the worst case; only a quiet machine can be held to that."""
+_MOST_SEGMENT = 536
+"""Bytes: 576 without the headers of IP and TCP."""
 _STILL_MM = 2.0
 _SETTLES_S = 0.5
 ATTEMPTS = 3
@@ -88,7 +90,10 @@ def small_packets(lan: Lan) -> str:
     segment = re.search(r"\bmss:(\d+)", lan.operator_host.run("ss -tin state established '( dport = :5555 )'"))
     for host in hosts:
         host.machine.set_link("mtu", "1500")
-    return f"armed, stiffness and telemetry flow; segments of {'?' if segment is None else segment[1]} bytes"
+    if segment is None:
+        raise CheckError("ss tells no segment size of the operator's connection")
+    require(int(segment[1]) <= _MOST_SEGMENT, f"segments of {segment[1]} bytes, which are more than {_MOST_SEGMENT}")
+    return f"armed, stiffness and telemetry flow; segments of {segment[1]} bytes"
 
 
 def silent_name_server(lan: Lan) -> str:

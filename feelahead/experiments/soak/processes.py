@@ -12,6 +12,7 @@ import numpy as np
 
 from common.clock import MonotonicClock
 from feelahead.both_sides.processes import SideFailedError, SideProcess
+from feelahead.both_sides.real_time import LINK_S
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.experiments.soak.light_observers import PERIOD_S, LightObservers
 from feelahead.experiments.soak.sampling import Sample, sample
@@ -98,6 +99,7 @@ class SoakProcesses:
             side.interrupt()
         for side in reversed(self._sides.values()):
             side.stop()
+            side.check()
         robot, owner, *others = self._summaries()
         return merge_summaries(robot, owner, [error for other in others for error in other["errors"]])
 
@@ -113,8 +115,12 @@ class SoakProcesses:
         arguments = [f"--connect={control}", f"--view-connect={view}", "--device=simulated"]
         self._start(name, "operator_side.main", arguments, number)
         # Until the robot side has said where it stands.
-        while self._sides[name].wait_for("status", _START_S).get("owner") is None:
-            pass
+        status = self._sides[name].wait_for("status", _START_S)
+        end_s = self._clock.now() + LINK_S
+        while status.get("owner") is None:
+            if self._clock.now() > end_s:
+                raise SideFailedError(f"the {name} has no link after {LINK_S:g} s: {status['link']}")
+            status = self._sides[name].wait_for("status", LINK_S)
 
     def _start(self, name: str, module: str, arguments: Sequence[str], number: int = 0) -> None:
         own = [f"--seed={self._settings.seed + number}", f"--summary={self._summary(name)}"]
