@@ -35,7 +35,7 @@ def main() -> int:
     failed = 0
     try:
         with provided_engine(given.cache.absolute(), say) as engine:
-            settings = {"LINK": given.link, **_OPTIONS, **base_image(engine, say)}
+            settings = {"LINK": given.link, **_OPTIONS, **base_image(engine, say), "FEELAHEAD_IMAGES": engine.project}
             failed = _try_everything(engine, settings, given.only, say)
     except SkippedError as reason:
         print(f"skipped: {reason}")
