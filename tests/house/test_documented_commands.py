@@ -67,11 +67,11 @@ PLACEHOLDERS = {
     r"--(config|peer-header) \S+": "",  # files that must be there
 }
 
-TWO_MACHINES = (".ci/run", "make test-two-hosts")
+TWO_MACHINES = (".ci/run", "test-two-hosts\n")
 RUN = {
     r"git clone|cd |make test$": (".ci/run", "make test\n"),
     r"make quick": (".ci/run", "make test\n"),  # the same commands, and more tests
-    r"make test-kernel": (".ci/run", "make test-kernel"),
+    r"make test-kernel": (".ci/run", "test-kernel "),
     r"make test-containers": (".ci/run", "make test-containers"),
     r"make latency-experiment": ("tests/containers/checks.py", '"--compose"'),
     r"make soak": ("tests/feelahead/experiments/test_soak.py", '"--observers", "8"'),
