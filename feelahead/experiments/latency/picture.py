@@ -65,4 +65,6 @@ def _draw_speeds(panel: Any, rows: Sequence[Row], links: Sequence[str], names: S
             text = "" if label in labelled or row.figures.stops else label
             panel.plot(place, row.figures.contact_speed_mm_s or 0.0, mark, label=text, **shown)
             labelled.update({text} - {""})
-    panel.set(ylabel="mm/s", title="first contact (none: 0; x: robot side stopped)", ylim=(-5.0, None))
+    # The most, with room for its mark.
+    highest = 1.1 * max(panel.get_ylim()[1], 10.0)
+    panel.set(ylabel="mm/s", title="first contact (none: 0; x: robot side stopped)", ylim=(-5.0, highest))
