@@ -4,24 +4,27 @@ A payload is `[version, message]`. The version is read first, so that a peer of 
 from garbage.
 """
 
-from typing import Any
+from typing import Any, Final, cast
 
 import msgpack
 import msgspec
 
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.messages import AnyMessage, Message
+from common.protocol.view_messages import AnyViewMessage
 
-PROTOCOL_VERSION = 5
+PROTOCOL_VERSION = 6
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
-each trigger in place of stiffness and contact, and in each command who reckons with the delay."""
+each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what."""
 MAXIMUM_BYTES = 4096
 """The largest message is an eighth of this; a longer payload is not looked into."""
+VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
+"""The same for what people look at; common/sockets refuses more, too."""
 
 
 def encode(message: Message) -> bytes:
     """Pack one message."""
-    payload: bytes = msgpack.packb([PROTOCOL_VERSION, msgspec.to_builtins(message)])
+    payload: bytes = msgpack.packb([PROTOCOL_VERSION, msgspec.to_builtins(message, builtin_types=(bytes,))])
     return payload
 
 
@@ -30,8 +33,17 @@ def decode(payload: bytes) -> AnyMessage:
 
     OtherVersionError, a kind of it, for a peer of another version, whatever else the bytes hold.
     """
-    if len(payload) > MAXIMUM_BYTES:
-        raise RemoteProtocolError(f"a payload of {len(payload)} bytes; valid: up to {MAXIMUM_BYTES}")
+    return cast(AnyMessage, _decode(payload, AnyMessage, MAXIMUM_BYTES))
+
+
+def decode_view(payload: bytes) -> AnyViewMessage:
+    """As `decode`, for what people look at."""
+    return cast(AnyViewMessage, _decode(payload, AnyViewMessage, VIEW_MAXIMUM_BYTES))
+
+
+def _decode(payload: bytes, kinds: Any, limit_bytes: int) -> Any:
+    if len(payload) > limit_bytes:
+        raise RemoteProtocolError(f"a payload of {len(payload)} bytes; valid: up to {limit_bytes}")
     try:
         body: Any = msgpack.unpackb(payload)
     # msgpack raises ValueError and its subclasses for bad bytes, and TypeError or OverflowError for odd keys.
@@ -45,7 +57,6 @@ def decode(payload: bytes) -> AnyMessage:
     if version != PROTOCOL_VERSION:
         raise OtherVersionError(f"protocol version {version!s:.40}; valid: {PROTOCOL_VERSION}")
     try:
-        message: AnyMessage = msgspec.convert(content, AnyMessage)
+        return msgspec.convert(content, kinds)
     except msgspec.ValidationError as error:
         raise RemoteProtocolError(f"no valid message: {error}") from error
-    return message

@@ -1,8 +1,8 @@
 """Every message that crosses the link, frozen and validated when it is made and when it is decoded.
 
-    operator ── Hello, MotionCommand ──▶ robot              control, ROUTER/DEALER
+    operator ── Hello, MotionCommand, Watch ──▶ robot       control, ROUTER/DEALER
     robot ── Hello, LeaseNotice, StiffnessUpdate ──▶ operator   control
-    robot ── Telemetry ──▶ whoever looks                    view, PUB/SUB
+    robot ── Telemetry ──▶ whoever looks                    view, PUB/SUB; view_messages.py has the others
 
 A field out of range or not finite makes the whole message invalid: nothing of it is ever applied.
 """
@@ -128,6 +128,15 @@ class MotionCommand(Message, frozen=True, tag="motion"):
         _in_range("token", 0, _LARGEST, self.token)
 
 
+class Watch(Message, frozen=True, tag="watch"):
+    """What the sender looks at, repeated a few times a second: what nobody looks at is not rendered."""
+
+    overview: bool = False
+    first_person: bool = False
+    scene: bool = False
+    """SceneShapes and SceneState"""
+
+
 class LeaseNotice(Message, frozen=True, tag="lease"):
     """Where the receiver stands with the robot side; repeated, so that a lost one does no harm."""
 
@@ -233,4 +242,4 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
         _in_range("r2", 0.0, 1.0, self.r2)
 
 
-AnyMessage = Hello | MotionCommand | LeaseNotice | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | Watch | LeaseNotice | StiffnessUpdate | Telemetry

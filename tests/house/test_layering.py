@@ -23,6 +23,7 @@ ARROWS = """
     common/timing: common
     common/protocol: common common/timing
     common/realtime: common
+    common/companion:
     common/sockets: common common/files
     common/command: common common/emulation common/files
 

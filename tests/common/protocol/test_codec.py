@@ -18,6 +18,7 @@ from common.protocol.messages import (
     StiffnessUpdate,
     Telemetry,
     TriggerField,
+    Watch,
 )
 from common.protocol.session import SessionState
 from tests.helpers.felt import felt, field, ways
@@ -63,6 +64,7 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         run=st.booleans(),
         compensation=st.sampled_from(["operator", "robot"]),
     ),
+    st.builds(Watch, headers, overview=st.booleans(), first_person=st.booleans(), scene=st.booleans()),
     st.builds(
         LeaseNotice,
         headers,

@@ -1,0 +1,116 @@
+"""Messages between two processes of one machine, over a stream socket: neither ever waits for the other.
+
+A message is a few bytes of length and its bytes. What does not fit into the bounded queue is refused whole.
+"""
+
+import contextlib
+import socket
+import struct
+from collections import deque
+from typing import Final
+
+_LENGTH: Final = struct.Struct("<I")
+_AT_ONCE: Final = 1 << 18
+MESSAGE_LIMIT_BYTES: Final = 1 << 26
+"""A longer one means that what comes is not ours."""
+
+
+class Channel:
+    """One end. Whoever waits for it waits for `fileno` and, while `waiting`, until it can be written to."""
+
+    def __init__(self, part: socket.socket, room_bytes: int = 1 << 23) -> None:
+        """`room_bytes`: so much may wait here to be sent, beside what the system's own buffer takes."""
+        part.setblocking(False)
+        for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+            part.setsockopt(socket.SOL_SOCKET, option, _AT_ONCE)
+        self.refused = 0
+        """Messages that found no room."""
+        self.ended = False
+        """Whether the other end is gone: nothing is sent any more, and what has arrived is the last."""
+        self._part = part
+        self._room_bytes = room_bytes
+        self._waiting: deque[memoryview] = deque()
+        self._waiting_bytes = 0
+        self._begun = bytearray()
+
+    def fileno(self) -> int:
+        """To wait for it."""
+        return self._part.fileno()
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that have not left yet."""
+        return self._waiting_bytes
+
+    def send(self, *parts: bytes) -> bool:
+        """Send `parts` as one message, now or in a later call; False, and counted, when there is no room for it."""
+        self.flush()
+        length = sum(map(len, parts))
+        if length > MESSAGE_LIMIT_BYTES:
+            raise ValueError(f"a message of {length} bytes; valid: up to {MESSAGE_LIMIT_BYTES}")
+        if self.ended or (self._waiting and self._waiting_bytes + length > self._room_bytes):
+            self.refused += 1
+            return False
+        for part in (_LENGTH.pack(length), *parts):
+            if part:
+                self._waiting.append(memoryview(part))
+                self._waiting_bytes += len(part)
+        self.flush()
+        return True
+
+    def flush(self) -> None:
+        """Let leave what can leave now."""
+        waiting = self._waiting
+        while waiting and not self.ended:
+            try:
+                sent = self._part.sendmsg(list(waiting)[:16])
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:
+                self._end()
+                return
+            self._waiting_bytes -= sent
+            while sent:
+                first = waiting.popleft()
+                if len(first) > sent:
+                    waiting.appendleft(first[sent:])
+                    break
+                sent -= len(first)
+
+    def receive(self) -> list[bytes]:
+        """What has arrived whole, oldest first; at most one read of the system's buffer, so that none holds us."""
+        self.flush()
+        try:
+            arrived = self._part.recv(_AT_ONCE)
+        except (BlockingIOError, InterruptedError):
+            return []
+        except OSError:
+            arrived = b""
+        if not arrived:
+            self._end()
+            return []
+        self._begun += arrived
+        whole, start = [], 0
+        while len(self._begun) - start >= _LENGTH.size:
+            (length,) = _LENGTH.unpack_from(self._begun, start)
+            if length > MESSAGE_LIMIT_BYTES:
+                self._end()
+                break
+            end = start + _LENGTH.size + length
+            if len(self._begun) < end:
+                break
+            whole.append(bytes(self._begun[start + _LENGTH.size : end]))
+            start = end
+        del self._begun[:start]
+        return whole
+
+    def _end(self) -> None:
+        self.ended = True
+        self._waiting.clear()
+        self._waiting_bytes = 0
+
+    def close(self) -> None:
+        """End it; the other end notices."""
+        self._end()
+        with contextlib.suppress(OSError):
+            self._part.close()

@@ -1,0 +1,18 @@
+"""A companion that sends back what it is sent, until the other end is gone."""
+
+import select
+import sys
+
+from common.companion.process import companion_channel
+
+
+def main() -> None:
+    channel, _ = companion_channel(sys.argv[1:])
+    while not channel.ended:
+        select.select([channel], [channel] if channel.waiting else [], [])
+        for message in channel.receive():
+            channel.send(message)
+
+
+if __name__ == "__main__":
+    main()

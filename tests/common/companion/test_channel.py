@@ -1,0 +1,91 @@
+import socket
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.companion.channel import MESSAGE_LIMIT_BYTES, Channel
+
+
+def pair(room_bytes: int = 1 << 23) -> tuple[Channel, Channel]:
+    one, other = socket.socketpair()
+    return Channel(one, room_bytes), Channel(other, room_bytes)
+
+
+def everything(channel: Channel, sender: Channel) -> list[bytes]:
+    """What arrives until nothing waits any more."""
+    arrived: list[bytes] = []
+    while True:
+        more = channel.receive()
+        arrived += more
+        if not more and not sender.waiting:
+            return arrived + channel.receive()
+        sender.flush()
+
+
+@given(st.lists(st.binary(max_size=3000), max_size=30))
+def test_messages_arrive_whole_and_in_order(messages: list[bytes]) -> None:
+    one, other = pair()
+    assert all(one.send(message[:7], message[7:]) for message in messages)
+    assert everything(other, one) == messages
+    one.close()
+    other.close()
+
+
+def test_large_messages_leave_in_parts() -> None:
+    one, other = pair()
+    large = bytes(range(256)) * 20_000
+    assert one.send(large)
+    assert one.waiting > 0
+    assert everything(other, one) == [large]
+    one.close()
+    other.close()
+
+
+def test_what_finds_no_room_is_refused_whole_and_counted() -> None:
+    one, other = pair(room_bytes=1_000_000)
+    sent = [one.send(bytes([number]) * 300_000) for number in range(20)]
+    assert not all(sent)
+    assert one.refused == sent.count(False)
+    assert [message[0] for message in everything(other, one)] == [n for n, left in enumerate(sent) if left]
+    one.close()
+    other.close()
+
+
+def test_one_message_may_be_larger_than_the_room() -> None:
+    one, other = pair(room_bytes=10)
+    assert one.send(bytes(1_000_000))
+    assert not one.send(b"next")
+    assert len(everything(other, one)) == 1
+    one.close()
+    other.close()
+
+
+def test_the_end_of_one_is_noticed_by_the_other() -> None:
+    one, other = pair()
+    assert one.send(b"last")
+    one.close()
+    assert other.receive() == [b"last"]
+    assert other.receive() == []
+    assert other.ended
+    assert not other.send(b"into the void")
+    assert not one.send(b"from beyond")
+    other.close()
+
+
+def test_a_length_beyond_reason_ends_it() -> None:
+    one, other = socket.socketpair()
+    channel = Channel(other)
+    one.sendall((MESSAGE_LIMIT_BYTES + 1).to_bytes(4, "little"))
+    assert channel.receive() == []
+    assert channel.ended
+    one.close()
+    channel.close()
+
+
+def test_more_than_anybody_would_take_is_an_error() -> None:
+    one, other = pair()
+    with pytest.raises(ValueError, match="valid: up to"):
+        one.send(bytes(MESSAGE_LIMIT_BYTES + 1))
+    one.close()
+    other.close()
