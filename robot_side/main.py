@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from common.clock import MonotonicClock, clock_domain
+from common.clock import MonotonicClock, ThreadClock, clock_domain
 from common.command.command_line import parse_settings, run_command
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
@@ -109,8 +109,10 @@ class _Loop:
         self._sockets = sockets
         self._status = status
         self._clock = MonotonicClock()
+        self._computed = ThreadClock()
         self._admission = Admission()
         self._tick_time = RunningStatistics(settings.seed)
+        self._tick_cpu_time = RunningStatistics(settings.seed)
         self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
         self._lines: dict[Stream, DelayLine[Outgoing]] = {
             stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
@@ -149,6 +151,7 @@ class _Loop:
         return {
             "duration_s": self._clock.now() - self._start_s,
             "tick_us": tick_microseconds(self._tick_time),
+            "tick_cpu_us": tick_microseconds(self._tick_cpu_time),
             **paced,
             "link": link_summary("to_operator", self._lines),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
@@ -165,8 +168,9 @@ class _Loop:
     def _tick(self, now_s: float) -> None:
         self._pacer.begin(now_s)
         self._admission.begin_tick()
-        began_s = self._clock.now()
+        began_s, computed_s = self._clock.now(), self._computed.now()
         outgoing = self._core.tick(now_s)
+        self._tick_cpu_time.add(self._computed.now() - computed_s)
         took_s = self._clock.now() - began_s
         self._tick_time.add(took_s)
         self._latest_tick_times_s.append(took_s)
