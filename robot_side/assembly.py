@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -54,6 +55,17 @@ class SimulationObserver:
             figures.first_contact(onset.thing, onset.closing_speed_m_s, since_start_s)
 
 
+@dataclass(frozen=True)
+class Assembled:
+    """A core, and what stands around it that others look at, too."""
+
+    core: RobotSide
+    scene: Scene
+    kinematics: MujocoKinematics
+    law: SweptLaw | PaperLaw
+    """The settings' own"""
+
+
 def build_robot_side(
     settings: RobotSettings,
     epoch: int,
@@ -63,6 +75,19 @@ def build_robot_side(
     other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> RobotSide:
+    """As `assemble`: the core alone."""
+    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce).core
+
+
+def assemble(
+    settings: RobotSettings,
+    epoch: int,
+    clock_domain: str,
+    watch: Callable[[Arm], Arm] | None = None,
+    scene: Scene | None = None,
+    other_law: Callable[[Law], Law] | None = None,
+    announce: Callable[[str], None] | None = None,
+) -> Assembled:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
@@ -93,13 +118,13 @@ def build_robot_side(
     held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed, searching)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
-    law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(
+    law = (SweptLaw if settings.law == "swept" else PaperLaw)(
         settings.uncertainty(prediction),
         np.full(arm.joint_count, encoder.standard_deviation_rad()),
         joint_limits,
         settings.motion,
     )
-    return RobotSide(
+    core = RobotSide(
         arm if watch is None else watch(arm),
         kinematics,
         camera,
@@ -118,6 +143,7 @@ def build_robot_side(
         notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
         held_covers=held_covers,
     )
+    return Assembled(core, scene, kinematics, law)
 
 
 def _notes(scene: Scene) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import msgpack
 import msgspec
 
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.protocol.messages import AnyMessage, Message
+from common.protocol.messages import AnyMessage, Header, Message
 from common.protocol.view_messages import AnyViewMessage
 
 PROTOCOL_VERSION = 6
@@ -26,6 +26,23 @@ def encode(message: Message) -> bytes:
     """Pack one message."""
     payload: bytes = msgpack.packb([PROTOCOL_VERSION, msgspec.to_builtins(message, builtin_types=(bytes,))])
     return payload
+
+
+class Prepared:
+    """A message packed once, to be sent again and again under other headers."""
+
+    def __init__(self, message: Message) -> None:
+        names = message.__struct_fields__
+        tag = cast(str, message.__struct_config__.tag)
+        # An array of few elements is one byte and these.
+        self._before: bytes = (
+            b"\x92" + msgpack.packb(PROTOCOL_VERSION) + bytes([0x91 + len(names)]) + msgpack.packb(tag)
+        )
+        self._after = b"".join(msgspec.msgpack.encode(getattr(message, name)) for name in names[1:])
+
+    def under(self, header: Header) -> bytes:
+        """Pack it under `header`."""
+        return b"".join((self._before, msgspec.msgpack.encode(header), self._after))
 
 
 def decode(payload: bytes) -> AnyMessage:

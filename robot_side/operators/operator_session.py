@@ -8,13 +8,14 @@ from typing import Any
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Header, Hello, MotionCommand
+from common.protocol.messages import Header, Hello, MotionCommand, Watch
 from common.protocol.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
 from robot_side.operators.lease import MOST_OBSERVERS, Lease
 from robot_side.operators.participant import Participant
 from robot_side.operators.safety import Permission, Safety
+from robot_side.operators.watchers import Watchers
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class OperatorSession:
         self.applied_age = RunningStatistics(seed)
         """Age in seconds of the command that moves the arm, in every tick in which one does."""
         self.leases_granted = 0
+        self.watchers = Watchers()
+        """Who looks at what"""
         self._new_link = new_link
         self._announcements = Announcements(new_link, self.lease)
         self._owner_link = new_link()
@@ -86,7 +89,10 @@ class OperatorSession:
         except RemoteProtocolError:
             self.rejected += 1
             return
-        if not isinstance(message, Hello | MotionCommand) or (isinstance(message, Hello) and message.side == "robot"):
+        if isinstance(message, Hello) and message.side == "robot":
+            self.rejected += 1
+            return
+        if not isinstance(message, Hello | MotionCommand | Watch):
             self.rejected += 1
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
@@ -105,6 +111,9 @@ class OperatorSession:
             if participant is self.lease.owner and self.safety.state == "armed" and arrival.one_way_s is not None:
                 self.driving_delay.add(arrival.one_way_s)
             self._judge(participant, message, arrival, now_s)
+        elif isinstance(message, Watch):
+            if arrival.fresh:
+                self.watchers.heard(participant.epoch, message, now_s)
         elif arrival.fresh:
             self._announcements.answer(participant, now_s)
 
@@ -166,7 +175,7 @@ class OperatorSession:
             "discarded_by_age": self.safety.discarded_by_age,
         }
 
-    def _admit(self, peer: bytes, message: Hello | MotionCommand, now_s: float) -> Participant | None:
+    def _admit(self, peer: bytes, message: Hello | MotionCommand | Watch, now_s: float) -> Participant | None:
         """Make room for a new epoch, which only a Hello can begin; None for whoever is turned away."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):

@@ -50,9 +50,10 @@ ARROWS = """
         robot_side/overlap/meshes
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
+    robot_side/cameras: common common/companion common/protocol robot_side/simulation
     robot_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper
-        robot_side/objects robot_side/operators robot_side/simulation
+        common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled robot_side/enlargement
+        robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -88,7 +89,7 @@ LIBRARIES = {
     "zmq": ("common/sockets", "feelahead/benchmarks/link/peers.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
-    "mujoco": ("robot_side/simulation", "feelahead/benchmarks/overlap/distances.py"),
+    "mujoco": ("robot_side/simulation", "robot_side/cameras", "feelahead/benchmarks/overlap/distances.py"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
     "time": (
@@ -102,6 +103,7 @@ LIBRARIES = {
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
         "robot_side/main.py",
+        "robot_side/cameras",
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
         "feelahead/approaches/progress.py",
