@@ -30,7 +30,7 @@ _TYPES: Final[Mapping[str, str]] = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
 }
-_HIDES_PANEL: Final = b"<style>.mantine-Paper-root, .mantine-ActionIcon-root { display: none !important }</style>"
+_HIDES_PANEL: Final = b"<style>.mantine-Paper-root, .mantine-Notification-root { display: none !important }</style>"
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 ProcessRequest = Callable[[ServerConnection, Request], Response | None]

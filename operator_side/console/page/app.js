@@ -24,6 +24,9 @@ let heardMs = performance.now();
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
+let drawn = true;
+const frame = document.querySelector("#scene iframe");
+const slow = drawsSlowly();
 let run = { title: "", live: true, tunable: [] };
 
 const send = (object) => {
@@ -40,6 +43,7 @@ function connect() {
     if (typeof data === "string") receive(JSON.parse(data));
     else views[new DataView(data).getUint8(0)]?.receive(data);
   };
+  socket.onopen = () => send({ slow });
   socket.onclose = ({ reason }) => {
     closedBecause = reason || "its process has ended, or this page may not see it";
     setTimeout(connect, RETRY_MS);
@@ -47,7 +51,8 @@ function connect() {
 }
 
 function receive(message) {
-  if (message.kind === "facts") showFacts(message);
+  if (message.kind === "end") send({ taken: true });
+  else if (message.kind === "facts") showFacts(message);
   else if (message.kind === "scene") showScene(message);
   else if (message.kind === "note") showNote(message.text);
   else if (message.kind === "run") {
@@ -102,10 +107,32 @@ function stateOf(view, status) {
   return status.state === "disarmed" ? "disarmed" : "starting";
 }
 
+byId("drawn").onclick = ({ currentTarget }) => {
+  drawn = !drawn;
+  currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
+  currentTarget.setAttribute("aria-pressed", drawn);
+  frame.hidden = !drawn;
+  if (!drawn) frame.removeAttribute("src");
+};
+
+// Without a graphics processor the drawing takes processor time from everything else: it is then drawn less often.
+function drawsSlowly() {
+  const context = document.createElement("canvas").getContext("webgl");
+  const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
+  return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
+}
+
+// Under our other name the scene is another site, with a process of its own: drawing it slows nothing here.
+function sceneAddress() {
+  const address = new URL("scene/", location.href);
+  address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
+  if (matchMedia("(prefers-color-scheme: dark)").matches) address.search = "darkMode";
+  return address.href;
+}
+
 function showScene(scene) {
-  const frame = document.querySelector("#scene iframe");
   // Only now does viser know where to look at the scene from.
-  if (!frame.src) frame.src = `scene/${matchMedia("(prefers-color-scheme: dark)").matches ? "?darkMode" : ""}`;
+  if (drawn && !frame.src) frame.src = sceneAddress();
   charts.overlap.add(scene.overlap_mm3);
   charts.tick.add(scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
