@@ -112,7 +112,7 @@ class Server:
             headers = Headers(Host=request.headers["Host"])  # without gzip
             response = visers(connection, Request(place.removeprefix(SCENE), headers))
             if response is not None and response.status_code == HTTPStatus.OK:
-                body = response.body.replace(b"</head>", _HIDES_PANEL + b"</head>", 1)
+                body = bytes(response.body).replace(b"</head>", _HIDES_PANEL + b"</head>", 1)
                 return self._file(place, response.headers["Content-Type"], body)
         elif place in self._files:
             return self._file(place, *self._files[place])

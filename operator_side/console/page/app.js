@@ -14,7 +14,7 @@ const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
-  delay: new Chart(byId("delay_chart"), "delay", "ms", [["to the operator", "--l2"], ["to the robot", "--r2", [5, 3]]]),
+  delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
   overlap: new Chart(byId("overlap_chart"), "overlap", "mm³", [["L2", "--l2"], ["R2", "--r2", [5, 3]]]),
   stiffness: new Chart(byId("stiffness_chart"), "stiffness", "", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 1),
   tick: new Chart(byId("tick_chart"), "robot tick", "µs", [["p50", "--l2"], ["p99", "--r2", [5, 3]]]),
@@ -93,8 +93,8 @@ function showFacts(message) {
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
   charts.delay.add([facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
-  charts.delay.said = [facts.to_robot.asked && `asked to the robot: ${facts.to_robot.asked}`,
-    facts.to_operator.asked && `asked to the operator: ${facts.to_operator.asked}`].filter(Boolean).join("; ");
+  const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
+  charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
   charts.stiffness.add([facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
 }
