@@ -85,10 +85,11 @@ class Status:
         elif (told := self._story.tell(now_s, view)) is not None:
             self._output.write(f"{told}\n")
 
-    def event(self, kind: str, **values: Value) -> None:
-        """One line of JSON, in the JSON mode only, at once."""
+    def event(self, kind: str, **values: Value) -> bool:
+        """One line of JSON, at once; False outside the JSON mode, where it says nothing."""
         if self._mode == "json":
             self._output.write(json.dumps({"event": kind, **values}) + "\n")
+        return self._mode == "json"
 
     def note(self, text: str) -> None:
         """A line that stays, for people; an event of its own in the JSON mode."""

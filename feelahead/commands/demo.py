@@ -23,6 +23,7 @@ from common.files.output_file import write_json
 from common.protocol.messages import Compensation
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.commands.open_browser import show_address
 
 _START_TIMEOUT_S = 600.0
 """The first start compiles the overlap kernels, which a busy machine takes minutes for."""
@@ -71,7 +72,7 @@ class DemoSettings(RunOptions):
     realtime: bool = False
     """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
-    """The browser console. It is not there yet: the status line is all there is to see."""
+    """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """More settings for the robot side: see feelahead-robot --help."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -171,6 +172,7 @@ def _operator_arguments(
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
+    arguments.append("--console" if settings.console else "--no-console")
     if "compensation" in given:
         arguments.append(f"--compensation={settings.compensation}")
     if "haptics" in given:
@@ -228,6 +230,8 @@ def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: S
     for event in side.events():
         if event["event"] == "status":
             said[side.name] = {name: value for name, value in event.items() if name != "event"}
+        elif event["event"] == "console":
+            show_address(str(event["address"]), status)
         else:
             _show_note(side, event, status)
 
