@@ -19,6 +19,7 @@ from common.command.patient_output import PatientOutput
 StatusMode = Literal["line", "json", "facts", "none"]
 
 _PERIOD_S = 0.2
+_FACTS_PERIOD_S = 0.1
 _LINES_OF_JSON = ("json", "facts")
 
 
@@ -76,10 +77,10 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, at most five times a second; BrokenPipeError, once, when the reader has gone."""
+        """Show the values, five times a second at most, or ten with facts; BrokenPipeError, once, when the reader has gone."""
         if not self.due(now_s):
             return
-        self._next_s = now_s + _PERIOD_S
+        self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
         if self._mode in _LINES_OF_JSON:
             self.event("status", **values)
             return
