@@ -10,6 +10,7 @@ from common.errors import ConfigurationError
 _ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l"
 """The other screen, without a cursor, and without going on in the next line."""
 _LEAVE: Final = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
+_INPUT: Final = 0
 _LOCAL: Final = 3
 _CONTROL_LETTERS: Final = 6
 _NO_LETTER: Final = b"\x00"
@@ -32,11 +33,15 @@ def attributes_of(descriptor: int) -> Attributes | None:
 
 
 def enter(descriptor: int) -> None:
-    """Take the other screen. What is typed is not shown; Ctrl-C works as before, Ctrl-Z would leave an arm alone."""
+    """Take the other screen. What is typed is not shown, and only Ctrl-C does what it did.
+
+    Ctrl-Z would leave an arm to itself, and Ctrl-S an old screen that looks like a new one.
+    """
     if (attributes := attributes_of(descriptor)) is not None:
         letters = list(attributes[_CONTROL_LETTERS])
         letters[termios.VSUSP] = _NO_LETTER
         attributes[_CONTROL_LETTERS] = letters
+        attributes[_INPUT] &= ~termios.IXON
         attributes[_LOCAL] &= ~termios.ECHO
         termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
     os.write(descriptor, _ENTER.encode())
