@@ -23,6 +23,7 @@ from common.realtime.priority import make_realtime, raise_priority
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.calibration.store import calibration_path, load_calibration
+from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
@@ -32,9 +33,12 @@ from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.facts_of_core import Surroundings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import Whoever, whoever
+from operator_side.terminal_view.status import TerminalStatus
+from operator_side.viewing import Viewing, view_topics
 
 MOTION_PERIOD_S = 1 / 250
 _GUARD_PERIOD_S = 0.5
@@ -68,9 +72,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(settings.connect, settings.view_connect, keys=keys) as sockets,
+        OperatorSockets(settings.connect, settings.view_connect, topics=view_topics(settings), keys=keys) as sockets,
         StopSignal() as stop,
-        Status(settings.status, "operator") as status,
+        TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
@@ -89,11 +93,21 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
+            surroundings = Surroundings(
+                hands="controller" if person is None else "person",
+                asked_to_robot=line.profile.words(),
+                swap_sides=settings.swap_sides,
+            )
+            # Before our own priority is raised, which it would inherit.
+            console = Console(settings.connect, port=settings.console_port) if settings.console else None
+            viewing = Viewing(core, surroundings, status, console and stack.enter_context(console))
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
-            loop = _Loop(settings, core, line, sockets, connection, guard, person, status, stored_travel=not given)
+            loop = _Loop(
+                settings, core, line, sockets, connection, guard, person, viewing, status, stored_travel=not given
+            )
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -132,6 +146,7 @@ class _Loop:
         connection: Connection,
         guard: ReleaseGuard | None,
         person: Whoever | None,
+        viewing: Viewing,
         status: Status,
         *,
         stored_travel: bool,
@@ -148,6 +163,7 @@ class _Loop:
         self._guard = guard
         self._guard_s = 0.0
         self._person = person
+        self._viewing = viewing
         self._status = status
         self._clock = MonotonicClock()
         self._collection = IdleCollection(self._clock)
@@ -167,8 +183,9 @@ class _Loop:
                     break
                 for payload in received:
                     self._core.receive(payload, now_s)
-                for _, payload in seen:
-                    self._core.receive_view(payload, now_s)
+                for topic, payload in seen:
+                    if not self._viewing.take(topic, payload):
+                        self._core.receive_view(payload, now_s)
                 self._connection.beat(now_s)
                 if (output := self._core.output_report(now_s)) is not None:
                     self._connection.write(output, now_s)
@@ -197,7 +214,7 @@ class _Loop:
         self._calibrate()
         if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
-        for payload in self._core.motion(now_s):
+        for payload in [*self._core.motion(now_s), *self._viewing.requests(now_s)]:
             self._line.push(now_s, payload)
 
     def _calibrate(self) -> None:
@@ -241,19 +258,27 @@ class _Loop:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
                 self._status.note(text)
-        if self._status.due(now_s):
-            values: dict[str, Value] = dict(self._core.status(now_s))
-            if self._sockets.trouble is not None and values.get("link") != "up":
-                values["link"] = self._sockets.trouble
-            values["controller"] = self._connection.state
-            controller = self._connection.controller
-            values["triggers_released"] = None if controller is None else controller.device.released
-            if self._person is not None:
-                values["person"] = self._person.doing
-            values["motion_overruns"] = self._pacer.overruns
-            self._status.show(now_s, values)
+        shows, tells = self._viewing.facts_due(now_s), self._status.due(now_s)
+        values = self._values(now_s) if shows or tells else {}
+        if shows:
+            self._viewing.show(values, now_s)
+        if tells:
+            self._viewing.tell(values, now_s)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
+
+    def _values(self, now_s: float) -> dict[str, Value]:
+        """What a person is shown."""
+        values: dict[str, Value] = dict(self._core.status(now_s))
+        if self._sockets.trouble is not None and values.get("link") != "up":
+            values["link"] = self._sockets.trouble
+        values["controller"] = self._connection.state
+        controller = self._connection.controller
+        values["triggers_released"] = None if controller is None else controller.device.released
+        if self._person is not None:
+            values["person"] = self._person.doing
+        values["motion_overruns"] = self._pacer.overruns
+        return values
 
 
 if __name__ == "__main__":

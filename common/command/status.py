@@ -77,7 +77,7 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, five times a second at most, or ten with facts; BrokenPipeError, once, when the reader has gone."""
+        """Show the values, five times a second at most, ten with facts; BrokenPipeError, once, when the reader has gone."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
@@ -98,10 +98,11 @@ class Status:
         if self._mode == "facts":
             self._output.write(msgspec.json.encode({"event": "facts", "facts": facts}).decode() + "\n")
 
-    def event(self, kind: str, **values: Value) -> None:
-        """One line of JSON, in the modes for programs only, at once."""
+    def event(self, kind: str, **values: Value) -> bool:
+        """One line of JSON, at once; False outside the modes for programs, where it says nothing."""
         if self._mode in _LINES_OF_JSON:
             self._output.write(json.dumps({"event": kind, **values}) + "\n")
+        return self._mode in _LINES_OF_JSON
 
     def note(self, text: str) -> None:
         """A line that stays, for people; an event of its own in the modes for programs."""

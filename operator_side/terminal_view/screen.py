@@ -1,6 +1,7 @@
 """A whole screen of one moment, for any size: what matters most stays, and what is large grows with the room."""
 
 from collections import deque
+from textwrap import wrap
 from typing import Final, NamedTuple
 
 from common.command.live_view import LiveView, live_view
@@ -58,12 +59,16 @@ def _shown(moment: Moment, signs: Signs, width: int, rows: int, notes: int) -> l
         )
         lines += beside(left, right, width, signs.cut)
         lines += _ahead(facts, view, signs)
-    columns = max(1, width - _CURVE_LABEL - _CURVE_FIGURES)
-    for rank, curve in enumerate(moment.history.curves(columns)):
-        lines += _curve(curve, signs, rows, 2 + rank)
+        columns = max(1, width - _CURVE_LABEL - _CURVE_FIGURES)
+        for rank, curve in enumerate(moment.history.curves(columns)):
+            lines += _curve(curve, signs, rows, 2 + rank)
+    else:
+        notes = _USUAL_HEIGHT
     lines.append(Ranked(5, line((_rule("notes", signs, width), Look.FAINT))))
-    newest = list(moment.notes)[-max(1, notes) :]
-    # The newest are worth most; those for which there is no line yet leave it free.
+    newest = [part for text in list(moment.notes)[-notes:] for part in wrap(text, width, subsequent_indent="  ")][
+        -notes:
+    ]
+    # The newest are worth most.
     lines += [Ranked(min(6, len(newest) - place), line(signs.words(text))) for place, text in enumerate(newest)]
     return lines
 

@@ -5,11 +5,11 @@ import pytest
 
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.history import SPAN_S, History
-from tests.helpers.made_up_facts import facts_of
+from tests.helpers.made_up_facts import PULLED, facts_of
 
 
 def at(now_s: float, newest_ms: float | None = None, **status: float) -> OperatorFacts:
-    facts = facts_of(now_s, **status)
+    facts = facts_of(now_s, PULLED, **status)
     return msgspec.structs.replace(facts, to_operator=msgspec.structs.replace(facts.to_operator, newest_ms=newest_ms))
 
 

@@ -13,7 +13,7 @@ from operator_side.terminal_view.history import History
 from operator_side.terminal_view.lines import Line, Look
 from operator_side.terminal_view.screen import SILENT_AFTER_S, Moment, screen
 from operator_side.terminal_view.signs import ASCII, BLOCKS, Signs, signs_for
-from tests.helpers.made_up_facts import STATUS, facts_in_motion, facts_of
+from tests.helpers.made_up_facts import PULLED, STATUS, facts_in_motion, facts_of
 
 floats = st.floats() | st.floats(-10.0, 10.0)
 unknown = st.none() | floats
@@ -73,7 +73,7 @@ def plain(line: Line) -> str:
     return "".join(text for text, _ in line)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.lists(any_facts, min_size=1, max_size=4),
     st.integers(60, 200),
@@ -145,7 +145,7 @@ STATES: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("signs", [BLOCKS, ASCII])
 @pytest.mark.parametrize(("banner", "status"), STATES.items())
 def test_each_state_has_words_and_signs_of_its_own(banner: str, status: dict[str, Value], signs: Signs) -> None:
-    shown = drawn(facts_of(**status), signs=signs)[0]
+    shown = drawn(facts_of(1.0, PULLED, **status), signs=signs)[0]
     assert shown.startswith(banner)
     # An alarm is told from all else by its line's end alone.
     assert (shown[-1] == "!") == banner.startswith("!")
