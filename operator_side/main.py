@@ -37,6 +37,7 @@ from operator_side.facts_of_core import Surroundings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import Whoever, whoever
+from operator_side.terminal_view.status import TerminalStatus
 from operator_side.viewing import Viewing, view_topics
 
 MOTION_PERIOD_S = 1 / 250
@@ -71,11 +72,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(
-            settings.connect, settings.view_connect, topics=view_topics(watches=settings.console), keys=keys
-        ) as sockets,
+        OperatorSockets(settings.connect, settings.view_connect, topics=view_topics(settings), keys=keys) as sockets,
         StopSignal() as stop,
-        Status(settings.status, "operator") as status,
+        TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
@@ -264,7 +263,7 @@ class _Loop:
         if shows:
             self._viewing.show(values, now_s)
         if tells:
-            self._status.show(now_s, values)
+            self._viewing.tell(values, now_s)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 

@@ -53,6 +53,8 @@ class OperatorSettings(RunOptions):
     """The browser console on this machine, at an address that is shown: both views, the scene, what is felt and why."""
     console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
     """Where it listens, on 127.0.0.1 alone; 0 for any port that is free."""
+    tui: bool = False
+    """The same on the whole terminal instead of a line, for machines without a browser; pictures aside."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
 
@@ -60,7 +62,14 @@ class OperatorSettings(RunOptions):
         super().__post_init__()
         if not 0 <= self.console_port <= _LAST_PORT:
             raise ValueError(f"--console-port {self.console_port}: valid: 0 to {_LAST_PORT}")
+        if self.tui and self.status != "line":
+            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
         if self.swap_sides and self.person.pull_n is not None:
             raise ValueError("--swap-sides with --person.pull-n: valid: one of them, as the finger pulls R2 to advance")
+
+    @property
+    def tells_facts(self) -> bool:
+        """Whether all that the console shows goes to the terminal, or to a program."""
+        return self.tui or self.status == "facts"

@@ -13,14 +13,17 @@ from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.facts import FACTS_PERIOD_S
 from operator_side.facts_of_core import Surroundings, operator_facts
+from operator_side.scene_figures import SceneFigures
+from operator_side.settings import OperatorSettings
 
 _WATCH_PERIOD_S: Final = 0.25
 _TELEMETRY_TOPIC: Final = b"telemetry"
 
 
-def view_topics(*, watches: bool) -> tuple[bytes, ...]:
+def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
     """What to subscribe to: pictures only where they could be shown."""
-    return (_TELEMETRY_TOPIC, VIDEO_TOPIC, SCENE_TOPIC) if watches else (_TELEMETRY_TOPIC,)
+    scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
+    return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
 
 
 class Viewing:
@@ -31,6 +34,7 @@ class Viewing:
         self._core = core
         self._surroundings = surroundings
         self._status = status
+        self._figures = SceneFigures()
         self._told: str | None = None
         self._watch_s = self._facts_s = -math.inf
 
@@ -38,19 +42,21 @@ class Viewing:
         """Whether a view payload is for who looks, and not for the core."""
         if topic not in (VIDEO_TOPIC, SCENE_TOPIC):
             return False
+        if topic == SCENE_TOPIC and self._status.wants_facts:
+            self._figures.take(payload)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
         return True
 
     def requests(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: what is looked at, while anything is."""
-        if self.console is None:
-            return []
-        self.console.receive()
-        if self.console.pages == 0 or now_s - self._watch_s < _WATCH_PERIOD_S:
+        if self.console is not None:
+            self.console.receive()
+        pages = self.console is not None and self.console.pages > 0
+        if not (pages or self._status.wants_facts) or now_s - self._watch_s < _WATCH_PERIOD_S:
             return []
         self._watch_s = now_s
-        watch = Watch(self._core.link.stamp(now_s), overview=True, first_person=True, scene=True)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True)
         return [encode(watch)]
 
     def facts_due(self, now_s: float) -> bool:
@@ -70,3 +76,10 @@ class Viewing:
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
         if self.console is not None:
             self.console.facts(operator_facts(self._core, status, self._surroundings, now_s))
+
+    def tell(self, status: Mapping[str, Value], now_s: float) -> None:
+        """Tell the status of `now_s`, and the facts where somebody wants them."""
+        self._status.show(now_s, status)
+        if self._status.wants_facts:
+            known = {**status, **self._figures.figures()}
+            self._status.show_facts(operator_facts(self._core, known, self._surroundings, now_s))

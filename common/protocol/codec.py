@@ -58,6 +58,12 @@ def decode_view(payload: bytes) -> AnyViewMessage:
     return cast(AnyViewMessage, _decode(payload, AnyViewMessage, VIEW_MAXIMUM_BYTES))
 
 
+def claims_to_be(tag: str, payload: bytes) -> bool:
+    """Whether `payload` says that it holds a message of this tag; told without unpacking it, so it may still be bad."""
+    # Behind a list's first byte, the version, and the first bytes of another list and of the tag.
+    return tag.encode() in payload[: 8 + len(tag)]
+
+
 def _decode(payload: bytes, kinds: Any, limit_bytes: int) -> Any:
     if len(payload) > limit_bytes:
         raise RemoteProtocolError(f"a payload of {len(payload)} bytes; valid: up to {limit_bytes}")

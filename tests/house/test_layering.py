@@ -66,9 +66,12 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
+    operator_side/facts.py: common/command
+    operator_side/terminal_view: common common/command common/companion operator_side operator_side/dualsense/reports
     operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
         operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
+        operator_side/terminal_view
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
@@ -106,6 +109,7 @@ LIBRARIES = {
         "robot_side/cameras",
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
+        "operator_side/terminal_view",
         "feelahead/approaches/progress.py",
         "feelahead/both_sides",
         "feelahead/commands",
