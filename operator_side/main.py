@@ -15,6 +15,7 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
+from common.emulation.tuned import tuned_link
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
@@ -32,9 +33,11 @@ from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.following_pages import follow_pages, shared_hands
 from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.whoever import Whoever, whoever
 
 MOTION_PERIOD_S = 1 / 250
 _GUARD_PERIOD_S = 0.5
@@ -74,14 +77,13 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
-        person: Whoever | None = None
+        person: SharedHands | None = None
         with ExitStack() as stack:
             guard: ReleaseGuard | None = None
-            if settings.device == "simulated":
+            pages = DrivingPage(may_drive=settings.device != "hid")
+            if settings.device != "hid":
                 simulated = SimulatedDualSense()
-                person = whoever(
-                    simulated, settings.person, settings.seed, settings.calibration, swap_sides=settings.swap_sides
-                )
+                person = shared_hands(simulated, pages, settings)
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
                 loaded = load_backend() if backend is None else backend
@@ -93,7 +95,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
-            loop = _Loop(settings, core, line, sockets, connection, guard, person, status, stored_travel=not given)
+            loop = _Loop(
+                settings, core, line, sockets, connection, guard, person, pages, status, stored_travel=not given
+            )
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -131,7 +135,8 @@ class _Loop:
         sockets: OperatorSockets,
         connection: Connection,
         guard: ReleaseGuard | None,
-        person: Whoever | None,
+        person: SharedHands | None,
+        pages: DrivingPage,
         status: Status,
         *,
         stored_travel: bool,
@@ -148,6 +153,8 @@ class _Loop:
         self._guard = guard
         self._guard_s = 0.0
         self._person = person
+        self._pages = pages
+        self._link = settings.link_spec()
         self._status = status
         self._clock = MonotonicClock()
         self._collection = IdleCollection(self._clock)
@@ -191,6 +198,10 @@ class _Loop:
 
     def _move(self, now_s: float) -> None:
         self._pacer.begin(now_s)
+        follow_pages(self._pages, self._core, now_s)
+        if (words := self._core.tuner.take_link()) is not None:
+            self._link = tuned_link(self._link, words)
+            self._line.change(self._link.profile("to_robot"))
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
         self._connection.update(now_s)

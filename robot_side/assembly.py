@@ -20,6 +20,7 @@ from robot_side.gripper.held_covers import HeldCovers
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
+from robot_side.operators.tuning import Tuning
 from robot_side.settings import RobotSettings
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
@@ -93,7 +94,7 @@ def build_robot_side(
     held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed, searching)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
-    law: Law = (SweptLaw if settings.law == "swept" else PaperLaw)(
+    law = (SweptLaw if settings.law == "swept" else PaperLaw)(
         settings.uncertainty(prediction),
         np.full(arm.joint_count, encoder.standard_deviation_rad()),
         joint_limits,
@@ -108,6 +109,7 @@ def build_robot_side(
             lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
             Safety(settings.safety),
             settings.seed,
+            Tuning(settings.probability, law.expect if settings.permit_tuning else None),
         ),
         LoopAge(settings.assumed_delay_s),
         joint_limits,

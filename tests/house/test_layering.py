@@ -37,7 +37,7 @@ ARROWS = """
         robot_side/overlap/closed_forms
     robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
         robot_side/overlap/lanes robot_side/overlap/precise robot_side/overlap/meshes
-    robot_side/operators: common common/protocol
+    robot_side/operators: common common/emulation common/protocol
     robot_side/arm: common common/protocol robot_side/compiled
     robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/objects: common robot_side/compiled robot_side/overlap/meshes
@@ -65,9 +65,12 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
+    operator_side/page_hands: common common/protocol operator_side/dualsense/simulated operator_side/hands
+        operator_side/simulated_person
     operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
         operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
+        operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/page_hands
+        operator_side/simulated_person
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*

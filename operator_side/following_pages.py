@@ -1,0 +1,42 @@
+"""What pages of the console ask for, handed on: hands to a controller, stops and wishes to the core."""
+
+import functools
+
+from operator_side.core import OperatorSide
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.facts import HandsFacts
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
+from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.whoever import whoever
+
+
+def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: OperatorSettings) -> SharedHands:
+    """Whoever is to have the simulated controller: a page, and before it the scripted person where there is one."""
+    calibration, swap_sides = settings.calibration, settings.swap_sides
+    person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
+    alone = settings.device == "browser"
+    return SharedHands(device, pages, None if alone else person, calibration, swap_sides=swap_sides)
+
+
+def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
+    """In every turn: a stop on a page counts like the controller's, and what a page wants tuned is asked for."""
+    if pages.stopping(now_s):
+        core.stop_button.press(now_s)
+    if (wish := pages.take_wish()) is not None:
+        core.tune(wish.probability, wish.link, now_s)
+
+
+def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
+    """What pages have to know; `shared` None for a real controller."""
+    rest_s = pages.rest_s(now_s)
+    return HandsFacts(
+        may_drive=pages.may_drive,
+        driver=pages.driver,
+        readiness=str(pages.readiness),
+        rest_s=rest_s,
+        person=shared is not None and shared.has_person,
+        doing="" if shared is None else shared.doing,
+        tuning_refused=core.tuner.why,
+        link_asked=core.tuner.link,
+    )
