@@ -16,6 +16,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.session import OWNING, SessionState
 from common.statistics import RunningStatistics
+from operator_side.commanding import STOPPING, StopButton, motion_command
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.feel.blindness import Blindness, Sight
 from operator_side.feel.haptics import Haptics
@@ -23,6 +24,7 @@ from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.standing import Standing
+from operator_side.tuner import Tuner
 
 STIFFNESS_EXPIRES_S = 0.2
 """Triggers are released, and the hands move nothing, this long after the last stiffness that was received."""
@@ -74,6 +76,8 @@ class OperatorSide:
             compensation=compensation,
         )
         """What the fingers are told, and why."""
+        self.stop_button = StopButton()
+        self.tuner = Tuner()
         self._blindness = Blindness()
         self._standing = Standing()
         self._intent: OperatorIntent | None = None
@@ -116,6 +120,7 @@ class OperatorSide:
                 self.link.begin_anew()
             if not self._standing.owns:
                 self._blindness.end()
+                self.stop_button.forget()
         if isinstance(message, StiffnessUpdate):
             self.stiffness_received += 1
             if message.state == "armed" and arrival.one_way_s is not None:
@@ -156,6 +161,10 @@ class OperatorSide:
         self._intent_s = now_s
         self._blindness.see_hands(released=self._intent.triggers_released)
 
+    def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
+        """The person wants another P, another emulated link, or both; None leaves it."""
+        self.tuner.ask(probability, link, self._standing, now_s)
+
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Read the triggers and sticks of the controller that has just been found through `calibration`."""
         if calibration != self._calibration:
@@ -188,32 +197,22 @@ class OperatorSide:
         if (command is None or not linked) and now_s - self._hello_s >= HEARTBEAT_PERIOD_S:
             self._hello_s = now_s
             payloads.append(encode(self.link.hello(now_s)))
+        if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
+            payloads.append(encode(tune))
         return payloads
 
     def _command(self, now_s: float) -> MotionCommand | None:
-        """What the hands do; None while there is no lease to send it under, or no controller."""
-        intent, lease = self._present_intent(now_s), self.lease
-        if intent is None or lease is None or not self._standing.owns:
+        """What the hands do; None while there is no lease to send it under, or neither controller nor stop."""
+        lease = self.lease
+        if lease is None or not self._standing.owns:
             return None
-        if self._must_stop_first() and not intent.emergency_stop:
+        state = None if self.stiffness is None else self.stiffness.state
+        intent = STOPPING if self.stop_button.holds(now_s, state) else self._present_intent(now_s)
+        if intent is None or (self._must_stop_first() and not intent.emergency_stop):
             return None
         if self._blindness.holds:
             intent = intent.resting()
-        return MotionCommand(
-            self.link.stamp(now_s),
-            l2=intent.l2,
-            r2=intent.r2,
-            lateral=intent.lateral,
-            turning=intent.turning,
-            gripper=float(intent.gripper),
-            run=intent.run,
-            arm=intent.arm,
-            emergency_stop=intent.emergency_stop,
-            next_target=intent.next_target,
-            hand_over=intent.hand_over,
-            token=lease.token,
-            compensation=self._compensation,
-        )
+        return motion_command(self.link.stamp(now_s), intent, lease.token, self._compensation)
 
     def _present_intent(self, now_s: float) -> OperatorIntent | None:
         return None if now_s - self._intent_s > INTENT_EXPIRES_S else self._intent
@@ -297,6 +296,8 @@ class OperatorSide:
                 "stale": self.link.stale,
             },
             "lease_states": self._standing.history,
+            "stops_pressed_elsewhere": self.stop_button.presses,
+            "tuning": self.tuner.summary(),
             "zones": self.haptics.rendering.zones(),
             "rendering": self.haptics.summary() | {"blind": self._blindness.times},
             "delay_ms": {

@@ -42,6 +42,27 @@ class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     newest_ms: float | None
 
 
+class HandsFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page has to know to drive, or to say why it cannot"""
+
+    may_drive: bool
+    """Whether a page can drive at all: not where a real controller does"""
+    driver: str | None
+    """The word by which the page that drives calls itself; None while none does"""
+    readiness: str
+    """operator_side/page_hands/driving_page.py: nobody drives, all keys up first, ready, running"""
+    rest_s: float
+    """For how long all keys still have to be up before hold-to-run counts"""
+    person: bool
+    """Whether there is a scripted person who could go on"""
+    doing: str
+    """What whoever has the controller does, in a word; empty for a real controller"""
+    tuning_refused: str
+    """Why the last wish to tune was refused; empty where it was not"""
+    link_asked: str | None
+    """The link that was asked for last from here, in netem's words; None while nothing was"""
+
+
 class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One moment of the operator side."""
 
@@ -68,7 +89,9 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     may_tune: bool
     """Whether the robot side lets this operator change P and the emulated link"""
     probability: float | None
-    """P as last asked for from here; None where nothing was"""
+    """P as the robot side has it; None while it has not said"""
+    page: HandsFacts | None = None
+    """None where there is nothing for pages to drive or to stop"""
 
 
 FACTS_PERIOD_S = 1.0 / 30.0

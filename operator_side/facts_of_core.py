@@ -10,7 +10,7 @@ from common.command.live_view import Value
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import ZONE_COUNT, Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.facts import DelayFacts, OperatorFacts, Ten, TriggerFacts
+from operator_side.facts import DelayFacts, HandsFacts, OperatorFacts, Ten, TriggerFacts
 
 _RECENT_S: Final = 1.0
 _TAIL: Final = 0.99
@@ -26,6 +26,7 @@ class Surroundings(msgspec.Struct, frozen=True):
     swap_sides: bool = False
     may_tune: bool = False
     probability: float | None = None
+    page: HandsFacts | None = None
 
 
 def operator_facts(
@@ -76,6 +77,7 @@ def operator_facts(
         hands=surroundings.hands,
         may_tune=surroundings.may_tune,
         probability=surroundings.probability,
+        page=surroundings.page,
     )
 
 

@@ -6,7 +6,7 @@ import secrets
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, NamedTuple
 
 from common.clock import MonotonicClock, clock_domain
 from common.command.command_line import given_fields, parse_settings, run_command
@@ -15,6 +15,7 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
+from common.emulation.tuned import tuned_link
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
@@ -33,10 +34,11 @@ from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.facts_of_core import Surroundings
+from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
 from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.whoever import Whoever, whoever
 from operator_side.terminal_view.status import TerminalStatus
 from operator_side.viewing import Viewing, view_topics
 
@@ -78,14 +80,13 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
-        person: Whoever | None = None
+        person: SharedHands | None = None
         with ExitStack() as stack:
             guard: ReleaseGuard | None = None
-            if settings.device == "simulated":
+            pages = DrivingPage(may_drive=settings.device != "hid")
+            if settings.device != "hid":
                 simulated = SimulatedDualSense()
-                person = whoever(
-                    simulated, settings.person, settings.seed, settings.calibration, swap_sides=settings.swap_sides
-                )
+                person = shared_hands(simulated, pages, settings)
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
                 loaded = load_backend() if backend is None else backend
@@ -93,21 +94,16 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
-            surroundings = Surroundings(
-                hands="controller" if person is None else "person",
-                asked_to_robot=line.profile.words(),
-                swap_sides=settings.swap_sides,
-            )
             # Before our own priority is raised, which it would inherit.
             console = Console(settings.connect, port=settings.console_port) if settings.console else None
-            viewing = Viewing(core, surroundings, status, console and stack.enter_context(console))
+            surroundings = functools.partial(surroundings_of, core, line, pages, person, swap_sides=settings.swap_sides)
+            viewing = Viewing(core, surroundings, status, pages, console and stack.enter_context(console))
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
-            loop = _Loop(
-                settings, core, line, sockets, connection, guard, person, viewing, status, stored_travel=not given
-            )
+            people = _People(person, pages, viewing)
+            loop = _Loop(settings, core, line, sockets, connection, guard, people, status, stored_travel=not given)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -134,6 +130,14 @@ def _find(find: Finder, preferred: str | None) -> OpenController:
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
+class _People(NamedTuple):
+    """Who is at this side, besides a real controller's hands."""
+
+    person: SharedHands | None
+    pages: DrivingPage
+    viewing: Viewing
+
+
 class _Loop:
     """Motion at absolute deadlines, messages and effects as they come."""
 
@@ -145,8 +149,7 @@ class _Loop:
         sockets: OperatorSockets,
         connection: Connection,
         guard: ReleaseGuard | None,
-        person: Whoever | None,
-        viewing: Viewing,
+        people: "_People",
         status: Status,
         *,
         stored_travel: bool,
@@ -162,8 +165,8 @@ class _Loop:
         self._connection = connection
         self._guard = guard
         self._guard_s = 0.0
-        self._person = person
-        self._viewing = viewing
+        self._person, self._pages, self._viewing = people
+        self._link = settings.link_spec()
         self._status = status
         self._clock = MonotonicClock()
         self._collection = IdleCollection(self._clock)
@@ -208,6 +211,10 @@ class _Loop:
 
     def _move(self, now_s: float) -> None:
         self._pacer.begin(now_s)
+        follow_pages(self._pages, self._core, now_s)
+        if (words := self._core.tuner.take_link()) is not None:
+            self._link = tuned_link(self._link, words)
+            self._line.change(self._link.profile("to_robot"))
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
         self._connection.update(now_s)

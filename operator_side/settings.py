@@ -36,8 +36,9 @@ class OperatorSettings(RunOptions):
     """With --keys: the robot side's public key, as shown on its machine by: feelahead keys show robot."""
     realtime: bool = False
     """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
-    device: Literal["hid", "simulated"] = "hid"
-    """A real controller, which is waited for while it is not there, or a simulated one with a scripted person."""
+    device: Literal["hid", "simulated", "browser"] = "hid"
+    """A real controller, which is waited for while it is not there; a simulated one with a scripted person, out of
+    whose hands a page of the console may take it; or a simulated one that nobody but a page drives."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
     compensation: Compensation = "operator"

@@ -1,7 +1,7 @@
 """Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from common.command.live_view import Value
@@ -13,6 +13,8 @@ from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.facts import FACTS_PERIOD_S
 from operator_side.facts_of_core import Surroundings, operator_facts
+from operator_side.following_pages import hear_pages
+from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.scene_figures import SceneFigures
 from operator_side.settings import OperatorSettings
 
@@ -29,8 +31,17 @@ def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
 class Viewing:
     """Feeds who looks; asks for nothing while nobody does."""
 
-    def __init__(self, core: OperatorSide, surroundings: Surroundings, status: Status, console: Console | None) -> None:
+    def __init__(
+        self,
+        core: OperatorSide,
+        surroundings: Callable[[float], Surroundings],
+        status: Status,
+        pages: DrivingPage,
+        console: Console | None,
+    ) -> None:
+        """`surroundings`: those of a moment. `pages`: are told what the console's say."""
         self.console = console
+        self._pages = pages
         self._core = core
         self._surroundings = surroundings
         self._status = status
@@ -51,7 +62,7 @@ class Viewing:
     def requests(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: what is looked at, while anything is."""
         if self.console is not None:
-            self.console.receive()
+            hear_pages(self.console, self._pages, now_s)
         pages = self.console is not None and self.console.pages > 0
         if not (pages or self._status.wants_facts) or now_s - self._watch_s < _WATCH_PERIOD_S:
             return []
@@ -75,11 +86,11 @@ class Viewing:
         """Show the facts of `now_s`; `status`: what the status line is made of."""
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
         if self.console is not None:
-            self.console.facts(operator_facts(self._core, status, self._surroundings, now_s))
+            self.console.facts(operator_facts(self._core, status, self._surroundings(now_s), now_s))
 
     def tell(self, status: Mapping[str, Value], now_s: float) -> None:
         """Tell the status of `now_s`, and the facts where somebody wants them."""
         self._status.show(now_s, status)
         if self._status.wants_facts:
             known = {**status, **self._figures.figures()}
-            self._status.show_facts(operator_facts(self._core, known, self._surroundings, now_s))
+            self._status.show_facts(operator_facts(self._core, known, self._surroundings(now_s), now_s))

@@ -21,6 +21,7 @@ from robot_side.gripper.held_covers import HeldCovers
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
+from robot_side.operators.tuning import Tuning
 from robot_side.settings import RobotSettings
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
@@ -133,6 +134,7 @@ def assemble(
             lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
             Safety(settings.safety),
             settings.seed,
+            Tuning(settings.probability, law.expect if settings.permit_tuning else None),
         ),
         LoopAge(settings.assumed_delay_s),
         joint_limits,

@@ -12,6 +12,7 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
 from common.emulation.delay_line import BitFlip, DelayLine, link_summary
 from common.emulation.spec import LinkSpec, Stream, unused_clauses
+from common.emulation.tuned import tuned_link
 from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
@@ -111,6 +112,7 @@ class _Loop:
     ) -> None:
         self._duration_s = settings.duration
         self._core = core = assembled.core
+        self._link = link
         self._sockets = sockets
         self._status = status
         self._clock = MonotonicClock()
@@ -226,6 +228,13 @@ class _Loop:
             self._sockets.refresh_keys()
             for text in self._sockets.news():
                 self._status.note(text)
+        tuning = self._core.session.tuning
+        for text in tuning.take_notes():
+            self._status.note(text)
+        if (words := tuning.take_link()) is not None:
+            self._link = tuned_link(self._link, words)
+            for stream, line in self._lines.items():
+                line.change(self._link.profile("to_operator", stream))
         self._collection.idle(now_s, resting=self._core.session.safety.state != "armed")
 
 

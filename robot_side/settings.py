@@ -104,6 +104,8 @@ class RobotSettings(RunOptions):
     Known for the built-in arm; without it a fifth of the way that full speed goes in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    permit_tuning: bool = False
+    """Let the operator that owns the robot change the probability and this side's emulated link while it runs."""
     assumed_delay_s: float = 1.0
     """The loop age that is reckoned with while none has been measured."""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)

@@ -41,7 +41,6 @@ class DelayLine(Generic[Item]):
         `corrupt` turns over one bit of an item by means of the function that it is given; it is needed where
         the profile corrupts and the items are not bytes.
         """
-        self.profile = profile
         self.figures = LinkFigures(profile.seed)
         """Everything that has happened so far."""
         self._start_s = start_s
@@ -50,6 +49,15 @@ class DelayLine(Generic[Item]):
         """By time of leaving, due time (earlier than that with slots) and order of arrival."""
         self._entered = 0
         self._last_due_s = -math.inf
+        self._follow(profile)
+
+    def change(self, profile: LinkProfile) -> None:
+        """From the next push on do what `profile` says; what waits leaves when it was due, and the figures go on."""
+        if profile != self.profile:
+            self._follow(profile)
+
+    def _follow(self, profile: LinkProfile) -> None:
+        self.profile = profile
         self._since_reordered = 0
         self._in_order = profile.model == "stream"
         self._outages = profile.outages

@@ -1,6 +1,6 @@
 """Every message that crosses the link, frozen and validated when it is made and when it is decoded.
 
-    operator ── Hello, MotionCommand, Watch ──▶ robot       control, ROUTER/DEALER
+    operator ── Hello, MotionCommand, Watch, Tune ──▶ robot     control, ROUTER/DEALER
     robot ── Hello, LeaseNotice, StiffnessUpdate ──▶ operator   control
     robot ── Telemetry ──▶ whoever looks                    view, PUB/SUB; view_messages.py has the others
 
@@ -27,6 +27,7 @@ _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
 _SLOWEST = 1e-6
 _LONGEST_REASON = 200
+_LONGEST_LINK = 200
 
 
 def _in_range(name: str, low: float, high: float, *values: float) -> None:
@@ -137,6 +138,24 @@ class Watch(Message, frozen=True, tag="watch"):
     """SceneShapes and SceneState"""
 
 
+class Tune(Message, frozen=True, tag="tune"):
+    """What the owner wants to be different while the run goes on; repeated until a notice says that it was taken."""
+
+    number: int
+    """Grows with each wish."""
+    probability: float | None = None
+    """P of eq. 10, within (0, 1); None leaves it."""
+    link: str | None = None
+    """The emulated link of both directions in netem's words, none for an empty text; None leaves it."""
+
+    def __post_init__(self) -> None:
+        _in_range("number", 1, _LARGEST, self.number)
+        if self.probability is not None:
+            _in_range("probability", 1e-6, 1.0 - 1e-6, self.probability)
+        if self.link is not None and len(self.link) > _LONGEST_LINK:
+            raise ValueError(f"link has {len(self.link)} characters; valid: up to {_LONGEST_LINK}")
+
+
 class LeaseNotice(Message, frozen=True, tag="lease"):
     """Where the receiver stands with the robot side; repeated, so that a lost one does no harm."""
 
@@ -149,6 +168,12 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     """How many observe."""
     place: int = 0
     """The receiver's place among them, or for who is not known that which it would get: 1 is next, 0 owns."""
+    may_tune: bool = False
+    """Whether the run lets its owner tune."""
+    probability: float | None = None
+    """P as it is now."""
+    tuned: int = 0
+    """The number of the receiver's newest wish to tune that arrived, granted or not."""
 
     def __post_init__(self) -> None:
         if len(self.why) > _LONGEST_REASON:
@@ -156,6 +181,9 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
         _in_range("token", 0, _LARGEST, self.token)
         _in_range("waiting", 0, 1000, self.waiting)
         _in_range("place", 0, 1000, self.place)
+        _in_range("tuned", 0, _LARGEST, self.tuned)
+        if self.probability is not None:
+            _in_range("probability", 0.0, 1.0, self.probability)
 
 
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -242,4 +270,4 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
         _in_range("r2", 0.0, 1.0, self.r2)
 
 
-AnyMessage = Hello | MotionCommand | Watch | LeaseNotice | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | StiffnessUpdate | Telemetry

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from common.clock import MonotonicClock, VirtualClock
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
+from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
@@ -19,7 +20,9 @@ from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.search import Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.following_pages import follow_pages
 from operator_side.main import MOTION_PERIOD_S
+from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
 from robot_side.ahead.law import Law
@@ -63,6 +66,7 @@ class Loopback:
         scene: Scene | None = None,
         device: SimulatedDualSense | None = None,
         person: Callable[[SimulatedDualSense], Person] | None = None,
+        pages: DrivingPage | None = None,
         after_robot_tick: Callable[[float], None] | None = None,
         other_law: Callable[[Law], Law] | None = None,
         tick_period_s: float = TICK_PERIOD_S,
@@ -71,6 +75,7 @@ class Loopback:
 
         tick_period_s: of the robot side; the physics keeps its own steps, and its fields come each 10 ms at most.
 
+        pages: of the console, as the person knows them.
         other_law: makes another law of the one that the settings name.
         after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
         """
@@ -93,6 +98,7 @@ class Loopback:
         )
         self.device = device or SimulatedDualSense()
         self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
+        self.pages = pages or DrivingPage(may_drive=False)
         self.person: Person = (
             person(self.device)
             if person is not None
@@ -107,10 +113,10 @@ class Loopback:
         self._after_robot_tick = after_robot_tick
         self._tick_period_s = tick_period_s
         self.tick_time = RunningStatistics(settings.robot.seed)
-        there, back = settings.operator.link_spec(), settings.robot.link_spec()
-        self._to_robot: DelayLine[bytes] = DelayLine(there.profile("to_robot"))
+        self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
+        self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
         self._to_operator: dict[Stream, DelayLine[bytes]] = {
-            stream: DelayLine(back.profile("to_operator", stream)) for stream in SENT_STREAMS
+            stream: DelayLine(self._back.profile("to_operator", stream)) for stream in SENT_STREAMS
         }
         self._ticks = 0
         self._motions = 0
@@ -156,12 +162,16 @@ class Loopback:
             self.operator.receive_view(payload, now_s)
 
     def _operator_tick(self, now_s: float) -> None:
+        follow_pages(self.pages, self.operator, now_s)
         self.person.tick(now_s, self.operator.screen, self.operator.link.round_trip.mean or 0.0)
         self.connection.update(now_s)
         if (report := self.connection.read(now_s)) is not None:
             self.operator.read_report(report, now_s)
         for payload in self.operator.motion(now_s):
             self._to_robot.push(now_s, payload)
+        if (words := self.operator.tuner.take_link()) is not None:
+            self._there = tuned_link(self._there, words)
+            self._to_robot.change(self._there.profile("to_robot"))
 
     def _robot_tick(self, now_s: float) -> None:
         start_s = _WALL.now()
@@ -169,5 +179,9 @@ class Loopback:
         self.tick_time.add(_WALL.now() - start_s)
         for message in outgoing:
             self._to_operator[message.stream].push(now_s, message.payload)
+        if (words := self.robot.session.tuning.take_link()) is not None:
+            self._back = tuned_link(self._back, words)
+            for stream, line in self._to_operator.items():
+                line.change(self._back.profile("to_operator", stream))
         if self._after_robot_tick is not None:
             self._after_robot_tick(now_s)

@@ -4,6 +4,7 @@ s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every t
 """
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -48,6 +49,10 @@ class PaperLaw:
         if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
             self._sensed = now_s, self._look(situation)
         return self._sensed[1]
+
+    def expect(self, probability: float) -> None:
+        """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+        self._uncertainty = replace(self._uncertainty, probability=probability)
 
     def summary(self) -> dict[str, int]:
         """How much work there was, over the run."""

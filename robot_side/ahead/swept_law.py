@@ -83,6 +83,10 @@ class SweptLaw:
             overlap_m3=leading.overlap_m3,
         )
 
+    def expect(self, probability: float) -> None:
+        """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+        self._uncertainty = replace(self._uncertainty, probability=probability)
+
     def summary(self) -> dict[str, int]:
         """How much work there was and was not, over the run."""
         return vars(self.ahead.counts)

@@ -34,7 +34,7 @@ def main() -> None:
         _refuse(channel, f"{'; '.join(troubles)}; to mend it: {REMEDY}")
         return
     try:
-        import simplejpeg  # type: ignore[import-untyped]  # noqa: F401, PLC0415  # may be missing
+        import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
         _refuse(channel, f"{error}; to mend it: pip install 'feelahead[robot]'")
         return

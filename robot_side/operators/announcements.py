@@ -13,6 +13,7 @@ from common.protocol.messages import Header, LeaseNotice
 from common.protocol.session import SessionState
 from robot_side.operators.lease import Lease
 from robot_side.operators.participant import Participant
+from robot_side.operators.tuning import Tuning
 
 _NOTICE_PERIOD_S = 0.05
 _ANSWER_PERIOD_S = 0.1
@@ -29,8 +30,9 @@ class Answer:
 class Announcements:
     """Answers and lease notices, bounded however fast strangers knock."""
 
-    def __init__(self, new_link: Callable[[], LinkEnd], lease: Lease) -> None:
+    def __init__(self, new_link: Callable[[], LinkEnd], lease: Lease, tuning: Tuning) -> None:
         self._lease = lease
+        self._tuning = tuning
         self._link = new_link()
         self._sequence = itertools.count(1)
         self._answers: list[Answer] = []
@@ -89,5 +91,8 @@ class Announcements:
             token=self._lease.token,
             waiting=len(observers),
             place=observers.index(participant) + 1 if participant in observers else 0,
+            may_tune=self._tuning.permitted,
+            probability=self._tuning.probability,
+            tuned=participant.tuned,
         )
         self._answers.append(Answer(participant.peer, encode(notice)))

@@ -8,13 +8,14 @@ from typing import Any
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Header, Hello, MotionCommand, Watch
+from common.protocol.messages import Header, Hello, MotionCommand, Tune, Watch
 from common.protocol.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
 from robot_side.operators.lease import MOST_OBSERVERS, Lease
 from robot_side.operators.participant import Participant
 from robot_side.operators.safety import Permission, Safety
+from robot_side.operators.tuning import Tuning
 from robot_side.operators.watchers import Watchers
 
 
@@ -29,9 +30,12 @@ class Receiver:
 class OperatorSession:
     """One owner and its observers: admits, orders and judges what arrives."""
 
-    def __init__(self, new_link: Callable[[], LinkEnd], safety: Safety, seed: int = 0) -> None:
+    def __init__(
+        self, new_link: Callable[[], LinkEnd], safety: Safety, seed: int = 0, tuning: Tuning | None = None
+    ) -> None:
         """`new_link` makes our end towards one more operator; all of them have our one epoch."""
         self.safety = safety
+        self.tuning = tuning or Tuning()
         self.lease = Lease(safety)
         self.rejected = 0
         """Payloads that were no valid message, or came from somebody who was not admitted."""
@@ -51,7 +55,7 @@ class OperatorSession:
         self.watchers = Watchers()
         """Who looks at what"""
         self._new_link = new_link
-        self._announcements = Announcements(new_link, self.lease)
+        self._announcements = Announcements(new_link, self.lease, self.tuning)
         self._owner_link = new_link()
         self._token = 0
         self._updated_s = -math.inf
@@ -89,10 +93,8 @@ class OperatorSession:
         except RemoteProtocolError:
             self.rejected += 1
             return
-        if isinstance(message, Hello) and message.side == "robot":
-            self.rejected += 1
-            return
-        if not isinstance(message, Hello | MotionCommand | Watch):
+        from_robot = isinstance(message, Hello) and message.side == "robot"
+        if from_robot or not isinstance(message, Hello | MotionCommand | Tune | Watch):
             self.rejected += 1
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
@@ -111,17 +113,25 @@ class OperatorSession:
             if participant is self.lease.owner and self.safety.state == "armed" and arrival.one_way_s is not None:
                 self.driving_delay.add(arrival.one_way_s)
             self._judge(participant, message, arrival, now_s)
-        elif isinstance(message, Watch):
-            if arrival.fresh:
-                self.watchers.heard(participant.epoch, message, now_s)
         elif arrival.fresh:
+            self._follow(participant, message, now_s)
+
+    def _follow(self, participant: Participant, message: Hello | Tune | Watch, now_s: float) -> None:
+        """What is no command."""
+        if isinstance(message, Watch):
+            self.watchers.heard(participant.epoch, message, now_s)
+        elif isinstance(message, Hello):
             self._announcements.answer(participant, now_s)
+        elif message.number > participant.tuned:
+            participant.tuned = message.number
+            self.tuning.take(message, now_s, owns=participant is self.lease.owner)
 
     def update(self, now_s: float) -> None:
         """Let go of whoever has been silent for too long; to be called in every tick."""
         if now_s == self._updated_s:
             return  # a flood that arrives at once costs this once
         self._updated_s = now_s
+        self.tuning.begin(now_s)
         self.lease.expire(now_s)
         self._follow_owner()
 
@@ -173,9 +183,10 @@ class OperatorSession:
             "commands_of_non_owners": self.not_owners,
             "other_version": self.other_version,
             "discarded_by_age": self.safety.discarded_by_age,
+            "tuning": self.tuning.summary(),
         }
 
-    def _admit(self, peer: bytes, message: Hello | MotionCommand | Watch, now_s: float) -> Participant | None:
+    def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune | Watch, now_s: float) -> Participant | None:
         """Make room for a new epoch, which only a Hello can begin; None for whoever is turned away."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):

@@ -22,6 +22,8 @@ class Participant:
         """When its Hello was answered last."""
         self.next_target_was_down = True
         self.hand_over_was_down = True
+        self.tuned = 0
+        """The number of its newest wish to tune."""
 
     @property
     def state(self) -> SessionState:

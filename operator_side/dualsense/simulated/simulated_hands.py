@@ -6,6 +6,7 @@ from typing import Final
 from operator_side.dualsense.reports.attachments import Battery, Connections, TouchPoint
 from operator_side.dualsense.reports.controller_state import (
     AT_REST_M_S2,
+    SENSED_TRAVEL,
     SENSOR_TICKS_PER_S,
     SENSOR_TIME_SPAN_S,
     Button,
@@ -38,6 +39,13 @@ class SimulatedHands:
         """Press the triggers with constant forces; ValueError for a negative or non-finite one."""
         self._l2.set_finger_force(l2_n)
         self._r2.set_finger_force(r2_n)
+
+    def set_travel(self, l2: float, r2: float) -> None:
+        """Hold the triggers at these travels as the controller reports them, 0 to 1, whatever resists, until a force
+        is set; ValueError beyond.
+        """
+        self._l2.hold_at(SENSED_TRAVEL * l2)
+        self._r2.hold_at(SENSED_TRAVEL * r2)
 
     def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
         """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError beyond."""

@@ -77,6 +77,7 @@ class SimulatedTrigger:
         """`strength_step_n`: what one strength resists; 0 for a trigger whose effects are told and not felt."""
         self._strength_step_n = strength_step_n
         self._finger_force_n = 0.0
+        self._held: float | None = None
         self._effect: AnyEffect = Off()
         self._power = 1.0
         self._fired = False
@@ -126,7 +127,14 @@ class SimulatedTrigger:
     def set_finger_force(self, finger_force_n: float) -> None:
         """Press with a constant force from now on; ValueError for a negative or non-finite one."""
         self._equilibrium = equilibrium_travel(finger_force_n, self._strengths(), self._strength_step_n)
-        self._finger_force_n = finger_force_n
+        self._finger_force_n, self._held = finger_force_n, None
+
+    def hold_at(self, travel: float) -> None:
+        """Be at this travel from now on, whatever resists, until a force is set; ValueError outside 0 to 1."""
+        if not 0.0 <= travel <= 1.0:
+            raise ValueError(f"travel = {travel}; valid: 0 to 1")
+        self._finger_force_n = 0.0
+        self._held = self._travel = travel
 
     def set_effect(self, effect: AnyEffect, power: float = 1.0) -> None:
         """Act like `effect` from now on; `power`: what is left of every strength, 0 to 1 (assumed linear).
@@ -144,8 +152,9 @@ class SimulatedTrigger:
         """Let `step_s` pass; ValueError for a negative or non-finite step."""
         if not (math.isfinite(step_s) and step_s >= 0.0):
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
-        remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
-        self._travel = self._equilibrium + (self._travel - self._equilibrium) * remaining
+        if self._held is None:
+            remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
+            self._travel = self._equilibrium + (self._travel - self._equilibrium) * remaining
         if isinstance(self._effect, Weapon):
             # Nothing is held beyond either end, so neither firing nor getting ready changes the way.
             zones = self._travel * ZONE_COUNT

@@ -18,6 +18,7 @@ from common.protocol.messages import (
     StiffnessUpdate,
     Telemetry,
     TriggerField,
+    Tune,
     Watch,
 )
 from common.protocol.session import SessionState
@@ -66,6 +67,13 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
     ),
     st.builds(Watch, headers, overview=st.booleans(), first_person=st.booleans(), scene=st.booleans()),
     st.builds(
+        Tune,
+        headers,
+        number=st.integers(1, 2**63 - 1),
+        probability=st.none() | st.floats(0.01, 0.999),
+        link=st.none() | st.text(max_size=200),
+    ),
+    st.builds(
         LeaseNotice,
         headers,
         session=st.sampled_from(SessionState),
@@ -73,6 +81,9 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         token=st.integers(0, 2**63 - 1),
         waiting=st.integers(0, 1000),
         place=st.integers(0, 1000),
+        may_tune=st.booleans(),
+        probability=st.none() | unit,
+        tuned=st.integers(0, 2**63 - 1),
     ),
     st.builds(
         StiffnessUpdate,

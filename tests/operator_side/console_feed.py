@@ -1,6 +1,6 @@
 """Something to see in a console: an arm that sways before a table, as both sides would tell of it.
 
-python -m tests.helpers.console_feed SECONDS     a console with it, whose address is printed
+python -m tests.operator_side.console_feed SECONDS     a console with it, whose address is printed
 """
 
 import math

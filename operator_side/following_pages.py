@@ -1,0 +1,80 @@
+"""What pages of the console ask for, handed on: hands to a controller, stops and wishes to the core."""
+
+import functools
+
+from common.emulation.delay_line import DelayLine
+from operator_side.console.console import Console
+from operator_side.core import OperatorSide
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.facts import HandsFacts
+from operator_side.facts_of_core import Surroundings
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
+from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.whoever import whoever
+
+
+def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: OperatorSettings) -> SharedHands:
+    """Whoever is to have the simulated controller: a page, and before it the scripted person where there is one."""
+    calibration, swap_sides = settings.calibration, settings.swap_sides
+    person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
+    alone = settings.device == "browser"
+    return SharedHands(device, pages, None if alone else person, calibration, swap_sides=swap_sides)
+
+
+def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
+    """Take what the pages of the console have said since the last call."""
+    console.receive()
+    while console.hands:
+        words = console.hands.popleft()
+        if words.hands is None:
+            pages.close(words.page, now_s)
+        else:
+            pages.receive(words.page, {"hands": words.hands}, now_s)
+    while console.tuning:
+        words = console.tuning.popleft()
+        pages.receive(words.page, {"tune": words.tune}, now_s)
+
+
+def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
+    """In every turn: a stop on a page counts like the controller's, and what a page wants tuned is asked for."""
+    if pages.stopping(now_s):
+        core.stop_button.press(now_s)
+    if (wish := pages.take_wish()) is not None:
+        core.tune(wish.probability, wish.link, now_s)
+
+
+def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
+    """What pages have to know; `shared` None for a real controller."""
+    rest_s = pages.rest_s(now_s)
+    return HandsFacts(
+        may_drive=pages.may_drive,
+        driver=pages.driver,
+        readiness=str(pages.readiness),
+        rest_s=rest_s,
+        person=shared is not None and shared.has_person,
+        doing="" if shared is None else shared.doing,
+        tuning_refused=core.tuner.why,
+        link_asked=core.tuner.link,
+    )
+
+
+def surroundings_of(
+    core: OperatorSide,
+    line: DelayLine[bytes],
+    pages: DrivingPage,
+    shared: SharedHands | None,
+    now_s: float,
+    *,
+    swap_sides: bool,
+) -> Surroundings:
+    """What the facts of `now_s` need besides the core; `line`: to the robot side."""
+    lease = core.lease
+    return Surroundings(
+        hands="controller" if shared is None else shared.hands,
+        asked_to_robot=line.profile.words(),
+        swap_sides=swap_sides,
+        may_tune=lease is not None and lease.may_tune,
+        probability=None if lease is None else lease.probability,
+        page=hands_facts(pages, shared, core, now_s),
+    )

@@ -1,0 +1,1 @@
+"""Keyboard, mouse and gamepad of a browser's page: second-class hands on a simulated controller."""

@@ -1,0 +1,95 @@
+"""What a page of the console says of its hands and of what it wants tuned: frozen, and validated whole."""
+
+from typing import Literal
+
+import msgspec
+
+from common.errors import RemoteProtocolError
+from common.protocol.messages import Vector2
+
+_LARGEST = 2**53 - 1
+"""A browser counts exactly up to here."""
+_LONGEST = 200
+
+
+class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the hands at one page do; sent 50 times a second while they drive, and at once when anything changes."""
+
+    page: str
+    """A word by which the page tells itself from others"""
+    number: int
+    """Grows with each message of the page"""
+    driving: bool = False
+    """The person has asked to drive from this page"""
+    run: bool = False
+    """Hold-to-run is held"""
+    l2: float = 0.0
+    """Calibrated travel of what retreats, 0 to 1"""
+    r2: float = 0.0
+    """Calibrated travel of what advances, 0 to 1"""
+    lateral: Vector2 = (0.0, 0.0)
+    """Across: right and up positive, -1 to 1 each, no dead zone"""
+    turning: Vector2 = (0.0, 0.0)
+    gripper: Literal[-1, 0, 1] = 0
+    """-1 opens, 1 closes, 0 holds"""
+    next_target: bool = False
+    hand_over: bool = False
+    stop: bool = False
+    """The emergency stop is pressed"""
+    give_back: bool = False
+    """The person lets the scripted one go on"""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.number <= _LARGEST:
+            raise ValueError(f"number = {self.number}; valid: 0 to {_LARGEST}")
+        if not 1 <= len(self.page) <= 32:
+            raise ValueError(f"page has {len(self.page)} characters; valid: 1 to 32")
+        for name, low, values in (
+            ("l2", 0.0, (self.l2,)),
+            ("r2", 0.0, (self.r2,)),
+            ("lateral", -1.0, self.lateral),
+            ("turning", -1.0, self.turning),
+        ):
+            for value in values:
+                if not low <= value <= 1.0:  # false for NaN, too
+                    raise ValueError(f"{name} = {value}; valid: {low:g} to 1")
+
+    @property
+    def moves_nothing(self) -> bool:
+        """Triggers and sticks are at rest."""
+        return self.l2 == self.r2 == 0.0 and self.lateral == self.turning == (0.0, 0.0)
+
+    @property
+    def all_up(self) -> bool:
+        """Nothing is pressed at all."""
+        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop
+        return self.moves_nothing and not pressed
+
+
+class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page wants to be different; None leaves it."""
+
+    probability: float | None = None
+    link: str | None = None
+    """Netem's words"""
+
+    def __post_init__(self) -> None:
+        if self.probability is not None and not 0.0 < self.probability < 1.0:
+            raise ValueError(f"probability = {self.probability}; valid: above 0 to below 1")
+        if self.link is not None and len(self.link) > _LONGEST:
+            raise ValueError(f"link has {len(self.link)} characters; valid: up to {_LONGEST}")
+
+
+class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One message of a page."""
+
+    hands: PageHands | None = None
+    tune: TuneWish | None = None
+
+
+def read_page_message(content: object) -> PageMessage:
+    """Validate what was JSON; RemoteProtocolError, in one line, for what is no message of a page."""
+    try:
+        return msgspec.convert(content, PageMessage)
+    except msgspec.ValidationError as error:
+        raise RemoteProtocolError(f"no valid message of a page: {error}") from error

@@ -1,0 +1,82 @@
+"""What the owner may change while the run goes on: the probability P of eq. 10, and the emulated link."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+from common.emulation.tuned import tunable_profile
+from common.errors import ConfigurationError
+from common.protocol.messages import Tune
+
+_REMEMBERED: Final = 1000
+_NOTES: Final = 20
+
+
+class Tuning:
+    """Grants wishes where the run permits it, and remembers what was granted when; the rest it counts."""
+
+    def __init__(self, probability: float | None = None, expect: Callable[[float], None] | None = None) -> None:
+        """`probability`: P at the start; `expect` makes another one hold; None permits no tuning at all."""
+        self.probability = probability
+        """P as it is now."""
+        self.refused = 0
+        self._expect = expect
+        self._start_s: float | None = None
+        self._granted: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
+        self._notes: deque[str] = deque(maxlen=_NOTES)
+        self._link: str | None = None
+        self._refused_because = ""
+
+    @property
+    def permitted(self) -> bool:
+        """Whether the run permits it."""
+        return self._expect is not None
+
+    def begin(self, now_s: float) -> None:
+        """The first call says when the run began."""
+        if self._start_s is None:
+            self._start_s = now_s
+
+    def take(self, tune: Tune, now_s: float, *, owns: bool) -> None:
+        """One wish, of the owner if `owns`: granted whole or not at all."""
+        if self._expect is None or not owns:
+            why = "only the owner may" if self.permitted else "valid with: --permit-tuning"
+            self._refuse(why)
+            return
+        try:
+            if tune.link is not None:
+                tunable_profile(tune.link)
+        except ConfigurationError as error:
+            self._refuse(str(error))
+            return
+        if tune.probability is not None and tune.probability != self.probability:
+            self._expect(tune.probability)
+            self.probability = tune.probability
+        if tune.link is not None:
+            self._link = tune.link
+        words = [] if tune.probability is None else [f"P = {tune.probability:g}"]
+        words += [] if tune.link is None else [f"link {tune.link or 'not emulated'!r}"]
+        self._notes.append(f"tuned: {', '.join(words) or 'nothing'}")
+        time_s = 0.0 if self._start_s is None else now_s - self._start_s
+        self._granted.append({"time_s": time_s, "probability": tune.probability, "link": tune.link})
+
+    def _refuse(self, why: str) -> None:
+        self.refused += 1
+        if why != self._refused_because:  # one line, however often somebody asks
+            self._refused_because = why
+            self._notes.append(f"tuning refused: {why}")
+
+    def take_link(self) -> str | None:
+        """The link that was asked for since the last call, for the side's own line; None for none."""
+        link, self._link = self._link, None
+        return link
+
+    def take_notes(self) -> list[str]:
+        """What a person should be told since the last call."""
+        notes = list(self._notes)
+        self._notes.clear()
+        return notes
+
+    def summary(self) -> dict[str, Any]:
+        """What was tuned when, and how often that was refused."""
+        return {"permitted": self.permitted, "granted": list(self._granted), "refused": self.refused}
