@@ -4,11 +4,11 @@ import select
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import mujoco
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import numpy.typing as npt
 import pytest
-import simplejpeg
+import simplejpeg  # type: ignore[import-untyped]
 
 from common.arrays import FloatArray
 from common.companion.process import Companion

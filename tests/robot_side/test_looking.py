@@ -95,7 +95,7 @@ class Table:
                 for message in line.pop(self.now_s):
                     self.ages_s[stream].append(self.now_s - self._sent_s.pop(id(message)))
                     if stream in ("video", "scene"):
-                        self.seen.append(decode_view(message.payload))  # type: ignore[arg-type]
+                        self.seen.append(decode_view(message.payload))
 
     def _push(self, messages: list[Outgoing]) -> None:
         for message in messages:
@@ -283,7 +283,7 @@ def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
     law_anew = assemble(table.settings, 1, "clock").law
     sensed = law_anew.sense(moving, 10.0)
     assert sensed.overlap_m3 > 1e-6
-    l2, r2 = law_anew.explain(moving, sensed)
+    l2, r2 = law_anew.explain("l2", moving, sensed), law_anew.explain("r2", moving, sensed)
     assert len(r2.overlaps_m3) > 1
     assert sum(r2.overlaps_m3.values()) == pytest.approx(sensed.overlap_m3, rel=1e-6)
     assert r2.terms.displacement_m == pytest.approx(0.03, rel=1e-3)

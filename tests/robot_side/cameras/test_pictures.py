@@ -56,7 +56,7 @@ def test_an_order_holds_the_state_as_it_is(desk: Desk, scene: Scene) -> None:
     companion = desk.started()
     companion.heard()
     scene.data.qpos[0] += 0.125
-    desk.cameras.update(0.001, 0.5, ("overview",))
+    desk.cameras.update(0.001, 0.5, BOTH[:1])
     [order] = desk.orders()
     assert order.positions == scene.data.qpos.tobytes()
 
