@@ -149,14 +149,16 @@ class Looking:
                 return []
             self._shapes_sent += 1
             return [Outgoing("scene", b"", view.shapes.under(session.view_header(now_s)))]
-        if not is_due:
-            return []
-        if self._backlog_s("scene", now_s) > _BACKLOG_S:
+        if is_due and self._backlog_s("scene", now_s) > _BACKLOG_S:
             self._counts["scene"]["behind"] += 1
+        elif is_due:
+            view.begin_state(sensed, situation, taken_s)
+            return []
+        state = view.work_on_state(lambda: session.view_header(now_s), self._ticks)
+        if state is None:
             return []
         self._counts["scene"]["sent"] += 1
         self._work_out_figures(now_s)
-        state = view.state(session.view_header(now_s), sensed, situation, taken_s, self._ticks)
         return [Outgoing("scene", b"", encode(state))]
 
     def _work_out_figures(self, now_s: float) -> None:

@@ -1,7 +1,7 @@
 """The scene as the robot side believes it is, as messages for whoever looks: what there is, where, and what it adds."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -11,13 +11,14 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
-from robot_side.ahead.explanation import Explains
+from robot_side.ahead.explanation import Explains, Trigger, TriggerExplained
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.cameras.shapes import SceneModel, bytes_of
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation.kinematics import MujocoKinematics
 
 _ROLES: Final = {Role.OBSTACLE: 0, Role.TARGET: 1, Role.SUPPORT: 2, Role.IGNORED: 3}
+_TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
 _FEW: Final = 64
 """So many objects have their poses in every SceneState, whether they move or not."""
 _STANDS_M: Final = 1e-6
@@ -36,6 +37,19 @@ class TickFigures:
     overruns: int = 0
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """A SceneState that is not finished yet."""
+
+    sensed: Sensed
+    situation: Situation
+    taken_s: float
+    version: int
+    link_poses: bytes
+    object_poses: FloatArray
+    explained: dict[Trigger, TriggerExplained] = field(default_factory=dict)
+
+
 class SceneView:
     """Makes SceneShapes and SceneState. What it says of shapes stays as it is until `begin_shapes` is called."""
 
@@ -51,6 +65,7 @@ class SceneView:
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._poses: FloatArray = np.empty((0, 7))
         self._making: Iterator[None] | None = None
+        self._begun: _Begun | None = None
 
     @property
     def complete(self) -> bool:
@@ -71,22 +86,44 @@ class SceneView:
                 return True
         return False
 
+    def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
+        """Begin a SceneState of the newest tick, which found `sensed` in `situation` at `taken_s`."""
+        links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
+        self._begun = _Begun(sensed, situation, taken_s, self.version, links, object_poses(situation.objects))
+
+    def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
+        """Go on with what was begun, for some 200 us: an explanation, or at last the message under a new header."""
+        begun = self._begun
+        if begun is None:
+            return None
+        for trigger in _TRIGGERS:
+            if trigger not in begun.explained:
+                begun.explained[trigger] = self._law.explain(trigger, begun.situation, begun.sensed)
+                return None
+        self._begun = None
+        return self._state(header(), begun, ticks)
+
     def state(
         self, header: Header, sensed: Sensed, situation: Situation, taken_s: float, ticks: TickFigures
     ) -> SceneState:
-        """Where everything was at `taken_s`, in the tick that found `sensed` in `situation`, the newest one."""
-        objects, pose = situation.objects, situation.pose
-        poses = object_poses(objects)
-        index = self._moved(poses)
-        l2, r2 = self._law.explain(situation, sensed)
+        """A SceneState of the newest tick at once, where nobody waits."""
+        self.begin_state(sensed, situation, taken_s)
+        while (state := self.work_on_state(lambda: header, ticks)) is None:
+            pass
+        return state
+
+    def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
+        objects, pose = begun.situation.objects, begun.situation.pose
+        index = self._moved(begun.object_poses)
+        l2, r2 = begun.explained["l2"], begun.explained["r2"]
         touched = sorted(l2.overlaps_m3.keys() | r2.overlaps_m3.keys())
         return SceneState(
             header,
-            version=self.version,
-            taken_s=taken_s,
-            link_poses=_row_bytes(self._kinematics.body_poses(self._model.bodies)),
+            version=begun.version,
+            taken_s=begun.taken_s,
+            link_poses=begun.link_poses,
             object_index=index.astype("<u4").tobytes(),
-            object_poses=_row_bytes(poses[index]),
+            object_poses=_row_bytes(begun.object_poses[index]),
             roles=bytes([_ROLES[role] for role in objects.roles]),
             tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
             spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),

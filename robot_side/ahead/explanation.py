@@ -1,7 +1,7 @@
 """What the enlargement is made of and what overlaps, for people who look; worked out only when asked for."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.tables import Tables
 from robot_side.ahead.total_overlap import total_overlap_m3
 
+Trigger = Literal["l2", "r2"]
 Overlaps = dict[int, float]
 """By object, m³; only where there is any."""
 
@@ -30,8 +31,8 @@ class TriggerExplained:
 class Explains(Protocol):
     """A law that can say why."""
 
-    def explain(self, situation: Situation, sensed: Sensed) -> tuple[TriggerExplained, TriggerExplained]:
-        """Of L2 and R2, as `sensed` was found in `situation`."""
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """One trigger, as `sensed` was found in `situation`."""
         ...
 
 

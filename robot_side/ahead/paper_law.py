@@ -12,7 +12,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import EnlargementTerms
-from robot_side.ahead.explanation import TriggerExplained, moved_and_inflated, overlaps_by_object
+from robot_side.ahead.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.scene_table import scene_table
@@ -58,9 +58,9 @@ class PaperLaw:
         """How much work there was, over the run."""
         return {"fields": self.looked}
 
-    def explain(self, situation: Situation, sensed: Sensed) -> tuple[TriggerExplained, TriggerExplained]:
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """The same for both triggers: D_incr in all directions, of which |v| t_d is called displacement here."""
-        del sensed
+        del trigger, sensed
         enlargement_m, covariances, velocities = self._enlargements(situation)
         largest = int(enlargement_m.argmax())
         displacement_m = float(np.linalg.norm(velocities[largest])) * situation.loop_age_s
@@ -77,8 +77,7 @@ class PaperLaw:
         )
         spheres = moved_and_inflated(situation, np.zeros(3), enlargement_m)
         table = scene_table(situation.objects)
-        found = TriggerExplained(terms, overlaps_by_object(spheres, table, _stands(situation), self._tables))
-        return found, found
+        return TriggerExplained(terms, overlaps_by_object(spheres, table, _stands(situation), self._tables))
 
     def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
         """D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""

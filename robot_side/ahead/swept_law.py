@@ -19,7 +19,13 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.messages import TriggerField, Ways
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
-from robot_side.ahead.explanation import TriggerExplained, enlargement_terms, moved_and_inflated, overlaps_by_object
+from robot_side.ahead.explanation import (
+    Trigger,
+    TriggerExplained,
+    enlargement_terms,
+    moved_and_inflated,
+    overlaps_by_object,
+)
 from robot_side.ahead.field import Ahead, Along
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.law import Sensed, Situation
@@ -91,12 +97,10 @@ class SweptLaw:
         """How much work there was and was not, over the run."""
         return vars(self.ahead.counts)
 
-    def explain(self, situation: Situation, sensed: Sensed) -> tuple[TriggerExplained, TriggerExplained]:
-        """Of L2 and R2: what D_σ is made of, and what overlaps at the robot side's δ."""
-        return self._explain("l2", situation, sensed.l2), self._explain("r2", situation, sensed.r2)
-
-    def _explain(self, side: Side, situation: Situation, felt: TriggerField) -> TriggerExplained:
-        along, _, prediction_sd_m = self._along(side, situation)
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """What D_σ is made of along one trigger, and what overlaps at the robot side's δ."""
+        felt = sensed.l2 if trigger == "l2" else sensed.r2
+        along, _, prediction_sd_m = self._along(trigger, situation)
         camera_sd_m = self._uncertainty.camera_sd_m
         terms, sigma_m = enlargement_terms(
             *(situation, along, self.ahead.encoder_sigma_rad, camera_sd_m, prediction_sd_m, felt.displacement_m)
