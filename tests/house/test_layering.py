@@ -65,9 +65,12 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
+    operator_side/facts.py: common/command
+    operator_side/console: common common/command common/companion common/protocol operator_side
+        operator_side/dualsense/reports
+    operator_side: operator_side common common/command common/emulation common/files common/protocol common/realtime common/sockets
+        operator_side/calibration operator_side/console operator_side/dualsense/effects operator_side/dualsense/hid
+        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
@@ -85,6 +88,8 @@ What has no row of its own counts to the room around it.
 """
 
 LIBRARIES = {
+    "viser": ("operator_side/console",),
+    "websockets": ("operator_side/console",),
     "zmq": ("common/sockets", "feelahead/benchmarks/link/peers.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
