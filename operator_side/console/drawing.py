@@ -195,7 +195,6 @@ class Drawing:
         elif self._label.text != text or not np.array_equal(self._label.position, position):
             self._label.text, self._label.position, self._label.visible = text, position, True
 
-
     def _place_of(self, index: int) -> Floats:
         """The middle (3,) of an object's first shape: its own frame may be anywhere."""
         shapes = () if self._shapes is None else self._shapes.shapes
