@@ -129,6 +129,7 @@ class Drawing:
         )
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.scene.configure_default_lights(enabled=False)
+        server.scene.configure_environment_map(None)
         server.scene.add_light_ambient("/light", intensity=0.9)
         server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
 

@@ -95,6 +95,8 @@ What has no row of its own counts to the room around it.
 """
 
 LIBRARIES = {
+    "viser": ("operator_side/console",),
+    "websockets": ("operator_side/console",),
     "zmq": ("common/sockets", "feelahead/benchmarks/link/peers.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
