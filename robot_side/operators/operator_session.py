@@ -113,7 +113,9 @@ class OperatorSession:
         elif isinstance(message, Tune):
             if arrival.fresh and message.number > participant.tuned:
                 participant.tuned = message.number
-                self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+                granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+                if granted and message.link is not None:
+                    participant.link.expect_other_delay()
         elif arrival.fresh:
             self._announcements.answer(participant, now_s)
 
