@@ -212,6 +212,7 @@ class _Loop:
     def _move(self, now_s: float) -> None:
         self._pacer.begin(now_s)
         follow_pages(self._pages, self._core, now_s)
+        # Before anything else is sent: the wish arrives after all that took the old way.
         if (words := self._core.tuner.take_link()) is not None:
             self._link = tuned_link(self._link, words)
             self._line.change(self._link.profile("to_robot"))

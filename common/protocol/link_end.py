@@ -100,6 +100,10 @@ class LinkEnd:
             last_held_s=now_s - self._last_received_s if overtaken else None,
         )
 
+    def expect_other_delay(self) -> None:
+        """The peer's link was changed on purpose: what queues is judged by what comes from now on."""
+        self._queueing.reset()
+
     def arrived(self, message: AnyMessage, now_s: float) -> Arrival:
         """Measure and order one message from the peer."""
         header = message.header

@@ -163,15 +163,15 @@ class Loopback:
 
     def _operator_tick(self, now_s: float) -> None:
         follow_pages(self.pages, self.operator, now_s)
+        if (words := self.operator.tuner.take_link()) is not None:
+            self._there = tuned_link(self._there, words)
+            self._to_robot.change(self._there.profile("to_robot"))
         self.person.tick(now_s, self.operator.screen, self.operator.link.round_trip.mean or 0.0)
         self.connection.update(now_s)
         if (report := self.connection.read(now_s)) is not None:
             self.operator.read_report(report, now_s)
         for payload in self.operator.motion(now_s):
             self._to_robot.push(now_s, payload)
-        if (words := self.operator.tuner.take_link()) is not None:
-            self._there = tuned_link(self._there, words)
-            self._to_robot.change(self._there.profile("to_robot"))
 
     def _robot_tick(self, now_s: float) -> None:
         start_s = _WALL.now()

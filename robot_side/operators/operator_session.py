@@ -124,7 +124,9 @@ class OperatorSession:
             self._announcements.answer(participant, now_s)
         elif message.number > participant.tuned:
             participant.tuned = message.number
-            self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+            granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+            if granted and message.link is not None:
+                participant.link.expect_other_delay()
 
     def update(self, now_s: float) -> None:
         """Let go of whoever has been silent for too long; to be called in every tick."""

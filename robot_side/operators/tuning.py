@@ -37,18 +37,16 @@ class Tuning:
         if self._start_s is None:
             self._start_s = now_s
 
-    def take(self, tune: Tune, now_s: float, *, owns: bool) -> None:
-        """One wish, of the owner if `owns`: granted whole or not at all."""
+    def take(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
+        """One wish, of the owner if `owns`: granted whole or not at all; whether it was."""
         if self._expect is None or not owns:
             why = "only the owner may" if self.permitted else "valid with: --permit-tuning"
-            self._refuse(why)
-            return
+            return self._refuse(why)
         try:
             if tune.link is not None:
                 tunable_profile(tune.link)
         except ConfigurationError as error:
-            self._refuse(str(error))
-            return
+            return self._refuse(str(error))
         if tune.probability is not None and tune.probability != self.probability:
             self._expect(tune.probability)
             self.probability = tune.probability
@@ -59,12 +57,14 @@ class Tuning:
         self._notes.append(f"tuned: {', '.join(words) or 'nothing'}")
         time_s = 0.0 if self._start_s is None else now_s - self._start_s
         self._granted.append({"time_s": time_s, "probability": tune.probability, "link": tune.link})
+        return True
 
-    def _refuse(self, why: str) -> None:
+    def _refuse(self, why: str) -> bool:
         self.refused += 1
         if why != self._refused_because:  # one line, however often somebody asks
             self._refused_because = why
             self._notes.append(f"tuning refused: {why}")
+        return False
 
     def take_link(self) -> str | None:
         """The link that was asked for since the last call, for the side's own line; None for none."""

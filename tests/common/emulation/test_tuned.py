@@ -1,0 +1,106 @@
+"""What may be changed of a link while a run goes on, and a line that changes."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.emulation.delay_line import DelayLine
+from common.emulation.profile import LinkProfile
+from common.emulation.spec import LinkSpec
+from common.emulation.tuned import tunable_profile, tuned_link
+from common.errors import ConfigurationError
+
+
+@pytest.mark.parametrize(
+    ("words", "delay_s", "jitter_s", "loss"),
+    [
+        ("", 0.0, 0.0, 0.0),
+        ("delay 50ms", 0.05, 0.0, 0.0),
+        ("delay 400ms 50ms distribution normal loss 10%", 0.4, 0.05, 0.1),
+        ("loss 2.5%", 0.0, 0.0, 0.025),
+    ],
+)
+def test_delay_jitter_and_loss_are_tuned(words: str, delay_s: float, jitter_s: float, loss: float) -> None:
+    profile = tuned_link(LinkSpec.parse("delay 1s loss 50%", seed=3), words).profile("to_robot")
+    assert (profile.delay_s, profile.jitter_s) == (delay_s, jitter_s)
+    assert (0.0 if profile.loss is None else profile.loss.share()) == loss
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "delay 501ms",
+        "delay 10ms 101ms",
+        "loss 21%",
+        "trace /etc/passwd",
+        "delay 10ms 1ms distribution /etc/passwd",
+        "delay 10ms 1ms distribution 7/etc/passwd",
+        "slot distribution normal 1ms 1ms",
+        "outage 2s at 1s",
+        "rate 1bit",
+        "limit 1",
+        "to_robot: delay 1ms",
+        "loss state 1%",
+        "wifi",
+        "delay",
+        "delay -1ms",
+        "'",
+    ],
+)
+def test_nothing_else_is(words: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        tunable_profile(words)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.text(max_size=50))
+def test_whatever_is_asked_for_is_granted_or_refused_in_words(words: str) -> None:
+    try:
+        profile = tunable_profile(words)
+    except ConfigurationError:
+        return
+    assert profile.delay_s <= 0.5
+    assert profile.trace is None
+
+
+def test_streams_keep_what_was_asked_for_them() -> None:
+    link = LinkSpec.parse("to_robot: delay 20ms; haptics: delay 30ms; video: rate 2mbit", 1, "stream")
+    tuned = tuned_link(link, "delay 5ms")
+    assert tuned.profile("to_robot").delay_s == tuned.profile("to_operator").delay_s == 0.005
+    assert tuned.profile("to_operator", "video").rate == link.profile("to_operator", "video").rate
+    assert tuned.profile("to_robot").model == "stream"
+
+
+def test_what_waits_leaves_when_it_was_due_and_what_comes_follows_the_new_profile() -> None:
+    line: DelayLine[bytes] = DelayLine(LinkProfile.parse("delay 100ms"))
+    line.push(0.0, b"old")
+    line.change(LinkProfile.parse("delay 10ms"))
+    line.push(0.001, b"new")
+    assert line.pop(0.0111) == [b"new"]
+    assert line.pop(0.0999) == []
+    assert line.pop(0.1) == [b"old"]
+    assert line.figures.sent == 2
+    assert line.summary()["asked"] == "delay 10ms"
+
+
+def test_a_line_that_changes_to_the_same_goes_on_as_it_was() -> None:
+    one, other = (DelayLine[int](LinkProfile.parse("delay 50ms 10ms distribution normal loss 10%", 5)) for _ in "ab")
+    for step in range(1000):
+        one.push(1e-3 * step, step)
+        other.push(1e-3 * step, step)
+        other.change(one.profile)
+    assert one.pop(2.0) == other.pop(2.0)
+
+
+def test_loss_begins_and_ends_with_its_profile() -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile())
+    for words, share in (("", 0.0), ("loss 20%", 0.2), ("", 0.0)):
+        line.change(LinkProfile.parse(words))
+        got = 0
+        for _ in range(10):
+            for step in range(500):
+                line.push(0.0, step)
+            got += len(line.pop(0.0))
+        assert math.isclose(got / 5000, 1.0 - share, abs_tol=0.03)
