@@ -39,7 +39,7 @@ def operator_facts(
     fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
     if felt is not None:
         back, forth = (travel or 0.0 for travel in pulled[::order])
-        needed = [*core.haptics.needed_m(felt, (back, forth), now_s)][::order]
+        needed = list(core.haptics.needed_m(felt, (back, forth), now_s)[::order])
     raw = (0.0, 0.0) if core.intent is None else core.intent.raw
     triggers = []
     for k, (effect, rendered) in enumerate(

@@ -6,6 +6,7 @@ here ──▶ operator side    a the address, w how many pages are open, h hand
 
 import contextlib
 import logging
+import math
 import os
 import secrets
 import socket
@@ -30,6 +31,8 @@ _NICENESS: Final = 5
 _FRAME: Final = struct.Struct("<Bd")
 """Before a picture: its view, and when it was taken, on the robot side's clock."""
 _MOST_LISTED: Final = 6
+_SLOW_PERIOD_S: Final = 0.25
+"""Between two drawings for a browser without a graphics processor."""
 _ROLES: Final = ("obstacle", "target", "support", "ignored")
 
 
@@ -42,6 +45,8 @@ class _Process:
         self._shapes: SceneShapes | None = None
         self._ended = threading.Event()
         self._drawing: Any = None
+        self._pages: Any = None
+        self._drawn_s = -math.inf
 
     def run(self, port: int) -> None:
         """Serve until the channel ends; what makes it impossible is said through it."""
@@ -131,8 +136,10 @@ class _Process:
 
     def _show_scene(self, state: SceneState) -> None:
         facts, names = self._facts, () if self._shapes is None else self._shapes.objects
-        needed_m = (None, None) if facts is None else (facts.l2.needed_m, facts.r2.needed_m)
-        self._drawing.state(state, needed_m, "R2" if facts is None else facts.advancing)
+        if not self._pages.slow or abs(state.taken_s - self._drawn_s) >= _SLOW_PERIOD_S:
+            self._drawn_s = state.taken_s
+            needed_m = (None, None) if facts is None else (facts.l2.needed_m, facts.r2.needed_m)
+            self._drawing.state(state, needed_m, "R2" if facts is None else facts.advancing)
         total_l2, total_r2 = (sum(row[column] for row in state.overlaps) for column in (1, 2))
         listed = sorted(state.overlaps, key=lambda row: -max(row[1], row[2]))[:_MOST_LISTED]
         known = {index for index, _, _ in listed}

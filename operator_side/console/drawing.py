@@ -20,7 +20,13 @@ R2_COLOR: Final = (230, 130, 0)
 """Blue and orange, which every eye tells apart; the page's style has the same."""
 _HALF_TINTED_M3: Final = 2e-6
 """An overlap that colours an object half."""
-_GHOST_OPACITY: Final = 0.10
+_GHOST_OPACITY: Final = 0.16
+_SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
+"""The first look at the tool is from here, relative to it."""
+_LIGHT_FROM: Final = (0.4, -1.0, 1.5)
+_FIELD_OF_VIEW: Final = 0.9
+"""In radians."""
+_STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _GONE: Final = 1e-6
 """The size of what is not to be seen."""
 
@@ -122,7 +128,9 @@ class Drawing:
             _Ghost(server.scene, "/felt by R2", R2_COLOR),
         )
         server.gui.configure_theme(show_logo=False, show_share_button=False)
-        server.scene.configure_default_lights(cast_shadow=False)
+        server.scene.configure_default_lights(enabled=False)
+        server.scene.add_light_ambient("/light", intensity=0.9)
+        server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
 
     def shapes(self, shapes: SceneShapes) -> None:
         """Build what there is, unless it is there."""
@@ -131,7 +139,7 @@ class Drawing:
         for batch in self._batches:
             batch.remove()
         self._shapes, self._looked = shapes, False
-        self._objects = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(shapes.objects), 1))
+        self._objects = np.tile(np.array(_STILL), (len(shapes.objects), 1))
         alike: dict[Any, tuple[Solid, list[tuple[Shape, Any]]]] = {}
         for shape in shapes.shapes:
             if shape.owner < len(shapes.links if shape.of_robot else shapes.objects):
@@ -171,7 +179,8 @@ class Drawing:
             self._looked = True
             tool = np.array(state.tool_pose[:3])
             self._server.initial_camera.look_at = tool
-            self._server.initial_camera.position = tool + np.array([0.75, -0.75, 0.45])
+            self._server.initial_camera.position = tool + np.array(_SEEN_FROM_M)
+            self._server.initial_camera.fov = _FIELD_OF_VIEW
 
     def _place_label(self, shapes: SceneShapes, roles: NDArray[np.uint8]) -> None:
         targets = np.flatnonzero(roles == ROLES.index("target"))
@@ -179,11 +188,18 @@ class Drawing:
             if self._label is not None:
                 self._label.visible = False
             return
-        text, position = f"target: {shapes.objects[targets[0]]}", self._objects[targets[0], :3]
+        text, position = f"target: {shapes.objects[targets[0]]}", self._place_of(int(targets[0]))
         if self._label is None:
             self._label = self._server.scene.add_label("/target", text, position=position, anchor="bottom-center")
         elif self._label.text != text or not np.array_equal(self._label.position, position):
             self._label.text, self._label.position, self._label.visible = text, position, True
+
+
+    def _place_of(self, index: int) -> Floats:
+        """The middle (3,) of an object's first shape: its own frame may be anywhere."""
+        shapes = () if self._shapes is None else self._shapes.shapes
+        pose = next((shape.pose for shape in shapes if shape.owner == index and not shape.of_robot), _STILL)
+        return compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:

@@ -53,23 +53,26 @@ class Gate:
     def headers(self, place: str) -> dict[str, str]:
         """What goes with an answer for `place`: it is kept nowhere, framed nowhere else, and asks nobody else.
 
-        viser's page is one file that unpacks itself, and starts a worker of WebAssembly.
+        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Ours shows it from the other
+        of our two names, as another site: it then has a process of its own in the browser, and no way into ours.
         """
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
+        sites = " ".join(f"http://{host}" for host in self._hosts)
+        scene = place.startswith(f"{SCENE}/")
         policy = (
             f"default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:;"
             f" style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:;"
             f" connect-src 'self' data: blob: {sockets}"
-            if place.startswith(f"{SCENE}/")
-            else f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; frame-src 'self';"
-            f" connect-src 'self' {sockets}"
+            if scene
+            else f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
+            f" frame-src {sites}; connect-src 'self' {sockets}"
         )
-        return {
-            "Content-Security-Policy": f"{policy}; frame-ancestors 'self'; base-uri 'none'; form-action 'none'",
+        ancestors, framing = (sites, {}) if scene else ("'none'", {"X-Frame-Options": "DENY"})
+        return framing | {
+            "Content-Security-Policy": f"{policy}; frame-ancestors {ancestors}; base-uri 'none'; form-action 'none'",
             "Referrer-Policy": "no-referrer",
-            "X-Frame-Options": "SAMEORIGIN",
             "X-Content-Type-Options": "nosniff",
             "Cross-Origin-Opener-Policy": "same-origin",
-            "Cross-Origin-Resource-Policy": "same-origin",
+            "Cross-Origin-Resource-Policy": "cross-origin" if scene else "same-origin",
             "Cache-Control": "no-store",
         }

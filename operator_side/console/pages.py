@@ -16,16 +16,24 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket's own codes: try again later; policy violation."""
 
+ROUND_ENDS: Final = '{"kind":"end"}'
+"""A page answers it with `taken`."""
+
 Heard = Callable[[str, bytes], None]
 """Called with `h` or `t` and MessagePack of `{"page": number, "hands" or "tune": what the page said}`. A page that is
 gone says `hands` of nil."""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a page may say, as JSON; what is in the two is not ours to judge."""
+    """What a page may say, as JSON; what is in the first two is not ours to judge."""
 
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
+    slow: bool | None = None
+    """Whether its browser draws the scene without a graphics processor"""
+    taken: bool | None = None
+    """All up to the last ROUND_ENDS has been looked at: the next round may come. Browsers store what a page has no time
+    for, without a bound, so that it would see everything, later and later."""
 
 
 class _Page:
@@ -35,16 +43,20 @@ class _Page:
         self.newest: dict[str, bytes | str] = {}
         self.notes: deque[str] = deque(maxlen=_MOST_NOTES)
         self.something = asyncio.Event()
+        self.taken = asyncio.Event()
+        self.slow = False
 
     async def send(self, connection: ServerConnection) -> None:
         while True:
             await self.something.wait()
             self.something.clear()
-            while self.notes:
-                await connection.send(self.notes.popleft())
-            while self.newest:
-                # Of a kind that comes meanwhile only the newest is left; the others still have their turn.
-                await connection.send(self.newest.pop(next(iter(self.newest))))
+            self.taken.clear()
+            this_round = [*self.notes, *self.newest.values()]
+            self.notes.clear()
+            self.newest.clear()
+            for message in (*this_round, ROUND_ENDS):
+                await connection.send(message)
+            await self.taken.wait()
 
 
 class Pages:
@@ -58,6 +70,11 @@ class Pages:
         self._number = 0
         self._lasting: dict[str, bytes | str] = {}
         self._notes: deque[str] = deque(maxlen=_MOST_NOTES)
+
+    @property
+    def slow(self) -> bool:
+        """Whether one of them draws the scene slowly."""
+        return any(page.slow for page in self._pages.values())
 
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
         """Send this, text or bytes, instead of what of this kind has not left yet; `lasting`: to later pages, too."""
@@ -88,7 +105,7 @@ class Pages:
         self._changed(len(self._pages))
         sending = asyncio.create_task(self._send(page, connection))
         try:
-            await self._listen(number, connection)
+            await self._listen(number, page, connection)
         except ConnectionClosed:
             pass
         finally:
@@ -103,7 +120,7 @@ class Pages:
         except ConnectionClosed:
             return  # whoever listens to it notices, too
 
-    async def _listen(self, number: int, connection: ServerConnection) -> None:
+    async def _listen(self, number: int, page: _Page, connection: ServerConnection) -> None:
         loop = asyncio.get_running_loop()
         since_s, count = loop.time(), 0
         async for message in connection:
@@ -118,6 +135,10 @@ class Pages:
             if said is None or count > _A_SECOND:
                 await connection.close(_NOT_OURS)
                 return
+            if said.taken is not None:
+                page.taken.set()
+            if said.slow is not None:
+                page.slow = said.slow
             if said.hands is not None:
                 self._heard("h", msgspec.msgpack.encode({"page": number, "hands": said.hands}))
             if said.tune is not None:

@@ -26,4 +26,4 @@ def compose(outer: Floats, inner: Floats) -> Floats:
 def approach(tool_pose: tuple[float, ...]) -> Floats:
     """The z axis (3,) of the tool."""
     turn = np.array(tool_pose[3:])[np.newaxis]
-    return rotated(turn, np.array([[0.0, 0.0, 1.0]]))[0]
+    return rotated(turn, np.array([[0.0, 0.0, 1.0]])).reshape(3)

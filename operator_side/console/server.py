@@ -30,7 +30,7 @@ _TYPES: Final[Mapping[str, str]] = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
 }
-_HIDES_PANEL: Final = b"<style>.mantine-Paper-root, .mantine-ActionIcon-root { display: none !important }</style>"
+_HIDES_PANEL: Final = b"<style>.mantine-Paper-root, .mantine-Notification-root { display: none !important }</style>"
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 ProcessRequest = Callable[[ServerConnection, Request], Response | None]
@@ -112,7 +112,7 @@ class Server:
             headers = Headers(Host=request.headers["Host"])  # without gzip
             response = visers(connection, Request(place.removeprefix(SCENE), headers))
             if response is not None and response.status_code == HTTPStatus.OK:
-                body = response.body.replace(b"</head>", _HIDES_PANEL + b"</head>", 1)
+                body = bytes(response.body).replace(b"</head>", _HIDES_PANEL + b"</head>", 1)
                 return self._file(place, response.headers["Content-Type"], body)
         elif place in self._files:
             return self._file(place, *self._files[place])

@@ -14,7 +14,7 @@ const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
-  delay: new Chart(byId("delay_chart"), "delay", "ms", [["to the operator", "--l2"], ["to the robot", "--r2", [5, 3]]]),
+  delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
   overlap: new Chart(byId("overlap_chart"), "overlap", "mm³", [["L2", "--l2"], ["R2", "--r2", [5, 3]]]),
   stiffness: new Chart(byId("stiffness_chart"), "stiffness", "", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 1),
   tick: new Chart(byId("tick_chart"), "robot tick", "µs", [["p50", "--l2"], ["p99", "--r2", [5, 3]]]),
@@ -24,6 +24,9 @@ let heardMs = performance.now();
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
+let drawn = true;
+const frame = document.querySelector("#scene iframe");
+const slow = drawsSlowly();
 let run = { title: "", live: true, tunable: [] };
 
 const send = (object) => {
@@ -40,6 +43,7 @@ function connect() {
     if (typeof data === "string") receive(JSON.parse(data));
     else views[new DataView(data).getUint8(0)]?.receive(data);
   };
+  socket.onopen = () => send({ slow });
   socket.onclose = ({ reason }) => {
     closedBecause = reason || "its process has ended, or this page may not see it";
     setTimeout(connect, RETRY_MS);
@@ -47,7 +51,8 @@ function connect() {
 }
 
 function receive(message) {
-  if (message.kind === "facts") showFacts(message);
+  if (message.kind === "end") send({ taken: true });
+  else if (message.kind === "facts") showFacts(message);
   else if (message.kind === "scene") showScene(message);
   else if (message.kind === "note") showNote(message.text);
   else if (message.kind === "run") {
@@ -88,8 +93,8 @@ function showFacts(message) {
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
   charts.delay.add([facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
-  charts.delay.said = [facts.to_robot.asked && `asked to the robot: ${facts.to_robot.asked}`,
-    facts.to_operator.asked && `asked to the operator: ${facts.to_operator.asked}`].filter(Boolean).join("; ");
+  const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
+  charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
   charts.stiffness.add([facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
 }
@@ -102,10 +107,32 @@ function stateOf(view, status) {
   return status.state === "disarmed" ? "disarmed" : "starting";
 }
 
+byId("drawn").onclick = ({ currentTarget }) => {
+  drawn = !drawn;
+  currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
+  currentTarget.setAttribute("aria-pressed", drawn);
+  frame.hidden = !drawn;
+  if (!drawn) frame.removeAttribute("src");
+};
+
+// Without a graphics processor the drawing takes processor time from everything else: it is then drawn less often.
+function drawsSlowly() {
+  const context = document.createElement("canvas").getContext("webgl");
+  const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
+  return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
+}
+
+// Under our other name the scene is another site, with a process of its own: drawing it slows nothing here.
+function sceneAddress() {
+  const address = new URL("scene/", location.href);
+  address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
+  if (matchMedia("(prefers-color-scheme: dark)").matches) address.search = "darkMode";
+  return address.href;
+}
+
 function showScene(scene) {
-  const frame = document.querySelector("#scene iframe");
   // Only now does viser know where to look at the scene from.
-  if (!frame.src) frame.src = `scene/${matchMedia("(prefers-color-scheme: dark)").matches ? "?darkMode" : ""}`;
+  if (drawn && !frame.src) frame.src = sceneAddress();
   charts.overlap.add(scene.overlap_mm3);
   charts.tick.add(scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {

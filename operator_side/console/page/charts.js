@@ -23,6 +23,12 @@ export class Chart {
     while (this.#samples[0][0] < nowMs - SPAN_MS) this.#samples.shift();
   }
 
+  #fitting(context, words, width) {
+    let shown = words;
+    while (shown && context.measureText(`${shown}…`).width > width) shown = shown.slice(0, -1);
+    return shown === words ? words : `${shown}…`;
+  }
+
   draw() {
     const ratio = devicePixelRatio || 1;
     const { clientWidth: width, clientHeight: height } = this.#canvas;
@@ -38,7 +44,7 @@ export class Chart {
     context.clearRect(0, 0, width, height);
     const known = this.#samples.flatMap(([, values]) => values).filter((value) => Number.isFinite(value));
     const top = this.#full ?? roundUp(Math.max(1, ...known));
-    const [left, right, upper, lower] = [4, width - 40, this.said ? 34 : 20, height - 6];
+    const [left, right, upper, lower] = [4, width - 36, 36, height - 6];
     const y = (value) => lower - ((lower - upper) * Math.min(Math.max(value, 0), top)) / top;
     const nowMs = performance.now();
     const x = (atMs) => right - ((right - left) * (nowMs - atMs)) / SPAN_MS;
@@ -58,24 +64,26 @@ export class Chart {
     context.fillStyle = color("--text");
     const title = this.#unit ? `${this.#title}, ${this.#unit}` : this.#title;
     context.fillText(title, left, 13);
-    let along = left + context.measureText(title).width + 10;
     if (this.said) {
+      const beside = left + context.measureText(title).width + 8;
       context.font = `11px ${FONT}`;
       context.fillStyle = color("--weak");
-      context.fillText(this.said, left, 27, right - left);
+      context.fillText(this.#fitting(context, this.said, width - beside), beside, 13);
     }
+    this.#canvas.title = this.said;
+    let along = left;
     this.#series.forEach(([name, hue, dash = []], index) => {
       context.strokeStyle = context.fillStyle = color(hue);
       context.lineWidth = 2;
       context.setLineDash(dash);
       context.beginPath();
-      context.moveTo(along, 9);
-      context.lineTo(along + 18, 9);
+      context.moveTo(along, 23);
+      context.lineTo(along + 18, 23);
       context.stroke();
       const newest = this.#samples.at(-1)?.[1][index];
       context.font = `11px ${FONT}`;
       const words = `${name} ${Number.isFinite(newest) ? newest.toFixed(newest < 10 ? 2 : 0) : "?"}`;
-      context.fillText(words, along + 22, 13);
+      context.fillText(words, along + 22, 27);
       along += 32 + context.measureText(words).width;
       context.beginPath();
       let drawing = false;
