@@ -1,6 +1,8 @@
 """Chromium without a screen, and a page in it whose every complaint is kept."""
 
+import base64
 import io
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,7 @@ _ARGUMENTS: Final = (
 SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 20_000
+_LOOK_S: Final = 0.02
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
 window.pretended = null;
@@ -41,6 +44,8 @@ class Browser:
         """`address` open at `size`; whatever the page complained of fails the context's end."""
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
+        from playwright.sync_api import Error  # noqa: PLC0415  # not part of our environment
+
         try:
             opened = context.new_page()
             if gamepad:
@@ -50,6 +55,8 @@ class Browser:
             yield page
             if page.complaints:
                 raise CheckFailedError(f"the page complained: {'; '.join(page.complaints[:3])}")
+        except Error as error:
+            raise CheckFailedError(f"the browser: {str(error).splitlines()[0]}") from error
         finally:
             context.close()
 
@@ -62,6 +69,7 @@ class Page:
         self.complaints: list[str] = []
         """Errors on its console and uncaught ones; a check that expects some clears them."""
         self._out = out
+        self._tools = raw.context.new_cdp_session(raw)
         raw.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
         raw.on("pageerror", lambda error: self.complaints.append(str(error)))
 
@@ -75,13 +83,13 @@ class Page:
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
         """Until JavaScript says so; CheckFailedError when it does not."""
-        try:
-            self.raw.wait_for_function(script, timeout=1e3 * limit_s, polling=20)
-        except Exception as error:
-            if type(error).__name__ != "TimeoutError":
-                raise
-            self.picture("unexpected")
-            raise CheckFailedError(f"not {what} within {limit_s:g} s") from None
+        # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
+        end_s = time.monotonic() + limit_s
+        while not self.ask(script):
+            if time.monotonic() > end_s:
+                self.picture("unexpected")
+                raise CheckFailedError(f"not {what} within {limit_s:g} s")
+            time.sleep(_LOOK_S)
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
         """Until `words` stand there, in any case."""
@@ -90,12 +98,20 @@ class Page:
 
     def pixels(self, selector: str | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """(height, width, 3) of what is drawn there, or of the whole page."""
-        shot = self.raw.screenshot() if selector is None else self.raw.locator(selector).screenshot()
-        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))
+        return np.asarray(Image.open(io.BytesIO(self._shot(selector))).convert("RGB"))
 
     def picture(self, name: str) -> None:
         """Keep a picture of the page for people."""
-        self.raw.screenshot(path=str(self._out / f"{name}.png"))
+        (self._out / f"{name}.png").write_bytes(self._shot())
+
+    def _shot(self, selector: str | None = None) -> bytes:
+        """As Chromium itself takes it: Playwright's way waits for the fonts of a scene that is busy drawing."""
+        clip = {}
+        if selector is not None:
+            box = self.raw.locator(selector).bounding_box()
+            clip = {"clip": {**box, "scale": 1}}
+        answer = self._tools.send("Page.captureScreenshot", {"format": "png", **clip})
+        return base64.b64decode(answer["data"])
 
     def updates_per_second(self, selector: str, seconds: float = 3.0) -> float:
         """How often what stands there, or one of its attributes, changes: drawn frames in which it did."""
