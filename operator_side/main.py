@@ -20,8 +20,11 @@ from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
+from common.recording.provenance import provenance
+from common.recording.side import SideRecording, recording_to
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
+from operator_side.assembly import build_operator_side
 from operator_side.calibration.store import calibration_path, load_calibration
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
@@ -33,6 +36,7 @@ from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.recorded import OperatorEncoder, recorded_by, recorded_status
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import Whoever, whoever
 
@@ -54,24 +58,18 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
-    core = OperatorSide(
-        secrets.randbits(53),
-        clock_domain(),
-        haptics=settings.haptics,
-        calibration=settings.calibration,
-        rendering=settings.rendering,
-        compensation=settings.compensation,
-        swap_sides=settings.swap_sides,
-        seed=settings.seed,
-        asymmetry_s=settings.asymmetry_s(),
-    )
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
         OperatorSockets(settings.connect, settings.view_connect, keys=keys) as sockets,
         StopSignal() as stop,
         Status(settings.status, "operator") as status,
+        recording_to(settings.record, "operator", OperatorEncoder()) as recording,
     ):
+        epoch = secrets.randbits(53)
+        core = build_operator_side(settings, epoch, clock_domain(), recorded_by(recording))
+        if recording is not None:
+            recording.begin(provenance(settings, epoch, clock_domain()))
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
         person: Whoever | None = None
@@ -94,6 +92,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
             loop = _Loop(settings, core, line, sockets, connection, guard, person, status, stored_travel=not given)
+            loop.recording = recording
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -102,7 +101,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             except Exception as error:
                 failure = error
         errors = [] if failure is None else [str(failure)]
-        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors}
+        kept = {} if recording is None else {"recording": recording.close()}
+        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors} | kept
         try:
             if settings.summary is not None:
                 write_json("--summary", settings.summary, summary)
@@ -137,6 +137,8 @@ class _Loop:
         stored_travel: bool,
     ) -> None:
         """`stored_travel`: take on the calibration that is stored for a controller, as none was given."""
+        self.recording: SideRecording | None = None
+        """Who keeps what happens"""
         self._stored_travel = stored_travel
         self._calibrated = 0
         self._told_travel: set[str] = set()
@@ -236,6 +238,9 @@ class _Loop:
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
+        if self.recording is not None:
+            for text in self.recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+                self._status.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S

@@ -62,12 +62,13 @@ def build_robot_side(
     scene: Scene | None = None,
     other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
+    side: Callable[..., RobotSide] = RobotSide,
 ) -> RobotSide:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
     that the settings name, so that the caller can look at it. `other_law`: makes another law of the settings' own.
-    `announce`: told once, in one line, what takes long.
+    `announce`: told once, in one line, what takes long. `side`: makes the core, as one that notes what happens to it.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -99,7 +100,7 @@ def build_robot_side(
         joint_limits,
         settings.motion,
     )
-    return RobotSide(
+    return side(
         arm if watch is None else watch(arm),
         kinematics,
         camera,

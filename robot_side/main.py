@@ -16,6 +16,7 @@ from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_descriptor_limit, raise_priority
+from common.recording.side import SideRecording, recording_to
 from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
 from common.sockets.keys import passed_over_note
@@ -26,6 +27,7 @@ from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
 from robot_side.outgoing_messages import Outgoing
+from robot_side.recorded import RobotEncoder, recorded_by, recorded_status, robot_header
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
@@ -52,11 +54,15 @@ def command(arguments: Sequence[str]) -> int:
     with (
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
+        recording_to(settings.record, "robot", RobotEncoder()) as recording,
     ):
-        core = build_robot_side(settings, secrets.randbits(53), clock_domain(), announce=status.note)
+        epoch = secrets.randbits(53)
+        core = build_robot_side(settings, epoch, clock_domain(), announce=status.note, side=recorded_by(recording))
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
+        if recording is not None:
+            recording.begin(robot_header(settings, epoch, clock_domain()))
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             for text in _admission_notes(settings, keys):
@@ -65,7 +71,7 @@ def command(arguments: Sequence[str]) -> int:
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, link, sockets, status)
+            loop = _Loop(settings, core, link, sockets, status, recording)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -75,6 +81,8 @@ def command(arguments: Sequence[str]) -> int:
                 failure = error
             # A run that failed has figures, too.
             summary = loop.summary() | core.summary() | {"errors": [] if failure is None else [str(failure)]}
+            if recording is not None:
+                summary["recording"] = recording.close()
             try:
                 if settings.summary is not None:
                     write_json("--summary", settings.summary, summary)
@@ -102,8 +110,15 @@ class _Loop:
     """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
 
     def __init__(
-        self, settings: RobotSettings, core: RobotSide, link: LinkSpec, sockets: RobotSockets, status: Status
+        self,
+        settings: RobotSettings,
+        core: RobotSide,
+        link: LinkSpec,
+        sockets: RobotSockets,
+        status: Status,
+        recording: SideRecording | None,
     ) -> None:
+        self._recording = recording
         self._duration_s = settings.duration
         self._core = core
         self._sockets = sockets
@@ -195,6 +210,9 @@ class _Loop:
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no tick should wait for."""
+        if self._recording is not None:
+            for text in self._recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+                self._status.note(text)
         if self._status.due(now_s):
             self._status.show(now_s, self._core.status(now_s) | self._paced())
         if now_s >= self._next_keys_s:
