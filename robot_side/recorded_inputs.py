@@ -125,9 +125,9 @@ def _packed(values: Any, last: Any) -> list[bytes]:
 class FrameUnpacker:
     """Frames from what is new in them."""
 
-    def __init__(self, mesh_library: Any = None) -> None:
-        """mesh_library: the shapes of the scene's meshes, which do not change and are not recorded."""
-        self._mesh_library = mesh_library
+    def __init__(self, scene: PerceivedObjects) -> None:
+        """scene: any frame of the same scene: the shapes of its meshes do not change and are not recorded."""
+        self._scene = scene
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
@@ -147,11 +147,13 @@ class FrameUnpacker:
             names = msgspec.msgpack.decode(content[position - length : position], type=tuple[str, ...])
         else:
             names = last.names
+        if names != self._scene.names:
+            raise ValueError("a frame of other objects than the scene's")
         roles = tuple(_ROLES[role] for role in content[position:])
         if len(roles) != len(names):
             raise ValueError(f"a frame with {len(roles)} roles of {len(names)} objects")
         self._last = PerceivedObjects(
-            time_s=time_s, names=names, roles=roles, mesh_library=self._mesh_library, **arrays
+            time_s=time_s, names=names, roles=roles, mesh_library=self._scene.mesh_library, **arrays
         )
         return self._last
 

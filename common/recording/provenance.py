@@ -27,7 +27,7 @@ def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
         "clock_domain": clock_domain,
         "settings": msgspec.to_builtins(told, enc_hook=_plain),
         "versions": {"python": platform.python_version(), **_versions()},
-        "processor": _processor(),
+        "processor": processor_name(),
         "system": f"{platform.system()} {platform.machine()}",
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
@@ -57,7 +57,8 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _processor() -> str:
+def processor_name() -> str:
+    """What the machine calls its processor: other ones may round otherwise."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
