@@ -42,7 +42,7 @@ def mend(path: Path, out: Path) -> int:
                             record.publish_time,
                             record.sequence,
                         )
-            writer.finish()
+            writer.finish()  # type: ignore[no-untyped-call]
     except FileExistsError as error:
         raise ConfigurationError(f"--out {out}: is there already; valid: a path where nothing is yet") from error
     except OSError as error:

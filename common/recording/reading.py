@@ -43,6 +43,10 @@ class Recording:
     whole: bool
     """Whether it was finished; else it ends at the last complete second"""
 
+    def began_ns(self) -> int:
+        """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
+        return next((message.log_ns for message in self.messages()), 0)
+
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
         """Every message in the file's order, which is nearly that of time; of `topics` only, if any are named."""
         from mcap.records import Channel  # noqa: PLC0415

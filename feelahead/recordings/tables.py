@@ -86,6 +86,10 @@ class Tables:
     duration_s: float
     by_name: Mapping[str, Table]
 
+    def table(self, name: str) -> Table:
+        """One of them; an empty one where there is none."""
+        return self.by_name.get(name) or Table()
+
     def joined(self, rate_hz: float = JOINED_HZ) -> Table:
         """One table at an even rate: at each moment the newest of everything, as someone looking then would see."""
         times_s = np.arange(0.0, self.duration_s, 1.0 / rate_hz)
@@ -96,20 +100,17 @@ class Tables:
                 continue
             blank = dict.fromkeys(f"{name}.{column}" for column in table.columns() if column not in _STAMPS)
             for row, found in zip(rows, table.before(times_s), strict=True):
-                row |= blank
-                row |= {f"{name}.{column}": value for column, value in found.items() if column not in _STAMPS}
+                row.update(blank)
+                row.update((f"{name}.{column}", value) for column, value in found.items() if column not in _STAMPS)
         return Table(times_s.tolist(), rows)
 
 
 def read_tables(recording: Recording) -> Tables:
     """Read everything but pictures and scenes."""
     tables: dict[str, Table] = {}
-    first_ns: int | None = None
-    last_ns = 0
-    zones = {"l2": _NO_ZONES, "r2": _NO_ZONES}
+    first_ns = last_ns = recording.began_ns()
+    zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
     for message in recording.messages((*_TOPICS, "/robot/inputs", "/operator/inputs")):
-        # A block is stamped with its end.
-        first_ns = message.log_ns if first_ns is None else first_ns
         last_ns = max(last_ns, message.log_ns)
         time_s = _NANOSECONDS * (message.log_ns - first_ns)
         if not message.topic.endswith("/inputs"):
@@ -119,11 +120,12 @@ def read_tables(recording: Recording) -> Tables:
             continue
         block = unpack_block(message.content)
         for entry in block.unpacked():
+            # A block is stamped with its end.
             if (found := _row(entry, zones)) is not None:
                 tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.last_s, found[1])
     sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
-    duration_s = _NANOSECONDS * (last_ns - (first_ns or 0))
-    return Tables(_NANOSECONDS * (first_ns or 0), duration_s, sorted_tables)
+    duration_s = _NANOSECONDS * (last_ns - first_ns)
+    return Tables(_NANOSECONDS * first_ns, duration_s, sorted_tables)
 
 
 def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[str, Any]] | None:
