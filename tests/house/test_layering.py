@@ -24,8 +24,9 @@ ARROWS = """
     common/protocol: common common/timing
     common/realtime: common
     common/companion:
+    common/recording: common common/companion common/protocol
     common/sockets: common common/files
-    common/command: common common/emulation common/files
+    common/command: common common/emulation common/files common/recording
 
     robot_side/compiled: common
     robot_side/overlap/checks: common robot_side/compiled
@@ -51,8 +52,8 @@ ARROWS = """
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
-    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled robot_side/enlargement
+    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
@@ -73,8 +74,8 @@ ARROWS = """
         operator_side/simulated_person
     operator_side/console: common common/command common/companion common/protocol operator_side/facts.py
         operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        operator_side/calibration operator_side/console operator_side/dualsense/effects operator_side/dualsense/hid
+    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects operator_side/dualsense/hid
         operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/facts.py operator_side/feel
         operator_side/hands operator_side/page_hands operator_side/simulated_person operator_side/terminal_view
 
@@ -85,7 +86,9 @@ ARROWS = """
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
+    feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/commands: common/* operator_side/* feelahead/both_sides feelahead/benchmarks/* feelahead/experiments/*
+        feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of
@@ -113,6 +116,7 @@ LIBRARIES = {
     ),
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
+        "common/recording/recorder.py",
         "robot_side/main.py",
         "robot_side/cameras",
         "robot_side/compiled/warm_up.py",
