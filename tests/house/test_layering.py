@@ -75,9 +75,10 @@ ARROWS = """
     operator_side/console: common common/command common/companion common/protocol operator_side/facts.py
         operator_side/dualsense/reports
     operator_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
-        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects operator_side/dualsense/hid
-        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/facts.py operator_side/feel
-        operator_side/hands operator_side/page_hands operator_side/simulated_person operator_side/terminal_view
+        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
+        operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
+        operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands
+        operator_side/simulated_person operator_side/terminal_view
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
