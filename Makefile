@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel test-netem test-two-hosts test-containers latency-experiment soak lock clean
+.PHONY: demo test quick types test-kernel test-netem test-two-hosts test-containers test-console latency-experiment soak lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -60,6 +60,10 @@ test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, be
 # Needs Docker; in CI, root gets Debian's for the time being. It says so and is skipped elsewhere.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
 	$(BIN)/python -m tests.containers $(ARGS)
+
+# Needs Chromium; in CI, root gets Debian's. It says so and is skipped elsewhere.
+test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real browser, clicked through; its pictures: console-pictures
+	$(BIN)/python -m tests.console $(ARGS)
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand

@@ -22,6 +22,14 @@ class MonotonicClock:
         return time.monotonic()
 
 
+class ThreadClock:
+    """What this thread has computed: it stands still while the machine does something else."""
+
+    def now(self) -> float:
+        """Seconds of processor time since the thread's start."""
+        return time.thread_time()
+
+
 class VirtualClock:
     """A clock that stands still until it is told otherwise, for both sides in one process."""
 

@@ -68,20 +68,21 @@ class OperatorSide:
         self._calibration = calibration or TravelCalibration()
         self._compensation: Compensation = compensation
         self._swap_sides = swap_sides
-        self._haptics = Haptics(
+        self.haptics = Haptics(
             rendering or RenderingSettings(),
             self._calibration,
             enabled=haptics,
             swap_sides=swap_sides,
             compensation=compensation,
         )
+        """What the fingers are told, and why."""
         self.stop_button = StopButton()
         self.tuner = Tuner()
         self._blindness = Blindness()
         self._standing = Standing()
         self._intent: OperatorIntent | None = None
         self._intent_s = 0.0
-        self._stiffness_s = 0.0
+        self.stiffness_s = 0.0
         self._hello_s = -math.inf
         self._screen_order = (-1, -1)
         self._lost_s: float | None = None
@@ -127,7 +128,7 @@ class OperatorSide:
             if arrival.fresh:
                 self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
                 self._blindness.end()
-                self.stiffness, self._stiffness_s = message, now_s
+                self.stiffness, self.stiffness_s = message, now_s
                 self._has_been_armed |= message.state == "armed"
                 if arrival.one_way_s is not None:
                     self.applied_age.add(arrival.one_way_s)
@@ -168,12 +169,12 @@ class OperatorSide:
         """Read the triggers and sticks of the controller that has just been found through `calibration`."""
         if calibration != self._calibration:
             self._calibration = calibration
-            self._haptics.calibrate(calibration)
+            self.haptics.calibrate(calibration)
 
     def controller_found(self, now_s: float) -> None:
         """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
         del now_s
-        self._haptics.controller_found()
+        self.haptics.controller_found()
 
     def controller_lost(self, now_s: float) -> None:
         """The controller went: what the hands did last counts no more, and not again before the arm has stopped."""
@@ -183,13 +184,13 @@ class OperatorSide:
         """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
         self._look(now_s)
         self._standing.expire(now_s)
-        linked = self.stiffness is not None and now_s - self._stiffness_s < 2 * HEARTBEAT_PERIOD_S
+        linked = self.stiffness is not None and now_s - self.stiffness_s < 2 * HEARTBEAT_PERIOD_S
         payloads = []
         command = self._command(now_s)
         if self._standing.owns:
-            self._haptics.commanded(command, now_s)
+            self.haptics.commanded(command, now_s)
         else:
-            self._haptics.forget_commands()
+            self.haptics.forget_commands()
         if command is not None:
             self.motion_sent += 1
             payloads.append(encode(command))
@@ -218,7 +219,7 @@ class OperatorSide:
 
     def _look(self, now_s: float) -> None:
         """Once the stiffness has expired there is none, and who drives is blind."""
-        if self.stiffness is not None and now_s - self._stiffness_s > STIFFNESS_EXPIRES_S:
+        if self.stiffness is not None and now_s - self.stiffness_s > STIFFNESS_EXPIRES_S:
             self.stiffness = None
             if self._standing.owns:
                 self._blindness.lose(now_s)
@@ -227,7 +228,7 @@ class OperatorSide:
         """Whether the arm may still be armed from before the controller was lost: then silence disarms it."""
         if self._lost_s is None:
             return False
-        if self.stiffness is not None and self._stiffness_s > self._lost_s and self.stiffness.state != "armed":
+        if self.stiffness is not None and self.stiffness_s > self._lost_s and self.stiffness.state != "armed":
             self._lost_s = None
         return self._lost_s is not None
 
@@ -238,7 +239,7 @@ class OperatorSide:
         if felt is not None and felt.state != "armed":
             felt = None
         pulled = (0.0, 0.0) if intent is None else (intent.l2, intent.r2)
-        return self._haptics.output_report(felt, pulled, self._blindness, now_s)
+        return self.haptics.output_report(felt, pulled, self._blindness, now_s)
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
         """What a person is shown; L2 and R2 are the controller's own, whatever the sides mean."""
@@ -259,7 +260,7 @@ class OperatorSide:
             "L2_pulled": left_pulled,
             "R2_pulled": right_pulled,
             "haptics": self._haptics_enabled,
-            "feel": self._haptics.status() if sight is Sight.SEEING else sight,
+            "feel": self.haptics.status() if sight is Sight.SEEING else sight,
             "release_first": sight is Sight.WAITING,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
@@ -280,7 +281,7 @@ class OperatorSide:
             return f"observing ({lease.place} of {lease.waiting} waiting)"
         if lease is not None and lease.session not in OWNING:
             return f"{LINK_REFUSED}{lease.why}"
-        linked = self.stiffness is not None and now_s - self._stiffness_s <= STIFFNESS_EXPIRES_S
+        linked = self.stiffness is not None and now_s - self.stiffness_s <= STIFFNESS_EXPIRES_S
         if linked and lease is not None:
             return LINK_UP
         return f"{LINK_LOST}nothing heard from the robot" if self.stiffness_received else "waiting for the robot side"
@@ -297,8 +298,8 @@ class OperatorSide:
             "lease_states": self._standing.history,
             "stops_pressed_elsewhere": self.stop_button.presses,
             "tuning": self.tuner.summary(),
-            "zones": self._haptics.rendering.zones(),
-            "rendering": self._haptics.summary() | {"blind": self._blindness.times},
+            "zones": self.haptics.rendering.zones(),
+            "rendering": self.haptics.summary() | {"blind": self._blindness.times},
             "delay_ms": {
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),

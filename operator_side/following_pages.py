@@ -2,9 +2,12 @@
 
 import functools
 
+from common.emulation.delay_line import DelayLine
+from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.facts import HandsFacts
+from operator_side.facts_of_core import Surroundings
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.settings import OperatorSettings
@@ -17,6 +20,20 @@ def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: Opera
     person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
     alone = settings.device == "browser"
     return SharedHands(device, pages, None if alone else person, calibration, swap_sides=swap_sides)
+
+
+def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
+    """Take what the pages of the console have said since the last call."""
+    console.receive()
+    while console.hands:
+        words = console.hands.popleft()
+        if words.hands is None:
+            pages.close(words.page, now_s)
+        else:
+            pages.receive(words.page, {"hands": words.hands}, now_s)
+    while console.tuning:
+        words = console.tuning.popleft()
+        pages.receive(words.page, {"tune": words.tune}, now_s)
 
 
 def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
@@ -39,4 +56,25 @@ def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSi
         doing="" if shared is None else shared.doing,
         tuning_refused=core.tuner.why,
         link_asked=core.tuner.link,
+    )
+
+
+def surroundings_of(
+    core: OperatorSide,
+    line: DelayLine[bytes],
+    pages: DrivingPage,
+    shared: SharedHands | None,
+    now_s: float,
+    *,
+    swap_sides: bool,
+) -> Surroundings:
+    """What the facts of `now_s` need besides the core; `line`: to the robot side."""
+    lease = core.lease
+    return Surroundings(
+        hands="controller" if shared is None else shared.hands,
+        asked_to_robot=line.profile.words(),
+        swap_sides=swap_sides,
+        may_tune=lease is not None and lease.may_tune,
+        probability=None if lease is None else lease.probability,
+        page=hands_facts(pages, shared, core, now_s),
     )

@@ -6,7 +6,7 @@ import secrets
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, NamedTuple
 
 from common.clock import MonotonicClock, clock_domain
 from common.command.command_line import given_fields, parse_settings, run_command
@@ -24,6 +24,7 @@ from common.realtime.priority import make_realtime, raise_priority
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.calibration.store import calibration_path, load_calibration
+from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
@@ -33,11 +34,13 @@ from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.following_pages import follow_pages, shared_hands
+from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.settings import OperatorSettings
+from operator_side.terminal_view.status import TerminalStatus
+from operator_side.viewing import Viewing, view_topics
 
 MOTION_PERIOD_S = 1 / 250
 _GUARD_PERIOD_S = 0.5
@@ -71,9 +74,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(settings.connect, settings.view_connect, keys=keys) as sockets,
+        OperatorSockets(settings.connect, settings.view_connect, topics=view_topics(settings), keys=keys) as sockets,
         StopSignal() as stop,
-        Status(settings.status, "operator") as status,
+        TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
     ):
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
@@ -91,13 +94,16 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
+            # Before our own priority is raised, which it would inherit.
+            console = Console(settings.connect, port=settings.console_port) if settings.console else None
+            surroundings = functools.partial(surroundings_of, core, line, pages, person, swap_sides=settings.swap_sides)
+            viewing = Viewing(core, surroundings, status, pages, console and stack.enter_context(console))
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
-            loop = _Loop(
-                settings, core, line, sockets, connection, guard, person, pages, status, stored_travel=not given
-            )
+            people = _People(person, pages, viewing)
+            loop = _Loop(settings, core, line, sockets, connection, guard, people, status, stored_travel=not given)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -124,6 +130,14 @@ def _find(find: Finder, preferred: str | None) -> OpenController:
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
+class _People(NamedTuple):
+    """Who is at this side, besides a real controller's hands."""
+
+    person: SharedHands | None
+    pages: DrivingPage
+    viewing: Viewing
+
+
 class _Loop:
     """Motion at absolute deadlines, messages and effects as they come."""
 
@@ -135,8 +149,7 @@ class _Loop:
         sockets: OperatorSockets,
         connection: Connection,
         guard: ReleaseGuard | None,
-        person: SharedHands | None,
-        pages: DrivingPage,
+        people: "_People",
         status: Status,
         *,
         stored_travel: bool,
@@ -152,8 +165,7 @@ class _Loop:
         self._connection = connection
         self._guard = guard
         self._guard_s = 0.0
-        self._person = person
-        self._pages = pages
+        self._person, self._pages, self._viewing = people
         self._link = settings.link_spec()
         self._status = status
         self._clock = MonotonicClock()
@@ -174,8 +186,9 @@ class _Loop:
                     break
                 for payload in received:
                     self._core.receive(payload, now_s)
-                for _, payload in seen:
-                    self._core.receive_view(payload, now_s)
+                for topic, payload in seen:
+                    if not self._viewing.take(topic, payload):
+                        self._core.receive_view(payload, now_s)
                 self._connection.beat(now_s)
                 if (output := self._core.output_report(now_s)) is not None:
                     self._connection.write(output, now_s)
@@ -209,7 +222,7 @@ class _Loop:
         self._calibrate()
         if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
-        for payload in self._core.motion(now_s):
+        for payload in [*self._core.motion(now_s), *self._viewing.requests(now_s)]:
             self._line.push(now_s, payload)
 
     def _calibrate(self) -> None:
@@ -231,20 +244,20 @@ class _Loop:
                 raise
             self._core.calibrate(TravelCalibration())
             self._told_travel.discard(controller.address)
-            self._status.note(f"{error}; its travel is read by the defaults")
+            self._viewing.note(f"{error}; its travel is read by the defaults")
             return
         self._core.calibrate(stored or TravelCalibration())
         if controller.address in self._told_travel:
             return
         self._told_travel.add(controller.address)
         if stored is None:
-            self._status.note("its travel has not been calibrated: feelahead calibrate does that")
+            self._viewing.note("its travel has not been calibrated: feelahead calibrate does that")
         else:
-            self._status.note(f"its travel calibration: {calibration_path(controller.address)}")
+            self._viewing.note(f"its travel calibration: {calibration_path(controller.address)}")
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
-            self._status.note(text)
+            self._viewing.note(text)
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
@@ -252,20 +265,28 @@ class _Loop:
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
-                self._status.note(text)
-        if self._status.due(now_s):
-            values: dict[str, Value] = dict(self._core.status(now_s))
-            if self._sockets.trouble is not None and values.get("link") != "up":
-                values["link"] = self._sockets.trouble
-            values["controller"] = self._connection.state
-            controller = self._connection.controller
-            values["triggers_released"] = None if controller is None else controller.device.released
-            if self._person is not None:
-                values["person"] = self._person.doing
-            values["motion_overruns"] = self._pacer.overruns
-            self._status.show(now_s, values)
+                self._viewing.note(text)
+        shows, tells = self._viewing.facts_due(now_s), self._status.due(now_s)
+        values = self._values(now_s) if shows or tells else {}
+        if shows:
+            self._viewing.show(values, now_s)
+        if tells:
+            self._viewing.tell(values, now_s)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
+
+    def _values(self, now_s: float) -> dict[str, Value]:
+        """What a person is shown."""
+        values: dict[str, Value] = dict(self._core.status(now_s))
+        if self._sockets.trouble is not None and values.get("link") != "up":
+            values["link"] = self._sockets.trouble
+        values["controller"] = self._connection.state
+        controller = self._connection.controller
+        values["triggers_released"] = None if controller is None else controller.device.released
+        if self._person is not None:
+            values["person"] = self._person.doing
+        values["motion_overruns"] = self._pacer.overruns
+        return values
 
 
 if __name__ == "__main__":

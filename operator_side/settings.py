@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import tyro
 
@@ -11,6 +11,8 @@ from common.protocol.messages import Compensation
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.settings import PersonSettings
+
+_LAST_PORT: Final = 65535
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,27 @@ class OperatorSettings(RunOptions):
     """Which part of the triggers' and sticks' travel counts."""
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
     """How what lies ahead becomes what the fingers feel."""
+    console: bool = False
+    """The browser console on this machine, at an address that is shown: both views, the scene, what is felt and why."""
+    console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
+    """Where it listens, on 127.0.0.1 alone; 0 for any port that is free."""
+    tui: bool = False
+    """The same on the whole terminal instead of a line, for machines without a browser; pictures aside."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """The scripted person's limits (simulated device only)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not 0 <= self.console_port <= _LAST_PORT:
+            raise ValueError(f"--console-port {self.console_port}: valid: 0 to {_LAST_PORT}")
+        if self.tui and self.status != "line":
+            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
         if self.swap_sides and self.person.pull_n is not None:
             raise ValueError("--swap-sides with --person.pull-n: valid: one of them, as the finger pulls R2 to advance")
+
+    @property
+    def tells_facts(self) -> bool:
+        """Whether all that the console shows goes to the terminal, or to a program."""
+        return self.tui or self.status == "facts"

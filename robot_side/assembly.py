@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -55,6 +56,17 @@ class SimulationObserver:
             figures.first_contact(onset.thing, onset.closing_speed_m_s, since_start_s)
 
 
+@dataclass(frozen=True)
+class Assembled:
+    """A core, and what stands around it that others look at, too."""
+
+    core: RobotSide
+    scene: Scene
+    kinematics: MujocoKinematics
+    law: SweptLaw | PaperLaw
+    """The settings' own"""
+
+
 def build_robot_side(
     settings: RobotSettings,
     epoch: int,
@@ -64,6 +76,19 @@ def build_robot_side(
     other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> RobotSide:
+    """As `assemble`: the core alone."""
+    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce).core
+
+
+def assemble(
+    settings: RobotSettings,
+    epoch: int,
+    clock_domain: str,
+    watch: Callable[[Arm], Arm] | None = None,
+    scene: Scene | None = None,
+    other_law: Callable[[Law], Law] | None = None,
+    announce: Callable[[str], None] | None = None,
+) -> Assembled:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
@@ -100,7 +125,7 @@ def build_robot_side(
         joint_limits,
         settings.motion,
     )
-    return RobotSide(
+    core = RobotSide(
         arm if watch is None else watch(arm),
         kinematics,
         camera,
@@ -120,6 +145,7 @@ def build_robot_side(
         notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
         held_covers=held_covers,
     )
+    return Assembled(core, scene, kinematics, law)
 
 
 def _notes(scene: Scene) -> tuple[str, ...]:

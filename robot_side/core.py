@@ -93,7 +93,8 @@ class RobotSide:
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
         self._centers_m: FloatArray = np.empty((0, 3))
-        self._last: tuple[Sensed, GripperPose, PerceivedObjects] | None = None
+        self.newest: tuple[Sensed, Situation] | None = None
+        """What the last tick found out, and where."""
         self._loop_age_s = RunningStatistics(seed)
         self._next_telemetry_s = -np.inf
         self._next_observers_s = -np.inf
@@ -132,21 +133,19 @@ class RobotSide:
         permission = self.session.permission(now_s)
         self._move(permission, pose, state, now_s)
         command = permission.command
-        sensed = self._law.sense(
-            Situation(
-                pose=whole,
-                joint_velocities_rad_s=state.joint_velocities_rad_s,
-                objects=objects,
-                loop_age_s=self._loop_age.value(now_s),
-                loop_age_known=self._loop_age.known,
-                compensation="operator" if command is None else command.compensation,
-                gap_m=state.gripper_opening_m if pose.sphere_on_finger.any() else None,
-                held=None if self._held is None else self._held.index,
-                lateral=(0.0, 0.0) if command is None else command.lateral,
-            ),
-            now_s,
+        situation = Situation(
+            pose=whole,
+            joint_velocities_rad_s=state.joint_velocities_rad_s,
+            objects=objects,
+            loop_age_s=self._loop_age.value(now_s),
+            loop_age_known=self._loop_age.known,
+            compensation="operator" if command is None else command.compensation,
+            gap_m=state.gripper_opening_m if pose.sphere_on_finger.any() else None,
+            held=None if self._held is None else self._held.index,
+            lateral=(0.0, 0.0) if command is None else command.lateral,
         )
-        self._last = sensed, whole, objects
+        sensed = self._law.sense(situation, now_s)
+        self.newest = sensed, situation
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
         self._record(sensed, objects, speed_m_s, permission.state == "armed", now_s)
         return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
@@ -191,8 +190,8 @@ class RobotSide:
             self._arm.command(still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
-        if self._assists and self._last is not None:
-            command = assisted(command, self._last[0].l2, self._last[0].r2)
+        if self._assists and self.newest is not None:
+            command = assisted(command, self.newest[0].l2, self.newest[0].r2)
         twist = tool_twist(command, pose.tool_rotation, self._motion)
         velocity = joint_velocities(pose.tool_jacobian, twist, self._limits.velocity_rad_s)
         given = self._limits.given(velocity, state.joint_positions_rad)
@@ -268,8 +267,8 @@ class RobotSide:
             "L2_pulled": None if command is None else command.l2,
             "R2_pulled": None if command is None else command.r2,
         }
-        if self._last is not None:
-            sensed, pose, objects = self._last
+        if self.newest is not None:
+            sensed, (pose, objects) = self.newest[0], (self.newest[1].pose, self.newest[1].objects)
             target, held = target_index(objects), None if self._held is None else self._held.index
             apart = perceived_distances(pose, objects, target, held)
             values |= {

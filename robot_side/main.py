@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from common.clock import MonotonicClock, clock_domain
+from common.clock import MonotonicClock, ThreadClock, clock_domain
 from common.command.command_line import parse_settings, run_command
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
@@ -22,18 +22,21 @@ from common.sockets.authentication import RobotKeys
 from common.sockets.keys import passed_over_note
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import Assembled, assemble
+from robot_side.cameras.pictures import Cameras
+from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
-from robot_side.outgoing_messages import Outgoing
+from robot_side.looking import Looking
+from robot_side.outgoing_messages import TOPICS, Outgoing
+from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
 
 TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2
 """How often the allow-list is looked at, so that a revoked operator is out within a second."""
 
-SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
+SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry", "video", "scene")
 
 
 def main() -> None:
@@ -54,7 +57,8 @@ def command(arguments: Sequence[str]) -> int:
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
     ):
-        core = build_robot_side(settings, secrets.randbits(53), clock_domain(), announce=status.note)
+        assembled = assemble(settings, secrets.randbits(53), clock_domain(), announce=status.note)
+        core = assembled.core
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
@@ -66,7 +70,7 @@ def command(arguments: Sequence[str]) -> int:
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, link, sockets, status)
+            loop = _Loop(settings, assembled, link, sockets, status)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -80,6 +84,7 @@ def command(arguments: Sequence[str]) -> int:
                 if settings.summary is not None:
                     write_json("--summary", settings.summary, summary)
             finally:
+                loop.close()
                 if failure is not None:
                     raise failure
     return 0
@@ -103,20 +108,29 @@ class _Loop:
     """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
 
     def __init__(
-        self, settings: RobotSettings, core: RobotSide, link: LinkSpec, sockets: RobotSockets, status: Status
+        self, settings: RobotSettings, assembled: Assembled, link: LinkSpec, sockets: RobotSockets, status: Status
     ) -> None:
         self._duration_s = settings.duration
+        self._core = core = assembled.core
         self._link = link
-        self._core = core
         self._sockets = sockets
         self._status = status
         self._clock = MonotonicClock()
+        self._computed = ThreadClock()
         self._admission = Admission()
         self._tick_time = RunningStatistics(settings.seed)
+        self._tick_cpu_time = RunningStatistics(settings.seed)
         self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
         self._lines: dict[Stream, DelayLine[Outgoing]] = {
             stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
         }
+        self._looking = Looking(
+            core,
+            SceneView(SceneModel(assembled.scene), assembled.kinematics, assembled.law),
+            Cameras(assembled.scene, settings.cameras, status.note) if settings.cameras.on else None,
+            lambda stream, now_s: self._lines[stream].backlog_s(now_s),
+            seed=settings.seed,
+        )
         self._collection = IdleCollection(self._clock)
         self._start_s = self._clock.now()
         self._pacer = Pacer(TICK_PERIOD_S, self._start_s, settings.seed)
@@ -140,7 +154,7 @@ class _Loop:
                     self._tick(now_s)
                 self._send()
                 if ticked:
-                    self._use_idle_time(self._clock.now())
+                    self._use_idle_time(self._clock.now(), now_s)
                 dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
                 wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))
 
@@ -151,8 +165,10 @@ class _Loop:
         return {
             "duration_s": self._clock.now() - self._start_s,
             "tick_us": tick_microseconds(self._tick_time),
+            "tick_cpu_us": tick_microseconds(self._tick_cpu_time),
             **paced,
             "link": link_summary("to_operator", self._lines),
+            "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {
                 "refused": sockets.refused,
@@ -167,11 +183,13 @@ class _Loop:
     def _tick(self, now_s: float) -> None:
         self._pacer.begin(now_s)
         self._admission.begin_tick()
-        began_s = self._clock.now()
+        began_s, computed_s = self._clock.now(), self._computed.now()
         outgoing = self._core.tick(now_s)
+        self._tick_cpu_time.add(self._computed.now() - computed_s)
         took_s = self._clock.now() - began_s
         self._tick_time.add(took_s)
         self._latest_tick_times_s.append(took_s)
+        self._looking.ticked(took_s, self._pacer.overruns)
         for message in outgoing:
             self._lines[message.stream].push(now_s, message, len(message.payload))
 
@@ -182,7 +200,7 @@ class _Loop:
                 if message.stream == "haptics":
                     self._sockets.send(message.peer, message.payload)
                 else:
-                    self._sockets.publish(b"telemetry", message.payload)
+                    self._sockets.publish(TOPICS[message.stream], message.payload)
 
     def _paced(self) -> dict[str, float | int]:
         """The ticks since this was last asked for."""
@@ -195,8 +213,14 @@ class _Loop:
             "late_us": 1e6 * self._pacer.take_latest_s(),
         }
 
-    def _use_idle_time(self, now_s: float) -> None:
-        """What no tick should wait for."""
+    def close(self) -> None:
+        """End what runs beside."""
+        self._looking.close()
+
+    def _use_idle_time(self, now_s: float, ticked_s: float) -> None:
+        """What no tick should wait for. ticked_s: the newest tick's `now`."""
+        for message in self._looking.idle(now_s, ticked_s):
+            self._lines[message.stream].push(now_s, message, len(message.payload))
         if self._status.due(now_s):
             self._status.show(now_s, self._core.status(now_s) | self._paced())
         if now_s >= self._next_keys_s:

@@ -1,18 +1,21 @@
 """What leaves the robot side: stiffness for those who feel, telemetry for those who look."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
 from robot_side.ahead.law import Sensed
 from robot_side.arm.port import GripperPose
 from robot_side.operators.operator_session import Receiver
 
-OutgoingStream = Literal["haptics", "telemetry"]
+OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
+TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
+"""Of what goes to whoever looks; scene is a stream of its own, as its large messages would hold up telemetry."""
 
 SHOWN_NAME = 100
 """Characters of an object's name that are sent and shown; a message has a limit."""
@@ -22,7 +25,7 @@ _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 
 @dataclass(frozen=True)
 class Outgoing:
-    """One payload to send: haptics to `peer` over the control port, telemetry to whoever looks."""
+    """One payload to send: haptics to `peer` over the control port, all else to whoever looks."""
 
     stream: OutgoingStream
     peer: bytes

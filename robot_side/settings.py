@@ -10,6 +10,7 @@ import tyro
 from common.command.run_options import RunOptions
 from robot_side.ahead.law import LawName
 from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.cameras.settings import CamerasSettings
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
@@ -113,6 +114,7 @@ class RobotSettings(RunOptions):
     """TOML only: [roles] name = "obstacle", "target", "support" or "ignored"; else the names tell."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
+    cameras: CamerasSettings = field(default_factory=CamerasSettings)
     motion: ToolMotionSettings = field(default_factory=ToolMotionSettings)
     safety: SafetySettings = field(default_factory=SafetySettings)
 

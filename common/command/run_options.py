@@ -43,7 +43,7 @@ class RunOptions:
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the run's figures there at the end."""
     status: StatusMode = "line"
-    """A live line for people, JSON lines for programs, or nothing."""
+    """A live line for people, JSON lines for programs, the same with all that the console shows, or nothing."""
 
     def __post_init__(self) -> None:
         self.link_spec()

@@ -4,8 +4,9 @@ import json
 import sys
 from collections.abc import Mapping
 from types import TracebackType
-from typing import IO, Literal, cast
+from typing import IO, Any, Literal, cast
 
+import msgspec
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
@@ -15,9 +16,11 @@ from common.command.live_story import Story
 from common.command.live_view import Value, live_view
 from common.command.patient_output import PatientOutput
 
-StatusMode = Literal["line", "json", "none"]
+StatusMode = Literal["line", "json", "facts", "none"]
 
 _PERIOD_S = 0.2
+_FACTS_PERIOD_S = 0.1
+_LINES_OF_JSON = ("json", "facts")
 
 
 class _Console(Console):
@@ -64,16 +67,24 @@ class Status:
         finally:
             self._output.__exit__(kind, error, trace)
 
+    @property
+    def wants_facts(self) -> bool:
+        """Whether `show_facts` shows anything: they take longer to put together than a status."""
+        return self._mode == "facts"
+
     def due(self, now_s: float) -> bool:
         """Whether `show` would show anything; building the values costs time in a tick."""
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, at most five times a second; BrokenPipeError, once, when the reader has gone."""
+        """Show the values, five times a second at most, ten with facts.
+
+        BrokenPipeError, once, when the reader has gone.
+        """
         if not self.due(now_s):
             return
-        self._next_s = now_s + _PERIOD_S
-        if self._mode == "json":
+        self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
+        if self._mode in _LINES_OF_JSON:
             self.event("status", **values)
             return
         view = live_view(values)
@@ -85,14 +96,20 @@ class Status:
         elif (told := self._story.tell(now_s, view)) is not None:
             self._output.write(f"{told}\n")
 
-    def event(self, kind: str, **values: Value) -> None:
-        """One line of JSON, in the JSON mode only, at once."""
-        if self._mode == "json":
+    def show_facts(self, facts: Any) -> None:
+        """All that is known of one moment, a struct, at once."""
+        if self._mode == "facts":
+            self._output.write(msgspec.json.encode({"event": "facts", "facts": facts}).decode() + "\n")
+
+    def event(self, kind: str, **values: Value) -> bool:
+        """One line of JSON, at once; False outside the modes for programs, where it says nothing."""
+        if self._mode in _LINES_OF_JSON:
             self._output.write(json.dumps({"event": kind, **values}) + "\n")
+        return self._mode in _LINES_OF_JSON
 
     def note(self, text: str) -> None:
-        """A line that stays, for people; an event of its own in the JSON mode."""
-        if self._mode == "json":
+        """A line that stays, for people; an event of its own in the modes for programs."""
+        if self._mode in _LINES_OF_JSON:
             self.event("note", text=text)
         elif self._mode == "line":
             # Wrapped between words for a person, left whole for whoever searches a file.

@@ -16,8 +16,17 @@ _END_LIMIT_S: Final = 2.0
 class Companion:
     """A Python process of ours at the other end of `channel`: it ends when the channel does, however we end."""
 
-    def __init__(self, module: str, arguments: Sequence[str] = (), room_bytes: int = 1 << 23) -> None:
-        """Run `module`, whose main function calls `companion_channel`; its errors go where ours go."""
+    def __init__(
+        self,
+        module: str,
+        arguments: Sequence[str] = (),
+        room_bytes: int = 1 << 23,
+        output: int = subprocess.DEVNULL,
+    ) -> None:
+        """Run `module`, whose main function calls `companion_channel`; its errors go where ours go.
+
+        `output`: a descriptor of ours that becomes its standard output.
+        """
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
@@ -25,7 +34,7 @@ class Companion:
                 [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
+                stdout=output,
                 # Ctrl-C reaches us alone.
                 start_new_session=True,
             )

@@ -62,6 +62,7 @@ class DelayLine(Generic[Item]):
         self._in_order = profile.model == "stream"
         self._outages = profile.outages
         self._rate = profile.rate
+        self._mean_delay_s = profile.mean_delay_s()
         self._trace = None if profile.trace is None else profile.trace.delays_s
         self._recovery_s = profile.recovery_s() if self._in_order else 0.0
 
@@ -129,6 +130,12 @@ class DelayLine(Generic[Item]):
     def next_due(self) -> float | None:
         """When the next message is due, in seconds on the clock of `push`; None while nothing waits."""
         return self._queue[0][0] if self._queue else None
+
+    def backlog_s(self, now_s: float) -> float:
+        """How long what is pushed now would wait, beyond its delay, for what a rate still holds back."""
+        if self._rate is None:
+            return 0.0
+        return max(0.0, self._last_due_s - now_s - self._mean_delay_s)
 
     @property
     def waiting(self) -> int:

@@ -15,7 +15,7 @@ from common.emulation.randomness import CorrelationModel
 from common.errors import ConfigurationError
 
 Direction = Literal["to_robot", "to_operator"]
-Stream = Literal["haptics", "telemetry", "video"]
+Stream = Literal["haptics", "telemetry", "video", "scene"]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import msgpack
 import msgspec
 
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.protocol.messages import AnyMessage, Message
+from common.protocol.messages import AnyMessage, Header, Message
 from common.protocol.view_messages import AnyViewMessage
 
 PROTOCOL_VERSION = 6
@@ -28,6 +28,23 @@ def encode(message: Message) -> bytes:
     return payload
 
 
+class Prepared:
+    """A message packed once, to be sent again and again under other headers."""
+
+    def __init__(self, message: Message) -> None:
+        names = message.__struct_fields__
+        tag = cast(str, message.__struct_config__.tag)
+        # An array of few elements is one byte and these.
+        self._before: bytes = (
+            b"\x92" + msgpack.packb(PROTOCOL_VERSION) + bytes([0x91 + len(names)]) + msgpack.packb(tag)
+        )
+        self._after = b"".join(msgspec.msgpack.encode(getattr(message, name)) for name in names[1:])
+
+    def under(self, header: Header) -> bytes:
+        """Pack it under `header`."""
+        return b"".join((self._before, msgspec.msgpack.encode(header), self._after))
+
+
 def decode(payload: bytes) -> AnyMessage:
     """Unpack and validate one message whole; RemoteProtocolError says what is wrong with the bytes.
 
@@ -39,6 +56,12 @@ def decode(payload: bytes) -> AnyMessage:
 def decode_view(payload: bytes) -> AnyViewMessage:
     """As `decode`, for what people look at."""
     return cast(AnyViewMessage, _decode(payload, AnyViewMessage, VIEW_MAXIMUM_BYTES))
+
+
+def claims_to_be(tag: str, payload: bytes) -> bool:
+    """Whether `payload` says that it holds a message of this tag; told without unpacking it, so it may still be bad."""
+    # Behind a list's first byte, the version, and the first bytes of another list and of the tag.
+    return tag.encode() in payload[: 8 + len(tag)]
 
 
 def _decode(payload: bytes, kinds: Any, limit_bytes: int) -> Any:

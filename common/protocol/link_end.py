@@ -12,6 +12,8 @@ from common.timing.clock_offset import ClockOffset
 
 _REMEMBERED_EPOCHS = 64
 """Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""
+_MOST_RECENT = 4096
+"""Arrivals whose delays are kept for who looks at the last second."""
 _MOST_UNMEASURED = 4096
 """Arrivals that wait for the offset to settle: it takes a second, in which a thousand or so arrive."""
 
@@ -50,6 +52,8 @@ class LinkEnd:
         """One-way delay from the peer in seconds, every arrival, before ordering; empty until the offset settles."""
         self.round_trip = RunningStatistics(seed)
         """Both ways without the peer's holding time, in seconds, every arrival that echoes a stamp."""
+        self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
+        """(now_s, one-way delay from the peer, round trip) of the newest arrivals in seconds, the oldest first."""
         self.stale = 0
         """Messages that came too late to be applied, or of no known epoch."""
         self._side = side
@@ -110,6 +114,7 @@ class LinkEnd:
             return Arrival(fresh=False, queueing_age_s=0.0, one_way_s=None, loop_age_s=None)
         loop_age_s = self._measure_loop(header, now_s)
         one_way_s = self._measure_one_way(header.sent_s, now_s)
+        self.recent.append((now_s, one_way_s, self.clock_offset.round_trip_s))
         queueing_age_s = self._queueing.update(header.sent_s, now_s)
         if self._newest is None or header.sequence > self._newest.sequence:
             self._newest, self._newest_received_s = header, now_s

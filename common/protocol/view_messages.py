@@ -71,6 +71,13 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     shapes: tuple[Shape, ...]
     left_out: int = 0
     """Objects that there was no room for; they are felt all the same"""
+    object_poses: bytes = b""
+    """(objects, 7) float32, rows as in SceneState: where each stands unless SceneState says otherwise; empty where
+    SceneState says it of all"""
+
+    def __post_init__(self) -> None:
+        if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):
+            raise ValueError("object_poses; valid: a row for each of objects, or none")
 
 
 class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import msgspec
 import tyro
 
 from common.command.command_line import given_fields, parse_settings
@@ -23,6 +24,9 @@ from common.files.output_file import write_json
 from common.protocol.messages import Compensation
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.commands.open_browser import show_address
+from operator_side.facts import OperatorFacts
+from operator_side.terminal_view.status import TerminalStatus
 
 _START_TIMEOUT_S = 600.0
 """The first start compiles the overlap kernels, which a busy machine takes minutes for."""
@@ -71,7 +75,9 @@ class DemoSettings(RunOptions):
     realtime: bool = False
     """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
-    """The browser console. It is not there yet: the status line is all there is to see."""
+    """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
+    tui: bool = False
+    """The whole terminal instead of a line, for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """More settings for the robot side: see feelahead-robot --help."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -79,6 +85,8 @@ class DemoSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.tui and self.status != "line":
+            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.scene is not None and self.model is not None:
             raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
 
@@ -91,7 +99,7 @@ def demo(arguments: Sequence[str]) -> int:
     given = given_fields(arguments, DemoSettings)
     errors: list[str] = []
     try:
-        with Status(settings.status, "feelahead demo") as status:
+        with TerminalStatus("feelahead demo") if settings.tui else Status(settings.status, "feelahead demo") as status:
             with tempfile.TemporaryDirectory(prefix="feelahead-") as folder, StopSignal() as stop:
                 for text in unused_clauses(settings.link_spec(), _SENT):
                     status.note(text)
@@ -171,6 +179,9 @@ def _operator_arguments(
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
+    arguments.append("--console" if settings.console else "--no-console")
+    if settings.tui or settings.status == "facts":
+        arguments.append("--status=facts")
     if "compensation" in given:
         arguments.append(f"--compensation={settings.compensation}")
     if "haptics" in given:
@@ -228,6 +239,11 @@ def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: S
     for event in side.events():
         if event["event"] == "status":
             said[side.name] = {name: value for name, value in event.items() if name != "event"}
+        elif event["event"] == "facts":
+            facts = msgspec.convert(event["facts"], OperatorFacts)
+            status.show_facts(msgspec.structs.replace(facts, status=_together(said["robot"], facts.status)))
+        elif event["event"] == "console":
+            show_address(str(event["address"]), status)
         else:
             _show_note(side, event, status)
 

@@ -9,6 +9,7 @@ from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.feel.write_bound import WriteBound
+from operator_side.feel.zones import moving_along, needed_m
 from operator_side.hands.travel_calibration import TravelCalibration
 
 
@@ -74,6 +75,7 @@ class Haptics:
         if not self._enabled:
             return None
         known = None if felt is None else self._displacement(felt, now_s)
+        self.without_history += felt is not None and known is None and self._compensation == "operator"
         wanted = self.rendering.render(felt, pulled, known, now_s)
         if blindness.light is not None:
             rumble = blindness.rumble(now_s) if felt is None else wanted.rumble
@@ -91,7 +93,7 @@ class Haptics:
         if self._compensation == "robot":
             return None
         header, along = felt.header, felt.r2
-        known = self._commands.displacement(
+        return self._commands.displacement(
             now_s,
             header.echo_sent_s,
             header.echo_held_s,
@@ -100,8 +102,23 @@ class Haptics:
             along.acceleration_m_s2,
             felt.told_m_s,
         )
-        self.without_history += known is None
-        return known
+
+    def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
+        """D at the present travel, in metres: of the trigger that retreats and of the one that advances.
+
+        pulled: as TriggerRendering's.
+        """
+        back, forth = moving_along(felt, self._displacement(felt, now_s))
+        (retreating, advancing), horizon_s = pulled, self._settings.horizon_s
+        return (
+            needed_m(felt.l2, max(0.0, retreating - advancing) * felt.l2.full_speed_m_s, back, horizon_s),
+            needed_m(felt.r2, max(0.0, advancing - retreating) * felt.r2.full_speed_m_s, forth, horizon_s),
+        )
+
+    @property
+    def written(self) -> OutputReport:
+        """What the controller was told last; nothing while it has not been told anything yet."""
+        return self._written or RELEASED
 
     def status(self) -> str:
         """A few words for people on each of the controller's own triggers."""

@@ -88,10 +88,14 @@ class RenderedTrigger:
         if free < ZONE_COUNT and (self.first_stiff is None or free < self.first_stiff):
             self.first_stiff = free
 
+    @property
+    def free_travel(self) -> float:
+        """How far it is pulled, in calibrated travel, 0 to 1, by what the controller reports, before it stiffens."""
+        return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
+
     def status(self) -> str:
-        """Its free way for people: as far as it is pulled, by what the controller reports, before it stiffens."""
-        free = self._strengths.count(0)
-        way = self._travel.travel(min(free / ZONE_COUNT / SENSED_TRAVEL, 1.0))
+        """Its free way for people."""
+        free, way = self._strengths.count(0), self.free_travel
         if free == ZONE_COUNT or way == 1.0:
             return "free"
         least, most = self._strengths[free], self._strengths[-1]

@@ -45,6 +45,13 @@ def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[D
     return Displacement(-known.way_m, -known.speed_m_s), known
 
 
+def needed_m(field: TriggerField, speed_m_s: float, moving: Displacement, horizon_s: float = HORIZON_S) -> float:
+    """D: how far ahead the gripper has to be felt where the trigger commands `speed_m_s`, 0 or more, along it."""
+    excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
+    stopping_m = (speed_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
+    return moving.way_m + speed_m_s * horizon_s + stopping_m
+
+
 def zone_strengths(
     field: TriggerField,
     horizon_m: float,
@@ -58,7 +65,7 @@ def zone_strengths(
     horizon_m: how far `field` knows what lies ahead; what goes beyond is full. horizon_s: h, from feeling to what the
     arm is told. A zone that does not advance along the trigger, as the other one is pulled farther, has none.
     """
-    full_m_s, twice_a = field.full_speed_m_s, 2.0 * field.acceleration_m_s2
+    full_m_s = field.full_speed_m_s
     touch_m_s = touch_speed_m_s(full_m_s)
     strengths: list[int] = []
     strength = beyond = 0
@@ -68,12 +75,11 @@ def zone_strengths(
         if speed_m_s > 0.0:
             ways = field.slow_m if first or speed_m_s < touch_m_s else field.fast_m
             first = False
-            excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
-            needed_m = moving.way_m + speed_m_s * horizon_s + (speed_m_s**2 + excess_m_s**2) / twice_a
-            if needed_m > horizon_m:
+            ahead_m = needed_m(field, speed_m_s, moving, horizon_s)
+            if ahead_m > horizon_m:
                 beyond += 1
                 strength = MAX_STRENGTH
             else:
-                strength = max(strength, bisect_right(ways, needed_m))
+                strength = max(strength, bisect_right(ways, ahead_m))
         strengths.append(strength)
     return Zones(tuple(strengths), beyond)

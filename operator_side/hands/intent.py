@@ -1,6 +1,6 @@
 """The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from operator_side.dualsense.reports.controller_state import ControllerState, Stick
@@ -30,6 +30,8 @@ class OperatorIntent:
     hand_over: bool
     gripper: Literal[-1, 0, 1]
     """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
+    raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
+    """What the controller itself reports of its own L2 and R2, 0 to 1 each, uncalibrated and never swapped."""
 
     @property
     def triggers_released(self) -> bool:
@@ -73,4 +75,5 @@ def operator_intent(
         next_target=Action.NEXT_TARGET in held,
         hand_over=Action.HAND_OVER in held,
         gripper=gripper,
+        raw=(state.l2, state.r2),
     )

@@ -3,13 +3,16 @@
 s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
 """
 
+import math
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from common.protocol.view_messages import EnlargementTerms
+from robot_side.ahead.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.scene_table import scene_table
@@ -55,21 +58,40 @@ class PaperLaw:
         """How much work there was, over the run."""
         return {"fields": self.looked}
 
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """The same for both triggers: D_incr in all directions, of which |v| t_d is called displacement here."""
+        del trigger, sensed
+        enlargement_m, covariances, velocities = self._enlargements(situation)
+        largest = int(enlargement_m.argmax())
+        displacement_m = float(np.linalg.norm(velocities[largest])) * situation.loop_age_s
+        uncertainty = self._uncertainty
+        terms = EnlargementTerms(
+            sigma_m=float(enlargement_m[largest]) - displacement_m,
+            mean_m=math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m),
+            kinematic_sd_m=math.sqrt(float(np.trace(covariances[largest]))),
+            camera_sd_m=uncertainty.camera_sd_m,
+            prediction_sd_m=0.0,
+            quantile=uncertainty.quantile,
+            loop_age_s=situation.loop_age_s,
+            displacement_m=displacement_m,
+        )
+        spheres = moved_and_inflated(situation, np.zeros(3), enlargement_m)
+        table = scene_table(situation.objects)
+        return TriggerExplained(terms, overlaps_by_object(spheres, table, _stands(situation), self._tables))
+
+    def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
+        jacobians = situation.pose.sphere_jacobians
+        covariances = position_covariance(jacobians, self._encoder_sigma_rad)
+        velocities_m_s = jacobians @ situation.joint_velocities_rad_s
+        enlargements_m = plain_enlargements_m(self._uncertainty, covariances, velocities_m_s, situation.loop_age_s)
+        return enlargements_m, covariances, velocities_m_s
+
     def _look(self, situation: Situation) -> Sensed:
         self.looked += 1
         pose = situation.pose
-        enlargement_m = plain_enlargements_m(
-            self._uncertainty,
-            position_covariance(pose.sphere_jacobians, self._encoder_sigma_rad),
-            pose.sphere_jacobians @ situation.joint_velocities_rad_s,
-            situation.loop_age_s,
-        )
-        radii = pose.sphere_radii_m + enlargement_m
-        standing = np.array(
-            [PASSED_OVER if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
-        )
-        if situation.held is not None:
-            standing[situation.held] = PASSED_OVER
+        enlargement_m, _, _ = self._enlargements(situation)
+        radii, standing = pose.sphere_radii_m + enlargement_m, _stands(situation)
         spheres = np.concatenate([pose.sphere_centers_m, radii[:, None]], axis=1)
         overlap_m3 = total_overlap_m3(spheres, scene_table(situation.objects), standing, self._tables)
         stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii**3).sum())))
@@ -84,3 +106,12 @@ class PaperLaw:
             enlargement_m=float(enlargement_m.max()),
             overlap_m3=overlap_m3,
         )
+
+
+def _stands(situation: Situation) -> IntArray:
+    standing = np.array(
+        [PASSED_OVER if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
+    )
+    if situation.held is not None:
+        standing[situation.held] = PASSED_OVER
+    return standing

@@ -19,6 +19,13 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.messages import TriggerField, Ways
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
+from robot_side.ahead.explanation import (
+    Trigger,
+    TriggerExplained,
+    enlargement_terms,
+    moved_and_inflated,
+    overlaps_by_object,
+)
 from robot_side.ahead.field import Ahead, Along
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.law import Sensed, Situation
@@ -90,6 +97,19 @@ class SweptLaw:
         """How much work there was and was not, over the run."""
         return vars(self.ahead.counts)
 
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """What D_σ is made of along one trigger, and what overlaps at the robot side's δ."""
+        felt = sensed.l2 if trigger == "l2" else sensed.r2
+        along, _, prediction_sd_m = self._along(trigger, situation)
+        camera_sd_m = self._uncertainty.camera_sd_m
+        terms, sigma_m = enlargement_terms(
+            *(situation, along, self.ahead.encoder_sigma_rad, camera_sd_m, prediction_sd_m, felt.displacement_m)
+        )
+        spheres = moved_and_inflated(situation, felt.displacement_m * along.direction, sigma_m)
+        standing = self._stands(situation)
+        found = overlaps_by_object(spheres, scene_table(situation.objects), standing, self.ahead.tables)
+        return TriggerExplained(terms, found)
+
     def _look_where_due(self, situation: Situation, velocity: FloatArray, now_s: float) -> None:
         """Look where that is due longest, and elsewhere only where it is overdue. velocity (3,): of the tool."""
         last = self._sideways
@@ -136,6 +156,23 @@ class SweptLaw:
     ) -> Seen:
         """sideways: what has brought the gripper to this pose; None where it stands there now."""
         pose = situation.pose
+        along, able, _ = self._along(side, situation)
+        scene, standing = scene_table(situation.objects), self._stands(situation)
+        if sideways is not None and sideways.moves_fingers:
+            # What the fingers close on is what they are to touch.
+            standing = np.where(standing == TARGET, PASSED_OVER, standing)
+        widest_m = math.inf if situation.gap_m is None else 0.5 * situation.gap_m
+        found = self.ahead.look(pose, scene, standing, along, widest_m)
+        overlap_m3 = 0.0
+        if sideways is None and side != "stick" and (side == "r2") == (speed_m_s >= 0.0):
+            sigma_m = self.ahead.tables.sigma_m[: len(pose.sphere_radii_m), 0]
+            spheres = moved_and_inflated(situation, abs(speed_m_s) * situation.loop_age_s * along.direction, sigma_m)
+            overlap_m3 = total_overlap_m3(spheres, scene, standing, self.ahead.tables)
+        return Seen(found, along.direction, pose.tool_position_m, able, along.reach_m, now_s, overlap_m3)
+
+    def _along(self, side: Side, situation: Situation) -> tuple[Along, Ability, float]:
+        """What the errors are along one side, what the joints give there, and σ_δ."""
+        pose = situation.pose
         direction = np.ascontiguousarray({"r2": 1.0, "l2": -1.0}.get(side, 0.0) * pose.tool_rotation[:, 2])
         full_speed_m_s = self._motion.trigger_speed_m_s
         if side == "stick":
@@ -159,19 +196,7 @@ class SweptLaw:
             reach_m,
             _early_m(situation, direction, able),
         )
-        scene, standing = scene_table(situation.objects), self._stands(situation)
-        if sideways is not None and sideways.moves_fingers:
-            # What the fingers close on is what they are to touch.
-            standing = np.where(standing == TARGET, PASSED_OVER, standing)
-        widest_m = math.inf if situation.gap_m is None else 0.5 * situation.gap_m
-        found = self.ahead.look(pose, scene, standing, along, widest_m)
-        overlap_m3 = 0.0
-        if sideways is None and side != "stick" and (side == "r2") == (speed_m_s >= 0.0):
-            sigma_m = self.ahead.tables.sigma_m[: len(pose.sphere_radii_m), :1]
-            moved = pose.sphere_centers_m + abs(speed_m_s) * situation.loop_age_s * direction
-            spheres = np.concatenate([moved, pose.sphere_radii_m[:, None] + sigma_m], axis=1)
-            overlap_m3 = total_overlap_m3(spheres, scene, standing, self.ahead.tables)
-        return Seen(found, direction, pose.tool_position_m, able, reach_m, now_s, overlap_m3)
+        return along, able, sd_m
 
     def _stands(self, situation: Situation) -> IntArray:
         """(k,) what each object is to the field."""

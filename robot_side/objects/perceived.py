@@ -63,6 +63,10 @@ class PerceivedObjects:
     mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
     """(q, 3, 3) mesh to world"""
     mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    positions_m: FloatArray | None = None
+    """(k, 3) of each object's own frame, that of its first primitive, in the world frame; None where nobody knows"""
+    rotations: FloatArray | None = None
+    """(k, 3, 3) object to world, with `positions_m`"""
     velocities_m_s: FloatArray | None = None
     """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
 

@@ -8,7 +8,7 @@ from typing import Any
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Header, Hello, MotionCommand, Tune
+from common.protocol.messages import Header, Hello, MotionCommand, Tune, Watch
 from common.protocol.session import SessionEvent, SessionState
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
@@ -16,6 +16,7 @@ from robot_side.operators.lease import MOST_OBSERVERS, Lease
 from robot_side.operators.participant import Participant
 from robot_side.operators.safety import Permission, Safety
 from robot_side.operators.tuning import Tuning
+from robot_side.operators.watchers import Watchers
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class OperatorSession:
         self.applied_age = RunningStatistics(seed)
         """Age in seconds of the command that moves the arm, in every tick in which one does."""
         self.leases_granted = 0
+        self.watchers = Watchers()
+        """Who looks at what"""
         self._new_link = new_link
         self._announcements = Announcements(new_link, self.lease, self.tuning)
         self._owner_link = new_link()
@@ -91,7 +94,7 @@ class OperatorSession:
             self.rejected += 1
             return
         from_robot = isinstance(message, Hello) and message.side == "robot"
-        if from_robot or not isinstance(message, Hello | MotionCommand | Tune):
+        if from_robot or not isinstance(message, Hello | MotionCommand | Tune | Watch):
             self.rejected += 1
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
@@ -110,14 +113,20 @@ class OperatorSession:
             if participant is self.lease.owner and self.safety.state == "armed" and arrival.one_way_s is not None:
                 self.driving_delay.add(arrival.one_way_s)
             self._judge(participant, message, arrival, now_s)
-        elif isinstance(message, Tune):
-            if arrival.fresh and message.number > participant.tuned:
-                participant.tuned = message.number
-                granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
-                if granted and message.link is not None:
-                    participant.link.expect_other_delay()
         elif arrival.fresh:
+            self._follow(participant, message, now_s)
+
+    def _follow(self, participant: Participant, message: Hello | Tune | Watch, now_s: float) -> None:
+        """What is no command."""
+        if isinstance(message, Watch):
+            self.watchers.heard(participant.epoch, message, now_s)
+        elif isinstance(message, Hello):
             self._announcements.answer(participant, now_s)
+        elif message.number > participant.tuned:
+            participant.tuned = message.number
+            granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+            if granted and message.link is not None:
+                participant.link.expect_other_delay()
 
     def update(self, now_s: float) -> None:
         """Let go of whoever has been silent for too long; to be called in every tick."""
@@ -179,7 +188,7 @@ class OperatorSession:
             "tuning": self.tuning.summary(),
         }
 
-    def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune, now_s: float) -> Participant | None:
+    def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune | Watch, now_s: float) -> Participant | None:
         """Make room for a new epoch, which only a Hello can begin; None for whoever is turned away."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):

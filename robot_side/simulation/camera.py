@@ -89,7 +89,12 @@ class MujocoCamera:
         scene, offsets_m = self._scene, self._error.next_frame()
         seen = scene.primitives.place(now_s, scene.roles, offsets_m, scene.data.geom_xpos, scene.data.geom_xmat)
         positions_m: FloatArray = scene.data.geom_xpos[self._first_geoms] + offsets_m
-        return replace(seen, velocities_m_s=self._velocities.see(now_s, positions_m))
+        return replace(
+            seen,
+            positions_m=positions_m,
+            rotations=scene.data.geom_xmat[self._first_geoms].reshape(-1, 3, 3),
+            velocities_m_s=self._velocities.see(now_s, positions_m),
+        )
 
     def set_role(self, name: str, role: Role) -> None:
         """Change what the object `name` is to the task, from the next frame on. ValueError for an unknown name."""

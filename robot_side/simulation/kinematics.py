@@ -48,6 +48,10 @@ class MujocoKinematics:
         rotations = self._data.xmat[bodies].reshape(-1, 3, 3)
         return near_order(self._data.xpos[bodies] + np.einsum("mij,mj->mi", rotations, local_centers_m), BLOCK)
 
+    def body_poses(self, bodies: IntArray) -> FloatArray:
+        """Where the newest `pose` put `bodies` (n,) of the robot: positions and quaternions (n, 7), w first."""
+        return np.concatenate([self._data.xpos[bodies], self._data.xquat[bodies]], axis=1)
+
     def pose(self, state: ArmState) -> GripperPose:
         """The gripper at the encoder readings of `state` (eq. 4); the fingers' own motion is not in its Jacobians."""
         model, data, robot = self._model, self._data, self._robot

@@ -1,16 +1,16 @@
 """An engine to try the containers on: the one that runs, or, in CI and as root, one of our own while we need it."""
 
 import os
-import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from common.errors import ConfigurationError
 from feelahead.containers.engine import COMPOSE_FILE, Engine, EngineError
+from tests.helpers.debian import Say, install, run_or_skip
 from tests.kernel.skipped import SkippedError
 
 PROJECT: Final = "feelahead-test"
@@ -18,8 +18,6 @@ _OFFICIAL: Final = "python:3.11-slim-bookworm"
 _OWN: Final = "feelahead-base"
 _PACKAGES: Final = ("docker.io", "docker-compose", "iptables")
 _PATIENCE_S: Final = 60.0
-_INSTALL_S: Final = 600.0
-Say = Callable[[str], None]
 
 
 def default_cache() -> Path:
@@ -36,8 +34,8 @@ def provided_engine(cache: Path, say: Say) -> Iterator[Engine]:
         except ConfigurationError as missing:
             if os.environ.get("CI") != "true" or os.geteuid() != 0:
                 raise SkippedError(f"{missing} (with CI=true, root gets one of Debian's)") from None
-            _install(_PACKAGES, "dockerd", say)
-            _install(("docker-compose",), "docker-compose", say)
+            install(_PACKAGES, "dockerd", say)
+            install(("docker-compose",), "docker-compose", say)
             engine = Engine(PROJECT, stack.enter_context(_own_engine(cache, say)))
         yield engine
 
@@ -56,9 +54,9 @@ def base_image(engine: Engine, say: Say) -> Mapping[str, str]:
         return {"FEELAHEAD_BASE": image}
     if os.geteuid() != 0:
         raise SkippedError(f"{_OFFICIAL} cannot be pulled, and only root can make a base image")
-    _install(("debootstrap",), "debootstrap", say)
+    install(("debootstrap",), "debootstrap", say)
     say("no registry of images: making a base image with debootstrap")
-    _run([str(COMPOSE_FILE.parent / "make-base"), _OWN], engine.environment)
+    run_or_skip([str(COMPOSE_FILE.parent / "make-base"), _OWN], engine.environment)
     return {"FEELAHEAD_BASE": _OWN}
 
 
@@ -104,29 +102,7 @@ def _wait_for_daemon(daemon: subprocess.Popen[bytes], environment: Mapping[str, 
         time.sleep(0.2)
 
 
-def _install(packages: tuple[str, ...], program: str, say: Say) -> None:
-    if shutil.which(program) is not None:
-        return
-    if shutil.which("apt-get") is None:
-        raise SkippedError(f"no {program} and no apt-get to install it")
-    say(f"installing {', '.join(packages)}")
-    _run(["apt-get", "update", "-qq"], {})
-    _run(
-        ["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages],
-        {"DEBIAN_FRONTEND": "noninteractive"},
-    )
-
-
 def _tidy(words: list[str], environment: Mapping[str, str]) -> None:
     """On the way out, where a failure changes nothing about what was found."""
     with suppress(OSError, subprocess.TimeoutExpired):
         subprocess.run(words, env=os.environ | environment, capture_output=True, timeout=_PATIENCE_S, check=False)
-
-
-def _run(words: list[str], environment: Mapping[str, str]) -> None:
-    done = subprocess.run(
-        words, env=os.environ | dict(environment), capture_output=True, text=True, timeout=_INSTALL_S, check=False
-    )
-    if done.returncode != 0:
-        said = done.stderr.strip().splitlines()
-        raise SkippedError(f"{words[0]}: {said[-1] if said else f'code {done.returncode}'}")

@@ -96,8 +96,8 @@ def test_the_gripper_is_covered_as_closely_as_is_set() -> None:
     for cover_m in (0.003, 0.01):
         robot = built(cover_m=cover_m)
         robot.tick(0.0)
-        assert robot._last is not None
-        counts.append(len(robot._last[1].sphere_radii_m))
+        assert robot.newest is not None
+        counts.append(len(robot.newest[1].pose.sphere_radii_m))
     assert counts[0] == 246
     assert counts[1] < 50
 

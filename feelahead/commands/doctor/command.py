@@ -26,7 +26,7 @@ from feelahead.commands.doctor.controller_checks import (
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
 from feelahead.commands.doctor.link_facts import Way, look_along
 from feelahead.commands.doctor.link_judgement import LinkFacts, judge, reached, told
-from feelahead.commands.doctor.machine_checks import check_ports, check_realtime
+from feelahead.commands.doctor.machine_checks import RENDERING, check_ports, check_realtime, check_rendering
 from feelahead.commands.doctor.python_checks import check_extra, check_python
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
@@ -109,6 +109,7 @@ def examine(controllers: list[ControllerSeen] | None) -> list[Finding]:
         ),
         *check_controllers(controllers),
         check_uhid(sys.platform, facts.uhid_facts()),
+        check_rendering(facts.rendering_troubles(RENDERING)),
         *check_realtime(sys.platform, facts.realtime_notes()),
         *check_ports(facts.port_troubles()),
     ]

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
@@ -31,6 +32,11 @@ for name in sys.argv[1:]:
     except Exception as error:
         failures[name] = str(error).splitlines()[0] if str(error) else type(error).__name__
 print(json.dumps(failures))
+"""
+_RENDER: Final = """
+import json, sys
+from robot_side.cameras.off_screen import trouble_with
+print(json.dumps(trouble_with(sys.argv[1])))
 """
 _REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"
 
@@ -89,6 +95,13 @@ def realtime_notes() -> list[str]:
         return []
     notes: list[str] = json.loads(_output_of(_REALTIME) or "[]")
     return notes
+
+
+def rendering_troubles(backends: Sequence[str]) -> dict[str, str | None]:
+    """For each way to render without a screen why it does not work, None if it does; each in a process of its own."""
+    outputs = {backend: _output_of(_RENDER, backend) for backend in backends}
+    ended = "trying it ends Python, or takes too long"
+    return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
 
 def port_troubles() -> dict[int, str | None]:

@@ -1,10 +1,14 @@
 """What the machine grants: priority, and the ports that the sides use by default."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 from feelahead.commands.doctor.finding import Finding, Verdict
 
+RENDERING: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
+"""As robot_side/cameras tries them."""
+RENDERING_PACKAGES: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 PORTS: Final = {
     5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
     5556: "the view port of feelahead-robot; another one: --view-bind tcp://127.0.0.1:5558",
@@ -24,6 +28,16 @@ def check_realtime(platform: str, notes: Sequence[str]) -> list[Finding]:
         said, _, command = note.removeprefix("--realtime: ").partition("; to permit it: ")
         findings.append(Finding("--realtime", Verdict.NOTE, f"{said}; the sides run without", command or None))
     return findings
+
+
+def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
+    """Whether the cameras' pictures can be rendered; `troubles`: way to render -> why not, None if it works."""
+    working = [name for name, trouble in troubles.items() if trouble is None]
+    if working:
+        return Finding("cameras", Verdict.OK, f"rendered without a screen by way of {working[0].upper() or 'OpenGL'}")
+    said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
+    remedy = RENDERING_PACKAGES if "egl" in troubles else None
+    return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)
 
 
 def check_ports(troubles: Mapping[int, str | None]) -> list[Finding]:

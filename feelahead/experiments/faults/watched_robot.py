@@ -23,7 +23,7 @@ from common.protocol.messages import MotionCommand
 from common.sockets.admission import Admission
 from feelahead.experiments.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm, ArmState
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import Assembled, assemble
 from robot_side.core import RobotSide
 from robot_side.outgoing_messages import Outgoing
 from robot_side.settings import RobotSettings
@@ -54,15 +54,16 @@ class Watch:
 
     def build(
         self, settings: RobotSettings, epoch: int, clock_domain: str, *, announce: Callable[[str], None]
-    ) -> RobotSide:
+    ) -> Assembled:
         """As robot_side.assembly's, watched."""
-        self._core = core = build_robot_side(
+        assembled = assemble(
             settings,
             epoch,
             clock_domain,
             lambda arm: _ToldArm(arm, settings.safety.gap_s, self),
             announce=announce,
         )
+        self._core = core = assembled.core
         receive = core.session.safety.receive
 
         def judged(command: MotionCommand, arrival: Arrival, now_s: float) -> bool:
@@ -81,7 +82,7 @@ class Watch:
 
         core.session.safety.receive = judged  # type: ignore[method-assign]
         core.tick = timed  # type: ignore[method-assign]
-        return core
+        return assembled
 
     def ticked(self, arm: WatchedArm, now_s: float) -> None:
         """Write down what is new."""
@@ -159,7 +160,7 @@ def main() -> None:
             raise ConfigurationError("--log: missing; valid: --log=FILE, once")
         with Path(own[0].removeprefix("--log=")).open("w", encoding="utf-8") as log:
             watched = Watch(log)
-            robot_side.main.build_robot_side = watched.build  # type: ignore[assignment,attr-defined]
+            robot_side.main.assemble = watched.build  # type: ignore[assignment,attr-defined]
             robot_side.main.Admission = lambda: watched.admission  # type: ignore[assignment,attr-defined]
             return robot_side.main.command([argument for argument in arguments if argument not in own])
 

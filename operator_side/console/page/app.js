@@ -1,0 +1,178 @@
+// The page: what the console sends, shown as it comes.
+import { Chart } from "./charts.js";
+import { Hands } from "./hands.js";
+import { Clock, View } from "./views.js";
+import { Trigger } from "./triggers.js";
+
+const SILENCE_MS = 400; // facts come 30 times a second
+const RETRY_MS = 500;
+const VIEWS = ["overview", "first_person"]; // by their number on the wire
+const MOST_NOTES = 50;
+const byId = (id) => document.getElementById(id);
+
+const clock = new Clock();
+const views = VIEWS.map((name) => new View(byId(name), clock));
+const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
+const charts = {
+  delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
+  overlap: new Chart(byId("overlap_chart"), "overlap", "mm³", [["L2", "--l2"], ["R2", "--r2", [5, 3]]]),
+  stiffness: new Chart(byId("stiffness_chart"), "stiffness", "", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 1),
+  tick: new Chart(byId("tick_chart"), "robot tick", "µs", [["p50", "--l2"], ["p99", "--r2", [5, 3]]]),
+};
+let socket = null;
+let heardMs = performance.now();
+let everHeard = false;
+let closedBecause = "";
+let facts = null;
+let drawn = true;
+const frame = document.querySelector("#scene iframe");
+const slow = drawsSlowly();
+let run = { title: "", live: true, tunable: [] };
+
+const send = (object) => {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
+};
+const hands = new Hands(document, send);
+
+function connect() {
+  const address = new URL("live", location.href);
+  address.protocol = "ws:";
+  socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data }) => {
+    if (typeof data === "string") receive(JSON.parse(data));
+    else views[new DataView(data).getUint8(0)]?.receive(data);
+  };
+  socket.onopen = () => send({ slow });
+  socket.onclose = ({ reason }) => {
+    closedBecause = reason || "its process has ended, or this page may not see it";
+    setTimeout(connect, RETRY_MS);
+  };
+}
+
+function receive(message) {
+  if (message.kind === "end") send({ taken: true });
+  else if (message.kind === "facts") showFacts(message);
+  else if (message.kind === "scene") showScene(message);
+  else if (message.kind === "note") showNote(message.text);
+  else if (message.kind === "run") {
+    run = message;
+    clock.live = run.live;
+    document.title = `feelahead: ${run.title}`;
+  }
+}
+
+function text(id, value, bad = false) {
+  const place = byId(id);
+  const shown = value ?? "–";
+  if (place.textContent !== shown) place.textContent = shown;
+  place.classList.toggle("bad", bad);
+}
+
+const ms = (value) => (value === null ? "?" : value.toFixed(value < 10 ? 1 : 0));
+
+function showFacts(message) {
+  heardMs = performance.now();
+  everHeard = true;
+  facts = message.facts;
+  clock.set(facts.now_s, facts.offset_s);
+  const { status } = facts;
+  const { view } = message;
+  const state = stateOf(view, status);
+  document.body.dataset.state = state;
+  const word = view.alarm || state === "starting" ? view.phase : state;
+  text("state", word.toUpperCase());
+  const doing = view.alarm ? view.reason : view.phase;
+  text("why", [doing === word ? null : doing, run.live ? null : "replay"].filter(Boolean).join(" · "));
+  text("link", status.link, status.link !== "up");
+  text("lease", status.owner);
+  text("whose", facts.hands === "person" ? "scripted person" : facts.hands);
+  text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
+  text("target", status.target ?? "none");
+  text("holding", status.holding);
+  const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
+  for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
+  charts.delay.add([facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
+  const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
+  charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
+  charts.stiffness.add([facts.l2.stiffness, facts.r2.stiffness]);
+  hands.show(facts);
+}
+
+// What the border says: no words of the status line are read but those that it is made of.
+function stateOf(view, status) {
+  if (view.phase === "LINK LOST" || view.phase === "REFUSED" || view.phase === "CONTROLLER LOST") return "lost";
+  if (status.state === "stopped") return "stopped";
+  if (status.state === "armed") return "armed";
+  return status.state === "disarmed" ? "disarmed" : "starting";
+}
+
+byId("drawn").onclick = ({ currentTarget }) => {
+  drawn = !drawn;
+  currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
+  currentTarget.setAttribute("aria-pressed", drawn);
+  frame.hidden = true;
+  if (!drawn) frame.removeAttribute("src");
+};
+
+// Without a graphics processor the drawing takes processor time from everything else: it is then drawn less often.
+function drawsSlowly() {
+  const context = document.createElement("canvas").getContext("webgl");
+  const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
+  return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
+}
+
+// Under our other name the scene is another site, with a process of its own: drawing it slows nothing here.
+function sceneAddress() {
+  const address = new URL("scene/", location.href);
+  address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
+  if (matchMedia("(prefers-color-scheme: dark)").matches) address.search = "darkMode";
+  return address.href;
+}
+
+function showScene(scene) {
+  // Only now does viser know where to look at the scene from.
+  if (drawn && !frame.src) frame.src = sceneAddress();
+  frame.hidden = !drawn;
+  charts.overlap.add(scene.overlap_mm3);
+  charts.tick.add(scene.tick_us);
+  const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
+    const row = document.createElement("tr");
+    for (const [content, kind, small] of [[name, "", role], [l2, "l2"], [r2, "r2"]]) {
+      const cell = row.insertCell();
+      cell.className = kind;
+      cell.textContent = kind ? (content ? content.toFixed(0) : "–") : content;
+      if (small) cell.append(" ", Object.assign(document.createElement("small"), { textContent: small }));
+    }
+    return row;
+  });
+  byId("objects").replaceChildren(...rows);
+  const [l2, r2] = scene.sigma_mm;
+  const left = scene.left_out ? ` ${scene.left_out} objects are felt but not drawn.` : "";
+  text("terms", `enlarged by D_σ: L2 ${l2.toFixed(1)} mm, R2 ${r2.toFixed(1)} mm.${left}`);
+}
+
+function showNote(note) {
+  const item = Object.assign(document.createElement("li"), { textContent: note });
+  byId("notes").append(item);
+  while (byId("notes").childElementCount > MOST_NOTES) byId("notes").firstChild.remove();
+  item.scrollIntoView({ block: "nearest" });
+}
+
+function look() {
+  const silentMs = performance.now() - heardMs;
+  const open = socket?.readyState === WebSocket.OPEN;
+  const lost = !open || silentMs > SILENCE_MS;
+  byId("lost").hidden = !lost;
+  if (lost) {
+    const [word, because] = byId("lost").children;
+    word.textContent = open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST";
+    const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
+    because.textContent = old + (open ? "The operator side says nothing." : `The console: ${closedBecause || "not reached yet"}.`);
+  }
+  for (const view of views) view.look();
+}
+
+connect();
+setInterval(look, 100);
+setInterval(() => Object.values(charts).forEach((chart) => chart.draw()), 100);

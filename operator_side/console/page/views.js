@@ -1,0 +1,87 @@
+// Camera pictures, the newest only, and how old what they show is.
+const OLD_S = 0.3;
+const SILENT_MS = 500;
+
+// The operator side's clock, as far as a page can tell it: the fastest of the messages says best.
+export class Clock {
+  live = true;
+  #ahead = [];
+  #nowS = 0;
+  #offsetS = null;
+
+  set(nowS, offsetS) {
+    const aheadS = nowS - performance.now() / 1000;
+    const jumped = this.#ahead.length && Math.abs(aheadS - this.#ahead.at(-1)) > 1;
+    if (jumped) this.#ahead = [];
+    this.#ahead.push(aheadS);
+    if (this.#ahead.length > 300) this.#ahead.shift();
+    [this.#nowS, this.#offsetS] = [nowS, offsetS];
+  }
+
+  // How long ago a moment of the robot side's clock was; null while nobody knows.
+  ageS(robotS) {
+    if (this.#offsetS === null || !this.#ahead.length) return null;
+    const nowS = this.live ? performance.now() / 1000 + Math.max(...this.#ahead) : this.#nowS;
+    return nowS - (robotS - this.#offsetS);
+  }
+}
+
+export class View {
+  #place; #clock; #context; #age; #stale;
+  #waiting = null;
+  #busy = false;
+  #capturedS = null;
+  #shownMs = -Infinity;
+  frames = 0;
+
+  constructor(place, clock) {
+    this.#place = place;
+    this.#clock = clock;
+    this.#context = place.querySelector("canvas").getContext("2d");
+    this.#age = place.querySelector(".age");
+    this.#stale = place.querySelector(".stale");
+  }
+
+  receive(data) {
+    this.#waiting = data;
+    if (!this.#busy) this.#draw();
+  }
+
+  async #draw() {
+    this.#busy = true;
+    while (this.#waiting !== null) {
+      const data = this.#waiting;
+      this.#waiting = null;
+      try {
+        const picture = await createImageBitmap(new Blob([new Uint8Array(data, 9)], { type: "image/jpeg" }));
+        const { canvas } = this.#context;
+        if (canvas.width !== picture.width || canvas.height !== picture.height) {
+          [canvas.width, canvas.height] = [picture.width, picture.height];
+        }
+        this.#context.drawImage(picture, 0, 0);
+        picture.close();
+        this.#capturedS = new DataView(data).getFloat64(1, true);
+        this.#shownMs = performance.now();
+        this.frames += 1;
+        this.#place.dataset.frames = this.frames;
+      } catch {
+        continue; // a broken picture is as good as none
+      }
+    }
+    this.#busy = false;
+  }
+
+  look() {
+    if (this.#capturedS === null) {
+      this.#place.classList.add("old");
+      return;
+    }
+    const silent = performance.now() - this.#shownMs > SILENT_MS;
+    const ageS = this.#clock.ageS(this.#capturedS);
+    const old = silent || (ageS !== null && ageS > OLD_S);
+    this.#age.textContent = ageS === null ? "age unknown" : `${Math.max(0, ageS * 1000).toFixed(0)} ms old`;
+    this.#place.classList.toggle("old", old);
+    this.#stale.hidden = !old;
+    if (old) this.#stale.textContent = `STALE ${(ageS ?? (performance.now() - this.#shownMs) / 1000).toFixed(1)} s`;
+  }
+}

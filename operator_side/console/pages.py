@@ -1,0 +1,146 @@
+"""The open pages: each gets the newest of everything as fast as it takes it, and says what its hands do."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+
+MOST_PAGES: Final = 8
+_MOST_NOTES: Final = 50
+_A_SECOND: Final = 500
+"""Messages that a page may send in a second: hands at 60 Hz, and every key's edge."""
+_TOO_MANY, _NOT_OURS = 1013, 1008
+"""WebSocket's own codes: try again later; policy violation."""
+
+ROUND_ENDS: Final = '{"kind":"end"}'
+"""A page answers it with `taken`."""
+
+Heard = Callable[[str, bytes], None]
+"""Called with `h` or `t` and MessagePack of `{"page": number, "hands" or "tune": what the page said}`. A page that is
+gone says `hands` of nil."""
+
+
+class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page may say, as JSON; what is in the first two is not ours to judge."""
+
+    hands: dict[str, Any] | None = None
+    tune: dict[str, Any] | None = None
+    slow: bool | None = None
+    """Whether its browser draws the scene without a graphics processor"""
+    taken: bool | None = None
+    """All up to the last ROUND_ENDS has been looked at: the next round may come. Browsers store what a page has no time
+    for, without a bound, so that it would see everything, later and later."""
+
+
+class _Page:
+    """What one page has not been sent yet: the newest of each kind, so that a slow one only misses some."""
+
+    def __init__(self) -> None:
+        self.newest: dict[str, bytes | str] = {}
+        self.notes: deque[str] = deque(maxlen=_MOST_NOTES)
+        self.something = asyncio.Event()
+        self.taken = asyncio.Event()
+        self.slow = False
+
+    async def send(self, connection: ServerConnection) -> None:
+        while True:
+            await self.something.wait()
+            self.something.clear()
+            self.taken.clear()
+            this_round = [*self.notes, *self.newest.values()]
+            self.notes.clear()
+            self.newest.clear()
+            for message in (*this_round, ROUND_ENDS):
+                await connection.send(message)
+            await self.taken.wait()
+
+
+class Pages:
+    """All open pages. Everything here happens in the server's own thread."""
+
+    def __init__(self, changed: Callable[[int], None], heard: Heard) -> None:
+        """`changed` is told how many are open now."""
+        self._changed = changed
+        self._heard = heard
+        self._pages: dict[int, _Page] = {}
+        self._number = 0
+        self._lasting: dict[str, bytes | str] = {}
+        self._notes: deque[str] = deque(maxlen=_MOST_NOTES)
+
+    @property
+    def slow(self) -> bool:
+        """Whether one of them draws the scene slowly."""
+        return any(page.slow for page in self._pages.values())
+
+    def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
+        """Send this, text or bytes, instead of what of this kind has not left yet; `lasting`: to later pages, too."""
+        if lasting:
+            self._lasting[kind] = message
+        for page in self._pages.values():
+            page.newest[kind] = message
+            page.something.set()
+
+    def note(self, message: str) -> None:
+        """Send this to every page, and to later ones."""
+        self._notes.append(message)
+        for page in self._pages.values():
+            page.notes.append(message)
+            page.something.set()
+
+    async def serve(self, connection: ServerConnection) -> None:
+        """One page, until it goes."""
+        if len(self._pages) >= MOST_PAGES:
+            await connection.close(_TOO_MANY, f"{MOST_PAGES} pages are open")
+            return
+        self._number += 1
+        number, page = self._number, _Page()
+        page.newest.update(self._lasting)
+        page.notes.extend(self._notes)
+        if page.newest or page.notes:
+            page.something.set()
+        self._pages[number] = page
+        self._changed(len(self._pages))
+        sending = asyncio.create_task(self._send(page, connection))
+        try:
+            await self._listen(number, page, connection)
+        except ConnectionClosed:
+            pass
+        finally:
+            sending.cancel()
+            del self._pages[number]
+            self._changed(len(self._pages))
+            self._heard("h", msgspec.msgpack.encode({"page": number, "hands": None}))
+
+    async def _send(self, page: _Page, connection: ServerConnection) -> None:
+        try:
+            await page.send(connection)
+        except ConnectionClosed:
+            return  # whoever listens to it notices, too
+
+    async def _listen(self, number: int, page: _Page, connection: ServerConnection) -> None:
+        loop = asyncio.get_running_loop()
+        since_s, count = loop.time(), 0
+        async for message in connection:
+            now_s = loop.time()
+            if now_s - since_s > 1.0:
+                since_s, count = now_s, 0
+            count += 1
+            try:
+                said = msgspec.json.decode(message if isinstance(message, str) else b"", type=Said)
+            except (msgspec.DecodeError, RecursionError):
+                said = None
+            if said is None or count > _A_SECOND:
+                await connection.close(_NOT_OURS)
+                return
+            if said.taken is not None:
+                page.taken.set()
+            if said.slow is not None:
+                page.slow = said.slow
+            if said.hands is not None:
+                self._heard("h", msgspec.msgpack.encode({"page": number, "hands": said.hands}))
+            if said.tune is not None:
+                self._heard("t", msgspec.msgpack.encode({"page": number, "tune": said.tune}))

@@ -1,0 +1,102 @@
+"""Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from common.command.live_view import Value
+from common.command.status import Status
+from common.protocol.codec import encode
+from common.protocol.messages import Watch
+from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
+from operator_side.console.console import Console
+from operator_side.core import OperatorSide
+from operator_side.facts import FACTS_PERIOD_S
+from operator_side.facts_of_core import Surroundings, operator_facts
+from operator_side.following_pages import hear_pages
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.scene_figures import SceneFigures
+from operator_side.settings import OperatorSettings
+
+_WATCH_PERIOD_S: Final = 0.25
+_TELEMETRY_TOPIC: Final = b"telemetry"
+
+
+def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
+    """What to subscribe to: pictures only where they could be shown."""
+    scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
+    return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
+
+
+class Viewing:
+    """Feeds who looks; asks for nothing while nobody does."""
+
+    def __init__(
+        self,
+        core: OperatorSide,
+        surroundings: Callable[[float], Surroundings],
+        status: Status,
+        pages: DrivingPage,
+        console: Console | None,
+    ) -> None:
+        """`surroundings`: those of a moment. `pages`: are told what the console's say."""
+        self.console = console
+        self._pages = pages
+        self._core = core
+        self._surroundings = surroundings
+        self._status = status
+        self._figures = SceneFigures()
+        self._told: str | None = None
+        self._watch_s = self._facts_s = -math.inf
+
+    def note(self, text: str) -> None:
+        """Say it to everybody: a line that stays."""
+        self._status.note(text)
+        if self.console is not None:
+            self.console.note(text)
+
+    def take(self, topic: bytes, payload: bytes) -> bool:
+        """Whether a view payload is for who looks, and not for the core."""
+        if topic not in (VIDEO_TOPIC, SCENE_TOPIC):
+            return False
+        if topic == SCENE_TOPIC and self._status.wants_facts:
+            self._figures.take(payload)
+        if self.console is not None:
+            self.console.view(payload, video=topic == VIDEO_TOPIC)
+        return True
+
+    def requests(self, now_s: float) -> list[bytes]:
+        """What to send to the robot side now: what is looked at, while anything is."""
+        if self.console is not None:
+            hear_pages(self.console, self._pages, now_s)
+        pages = self.console is not None and self.console.pages > 0
+        if not (pages or self._status.wants_facts) or now_s - self._watch_s < _WATCH_PERIOD_S:
+            return []
+        self._watch_s = now_s
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True)
+        return [encode(watch)]
+
+    def facts_due(self, now_s: float) -> bool:
+        """Whether to call `show`."""
+        if self.console is None:
+            return False
+        for text in self.console.take_notes():
+            self._status.note(text)
+        if self.console.address not in (None, self._told):
+            self._told = self.console.address
+            if not self._status.event("console", address=self._told):
+                self._status.note(f"console: {self._told}")
+        return self.console.pages > 0 and now_s - self._facts_s >= FACTS_PERIOD_S
+
+    def show(self, status: Mapping[str, Value], now_s: float) -> None:
+        """Show the facts of `now_s`; `status`: what the status line is made of."""
+        self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
+        if self.console is not None:
+            self.console.facts(operator_facts(self._core, status, self._surroundings(now_s), now_s))
+
+    def tell(self, status: Mapping[str, Value], now_s: float) -> None:
+        """Tell the status of `now_s`, and the facts where somebody wants them."""
+        self._status.show(now_s, status)
+        if self._status.wants_facts:
+            known = {**status, **self._figures.figures()}
+            self._status.show_facts(operator_facts(self._core, known, self._surroundings(now_s), now_s))

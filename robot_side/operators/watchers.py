@@ -1,0 +1,31 @@
+"""Who looks at what: each Watch counts for a second after it arrived."""
+
+from common.protocol.messages import Watch
+
+WATCH_S = 1.0
+_PARTS = ("overview", "first_person", "scene")
+_NOBODY: frozenset[str] = frozenset()
+
+
+class Watchers:
+    """The newest Watch of each operator; the session admits only those of owner and observers."""
+
+    def __init__(self) -> None:
+        self.scene_begun = 0
+        """How often somebody began to look at the scene."""
+        self._watching: dict[int, tuple[Watch, float]] = {}
+
+    def heard(self, epoch: int, watch: Watch, now_s: float) -> None:
+        """Take one Watch of the operator `epoch`."""
+        before = self._watching.get(epoch)
+        looked = before is not None and before[0].scene and now_s - before[1] < WATCH_S
+        self.scene_begun += watch.scene and not looked
+        self._watching[epoch] = watch, now_s
+
+    def looked_at(self, now_s: float) -> frozenset[str]:
+        """What somebody looks at: of `overview`, `first_person` and `scene`, those that are."""
+        if not self._watching:
+            return _NOBODY
+        for epoch in [epoch for epoch, (_, heard_s) in self._watching.items() if now_s - heard_s >= WATCH_S]:
+            del self._watching[epoch]
+        return frozenset(part for part in _PARTS for watch, _ in self._watching.values() if getattr(watch, part))

@@ -1,0 +1,199 @@
+"""Chromium without a screen, and a page in it whose every complaint is kept."""
+
+import base64
+import io
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from PIL import Image
+
+from tests.containers.watch import CheckFailedError
+
+_ARGUMENTS: Final = (
+    # Root has no sandbox, and a machine without a graphics processor draws by software.
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--force-color-profile=srgb",
+)
+SMALL: Final = (1280, 720)
+LARGE: Final = (1920, 1080)
+_LIMIT_MS: Final = 20_000
+_LOOK_S: Final = 0.02
+_BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
+_FAKE_GAMEPAD: Final = """
+window.pretended = null;
+navigator.getGamepads = () => [window.pretended, null, null, null];
+"""
+
+
+class Browser:
+    """One browser; each page has a context of its own, as another person's would."""
+
+    def __init__(self, chromium: Any, out: Path) -> None:
+        self._chromium = chromium
+        self._out = out
+
+    @contextmanager
+    def page(self, address: str, size: tuple[int, int] = SMALL, *, gamepad: bool = False) -> Iterator["Page"]:
+        """`address` open at `size`; whatever the page complained of fails the context's end."""
+        context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
+        context.set_default_timeout(_LIMIT_MS)
+        from playwright.sync_api import Error  # noqa: PLC0415  # not part of our environment
+
+        try:
+            opened = context.new_page()
+            if gamepad:
+                opened.add_init_script(_FAKE_GAMEPAD)
+            page = Page(opened, self._out)
+            opened.goto(address)
+            yield page
+            if page.complaints:
+                raise CheckFailedError(f"the page complained: {'; '.join(page.complaints[:3])}")
+        except Error as error:
+            raise CheckFailedError(f"the browser: {str(error).splitlines()[0]}") from error
+        finally:
+            context.close()
+
+
+class Page:
+    """What a person does at a page and sees of it. `raw`: Playwright's own page, for all else."""
+
+    def __init__(self, raw: Any, out: Path) -> None:
+        self.raw = raw
+        self.complaints: list[str] = []
+        """Errors on its console and uncaught ones; a check that expects some clears them."""
+        self._out = out
+        self._tools = raw.context.new_cdp_session(raw)
+        raw.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
+        raw.on("pageerror", lambda error: self.complaints.append(str(error)))
+
+    def text(self, selector: str) -> str:
+        """What stands there."""
+        return str(self.raw.text_content(selector) or "").strip()
+
+    def ask(self, script: str, argument: object = None) -> Any:
+        """What a piece of JavaScript says."""
+        return self.raw.evaluate(script, argument)
+
+    def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
+        """Until JavaScript says so; CheckFailedError when it does not."""
+        # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
+        end_s = time.monotonic() + limit_s
+        while not self.ask(script):
+            if time.monotonic() > end_s:
+                self.picture("unexpected")
+                raise CheckFailedError(f"not {what} within {limit_s:g} s")
+            time.sleep(_LOOK_S)
+
+    def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
+        """Until `words` stand there, in any case."""
+        script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
+        self.wait(script, f"{words!r} in {selector}", limit_s)
+
+    def pixels(self, selector: str | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """(height, width, 3) of what is drawn there, or of the whole page."""
+        return np.asarray(Image.open(io.BytesIO(self._shot(selector))).convert("RGB"))
+
+    def picture(self, name: str) -> None:
+        """Keep a picture of the page for people."""
+        (self._out / f"{name}.png").write_bytes(self._shot())
+
+    def _shot(self, selector: str | None = None) -> bytes:
+        """As Chromium itself takes it: Playwright's way waits for the fonts of a scene that is busy drawing."""
+        clip = {}
+        if selector is not None:
+            box = self.raw.locator(selector).bounding_box()
+            clip = {"clip": {**box, "scale": 1}}
+        answer = self._tools.send("Page.captureScreenshot", {"format": "png", **clip})
+        return base64.b64decode(answer["data"])
+
+    def updates_per_second(self, selector: str, seconds: float = 3.0) -> float:
+        """How often what stands there, or one of its attributes, changes: drawn frames in which it did."""
+        script = """async ([selector, seconds]) => {
+            let changed = 0, fresh = false;
+            const observer = new MutationObserver(() => { fresh = true; });
+            const all = { attributes: true, childList: true, characterData: true, subtree: true };
+            observer.observe(document.querySelector(selector), all);
+            const began = performance.now();
+            while (performance.now() - began < 1000 * seconds) {
+                await new Promise(requestAnimationFrame);
+                changed += fresh;
+                fresh = false;
+            }
+            observer.disconnect();
+            return 1000 * changed / (performance.now() - began);
+        }"""
+        return float(self.ask(script, [selector, seconds]))
+
+    def press(self, key: str) -> None:
+        """Down and up."""
+        self.raw.keyboard.press(key)
+
+    @contextmanager
+    def held(self, *keys: str) -> Iterator[None]:
+        """These keys down."""
+        for key in keys:
+            self.raw.keyboard.down(key)
+        try:
+            yield
+        finally:
+            for key in reversed(keys):
+                self.raw.keyboard.up(key)
+
+    def blur(self) -> None:
+        """The window loses the focus, as when a person goes to another one."""
+        self.ask("window.dispatchEvent(new Event('blur'))")
+
+    def hide(self) -> None:
+        """The tab is hidden, as when a person goes to another one."""
+        self.ask(
+            """() => {
+            Object.defineProperty(document, 'visibilityState', { value: 'hidden', configurable: true });
+            Object.defineProperty(document, 'hidden', { value: true, configurable: true });
+            document.dispatchEvent(new Event('visibilitychange'));
+        }"""
+        )
+
+    def pretend_gamepad(self, axes: tuple[float, ...], buttons: tuple[float, ...]) -> None:
+        """A gamepad in these positions, in the browser's standard order, until told otherwise."""
+        script = """([axes, values]) => {
+            const buttons = values.map((value) => ({ value, pressed: value > 0.5, touched: value > 0 }));
+            const before = window.pretended;
+            const known = { id: 'pretended', index: 0, mapping: 'standard', connected: true };
+            window.pretended = { ...known, axes, buttons, timestamp: performance.now() };
+            const event = new Event('gamepadconnected');
+            event.gamepad = window.pretended;
+            if (!before) window.dispatchEvent(event);
+        }"""
+        self.ask(script, [list(axes), list(buttons)])
+
+
+def brightness(pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """(height, width), 0 to 255: what is left for whoever sees no colours."""
+    made: np.ndarray[Any, np.dtype[np.float64]] = pixels.astype(np.float64) @ np.asarray(_BRIGHTNESS)
+    return made
+
+
+def border(pixels: np.ndarray[Any, np.dtype[np.uint8]], width: int = 8) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """(n, 3): the outermost pixels of the page's upper edge, corners aside."""
+    return pixels[:width, 4 * width : -4 * width].reshape(-1, 3)
+
+
+@contextmanager
+def browser(program: str, out: Path) -> Iterator[Browser]:
+    """Chromium, until the context ends; Playwright has been provided."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415  # not part of our environment
+
+    out.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=program, args=list(_ARGUMENTS))
+        try:
+            yield Browser(chromium, out)
+        finally:
+            chromium.close()

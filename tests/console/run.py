@@ -1,0 +1,83 @@
+"""A real run with a console: both sides as the demo starts them, and what it says of itself meanwhile."""
+
+import os
+import signal
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Final
+
+from feelahead.both_sides.processes import StartedSide
+from tests.containers.watch import CheckFailedError
+
+Event = dict[str, Any]
+_START_S: Final = 300.0
+"""The first start compiles the overlap kernels."""
+_KEPT: Final = 400
+_LOOK_S: Final = 0.02
+
+
+class Run:
+    """A demo, and its newest facts."""
+
+    def __init__(self, demo: StartedSide) -> None:
+        self._demo = demo
+        self.address = ""
+        """The console's, with its token."""
+        self.process_ids: dict[str, int] = {}
+        """By side."""
+        self.facts: deque[Event] = deque(maxlen=_KEPT)
+        """The newest last, ten a second."""
+        self.notes: list[str] = []
+
+    def look(self) -> None:
+        """Take what it has said since."""
+        for event in self._demo.events():
+            kind = event["event"]
+            if kind == "console":
+                self.address = event["address"]
+            elif kind == "started":
+                self.process_ids[event["side"]] = event["process_id"]
+            elif kind == "facts":
+                self.facts.append(event["facts"])
+            elif kind == "note":
+                self.notes.append(event["text"])
+        self._demo.check()
+
+    def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
+        """How long it took in seconds; CheckFailedError when it does not come."""
+        began_s = time.monotonic()
+        while True:
+            self.look()
+            if holds(self):
+                return time.monotonic() - began_s
+            if time.monotonic() - began_s > limit_s:
+                raise CheckFailedError(f"not {what} within {limit_s:g} s; newest: {self.status} {self.notes[-3:]}")
+            time.sleep(_LOOK_S)
+
+    @property
+    def status(self) -> Event:
+        """Of the newest facts."""
+        return dict(self.facts[-1]["status"]) if self.facts else {}
+
+    @contextmanager
+    def frozen(self, side: str) -> Iterator[None]:
+        """kill -STOP it, and let it go on."""
+        os.kill(self.process_ids[side], signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(self.process_ids[side], signal.SIGCONT)
+
+
+@contextmanager
+def running(arguments: Sequence[str]) -> Iterator[Run]:
+    """A demo that has a console and a link, until the context ends."""
+    command = [sys.executable, "-P", "-m", "feelahead", "demo", "--status", "facts", "--duration", "3600", *arguments]
+    with StartedSide("demo", command) as demo:
+        run = Run(demo)
+        run.wait_until("a console's address", lambda run: run.address, _START_S)
+        run.wait_until("linked", lambda run: run.status.get("link") == "up", _START_S)
+        yield run

@@ -1,0 +1,65 @@
+"""A companion that renders nothing and does as a test says, with Cameras in front of it."""
+
+import socket
+from collections.abc import Callable
+
+from common.companion.channel import Channel
+from robot_side.cameras.exchange import Order, Picture, Refusal, Setup, decode_to_companion, encode
+from robot_side.cameras.pictures import Cameras, Renders
+from robot_side.cameras.settings import CamerasSettings
+from robot_side.simulation.scene import Scene
+
+
+class FakeCompanion:
+    """Both ends of a channel, and what the other end was sent."""
+
+    def __init__(self) -> None:
+        ours, theirs = socket.socketpair()
+        self.channel, self.other = Channel(ours), Channel(theirs)
+        self.running = True
+        self.closed: list[float] = []
+
+    def close(self, limit_s: float = 2.0) -> bool:
+        self.closed.append(limit_s)
+        self.channel.close()
+        self.other.close()
+        self.running = False
+        return True
+
+    def heard(self) -> list[Setup | Order]:
+        return [decode_to_companion(payload) for payload in self.other.receive()]
+
+    def answer(self, message: Picture | Refusal) -> None:
+        self.other.send(encode(message))
+
+    def picture(self, order: Order, jpeg: bytes = b"\xff\xd8") -> None:
+        self.answer(Picture(order.view, order.captured_s, jpeg, 0.003))
+
+
+class Desk:
+    """Cameras, the companions that they started, and what a person was told."""
+
+    def __init__(self, scene: Scene, settings: CamerasSettings | None = None) -> None:
+        self.companions: list[FakeCompanion] = []
+        self.notes: list[str] = []
+        self.fails_to_start: str | None = None
+        self.cameras = Cameras(scene, settings or CamerasSettings(), self.notes.append, self._start)
+
+    def _start(self, done: Callable[[Renders | str], None]) -> None:
+        if self.fails_to_start is not None:
+            done(self.fails_to_start)
+            return
+        self.companions.append(FakeCompanion())
+        done(self.companions[-1])
+
+    def orders(self) -> list[Order]:
+        return [message for message in self.companions[-1].heard() if isinstance(message, Order)]
+
+    def started(self, now_s: float = 0.0) -> FakeCompanion:
+        self.cameras.update(now_s, now_s, ("overview", "first_person"))
+        return self.companions[-1]
+
+    def close(self) -> None:
+        self.cameras.close()
+        for companion in self.companions:
+            companion.close()

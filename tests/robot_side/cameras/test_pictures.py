@@ -1,0 +1,145 @@
+"""The robot side's end of rendering in virtual time, with a companion that does as the test says."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from common.protocol.view_messages import ViewName
+from robot_side.cameras.exchange import Order, Refusal, Setup
+from robot_side.cameras.pictures import IDLE_S, RETRY_S
+from robot_side.cameras.settings import CamerasSettings
+from robot_side.simulation.scene import Scene, load_scene
+from tests.helpers.fake_companion import Desk
+
+BOTH: tuple[ViewName, ViewName] = ("overview", "first_person")
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene()
+
+
+@pytest.fixture
+def desk(scene: Scene) -> Iterator[Desk]:
+    made = Desk(scene)
+    yield made
+    made.close()
+
+
+def test_nothing_is_started_before_somebody_looks(desk: Desk) -> None:
+    for turn in range(200):
+        assert desk.cameras.update(0.01 * turn, 0.0, ()) == []
+    assert desk.companions == []
+    desk.started(2.0)
+    assert len(desk.companions) == 1
+
+
+def test_one_order_of_each_view_is_under_way_and_its_answer_carries_its_stamp(desk: Desk) -> None:
+    companion = desk.started()
+    desk.cameras.update(0.001, 0.5, BOTH)
+    setup, *orders = companion.heard()
+    assert isinstance(setup, Setup)
+    assert [(order.view, order.captured_s) for order in orders if isinstance(order, Order)] == [
+        ("overview", 0.5),
+        ("first_person", 0.5),
+    ]
+    for turn in range(10):
+        assert desk.cameras.update(0.002 + 0.001 * turn, 0.6, BOTH) == []
+    assert companion.heard() == []
+    companion.picture(orders[1])  # type: ignore[arg-type]
+    [picture] = desk.cameras.update(0.02, 0.7, BOTH)
+    assert (picture.view, picture.captured_s) == ("first_person", 0.5)
+    assert [(order.view, order.captured_s) for order in desk.orders()] == [("first_person", 0.7)]
+
+
+def test_an_order_holds_the_state_as_it_is(desk: Desk, scene: Scene) -> None:
+    companion = desk.started()
+    companion.heard()
+    scene.data.qpos[0] += 0.125
+    desk.cameras.update(0.001, 0.5, BOTH[:1])
+    [order] = desk.orders()
+    assert order.positions == scene.data.qpos.tobytes()
+
+
+def test_a_companion_that_dies_is_said_and_started_again_but_not_at_once(desk: Desk) -> None:
+    companion = desk.started()
+    desk.cameras.update(0.001, 0.0, BOTH)
+    for order in desk.orders():
+        companion.picture(order)
+    assert len(desk.cameras.update(0.01, 0.0, BOTH)) == 2
+    companion.other.close()
+    companion.running = False
+    assert desk.cameras.update(0.02, 0.0, BOTH) == []
+    [note] = desk.notes
+    assert "ended unexpectedly" in note
+    for turn in range(1, 100):
+        desk.cameras.update(0.02 + turn * RETRY_S / 100.0, 0.0, BOTH)
+    assert len(desk.companions) == 1
+    desk.cameras.update(0.03 + RETRY_S, 0.0, BOTH)
+    assert len(desk.companions) == 2
+    desk.cameras.update(0.04 + RETRY_S, 0.0, BOTH)
+    desk.companions[-1].picture(desk.orders()[0])
+    assert len(desk.cameras.update(0.05 + RETRY_S, 0.0, BOTH)) == 1
+    assert desk.notes == [note]
+    assert desk.cameras.works
+
+
+def test_where_it_cannot_work_that_is_said_once_and_nothing_is_tried_again(desk: Desk) -> None:
+    companion = desk.started()
+    companion.answer(Refusal("no EGL; to mend it: install something"))
+    for turn in range(1000):
+        desk.cameras.update(0.1 * turn, 0.0, BOTH)
+    assert len(desk.companions) == 1
+    assert desk.notes == ["cameras: no pictures, the arm goes on without: no EGL; to mend it: install something"]
+    assert not desk.cameras.works
+
+
+def test_one_that_never_comes_to_a_picture_is_given_up(desk: Desk) -> None:
+    for turn in range(2000):
+        desk.cameras.update(0.01 * turn, 0.0, BOTH)
+        if desk.companions:
+            desk.companions[-1].other.close()
+    assert len(desk.companions) == 2
+    assert len(desk.notes) == 2
+    assert "feelahead doctor" in desk.notes[-1]
+
+
+def test_one_that_hangs_is_ended(desk: Desk) -> None:
+    companion = desk.started()
+    for turn in range(1, 4000):
+        desk.cameras.update(0.01 * turn, 0.0, BOTH)
+    assert companion.closed == [0.0]
+    assert any("has not answered" in note for note in desk.notes)
+
+
+def test_after_a_minute_without_anybody_it_ends_and_begins_anew_for_the_next(desk: Desk) -> None:
+    companion = desk.started()
+    desk.cameras.update(0.1, 0.0, BOTH)
+    for order in desk.orders():
+        companion.picture(order)
+    desk.cameras.update(0.2, 0.0, ())
+    desk.cameras.update(0.1 + IDLE_S, 0.0, ())
+    assert companion.closed == []
+    desk.cameras.update(0.2 + IDLE_S, 0.0, ())
+    assert companion.channel.ended
+    companion.running = False
+    desk.cameras.update(0.3 + IDLE_S, 0.0, ())
+    # It has ended by itself: it is only seen off.
+    assert companion.closed == [0.0]
+    desk.cameras.update(0.4 + IDLE_S, 0.0, BOTH)
+    assert len(desk.companions) == 2
+    assert desk.notes == []
+
+
+def test_who_cannot_start_a_process_is_told_so(desk: Desk) -> None:
+    desk.fails_to_start = "no process can be started: Cannot allocate memory"
+    desk.cameras.update(0.0, 0.0, BOTH)
+    assert "Cannot allocate memory" in desk.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("width", 0), ("height", 5000), ("rate_hz", 0.0), ("quality", 101), ("rate_hz", float("nan"))]
+)
+def test_settings_out_of_range_are_named(field: str, value: float) -> None:
+    with pytest.raises(ValueError, match=rf"cameras\.{field} = .*; valid: "):
+        CamerasSettings(**{field: value})  # type: ignore[arg-type]

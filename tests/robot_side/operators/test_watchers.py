@@ -1,0 +1,84 @@
+import pytest
+
+from common.protocol.codec import encode
+from common.protocol.messages import Watch
+from feelahead.experiments.faults.session_bench import Bench, Operator
+from robot_side.operators.watchers import WATCH_S, Watchers
+
+
+def watch(bench: Bench, operator: Operator, **what: bool) -> None:
+    payload = encode(Watch(operator.link.stamp(bench.now_s), **what))
+    bench.robot.receive(operator.peer, payload, bench.now_s)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def looked_at(bench: Bench) -> frozenset[str]:
+    return bench.robot.session.watchers.looked_at(bench.now_s)
+
+
+def test_owner_and_observers_may_look_and_each_watch_lasts_a_second(bench: Bench) -> None:
+    owner, observer = bench.join(2, b"one"), bench.join(3, b"two")
+    assert looked_at(bench) == frozenset()
+    watch(bench, owner, overview=True)
+    bench.tick(600)
+    watch(bench, observer, scene=True, first_person=True)
+    assert looked_at(bench) == {"overview", "first_person", "scene"}
+    bench.tick(399)
+    assert "overview" in looked_at(bench)
+    bench.tick(1)
+    assert looked_at(bench) == {"first_person", "scene"}
+    bench.tick(600)
+    assert looked_at(bench) == frozenset()
+
+
+def test_the_newest_watch_of_each_holds(bench: Bench) -> None:
+    owner = bench.join(2)
+    watch(bench, owner, overview=True)
+    bench.tick()
+    watch(bench, owner, first_person=True)
+    assert looked_at(bench) == {"first_person"}
+
+
+def test_a_watch_of_nobody_known_is_rejected(bench: Bench) -> None:
+    stranger = bench.operator(9, b"stranger")
+    watch(bench, stranger, overview=True)
+    assert looked_at(bench) == frozenset()
+    assert bench.robot.session.rejected == 1
+
+
+def test_an_old_watch_again_counts_for_nothing(bench: Bench) -> None:
+    owner = bench.join(2)
+    payload = encode(Watch(owner.link.stamp(bench.now_s), overview=True))
+    bench.robot.receive(owner.peer, payload, bench.now_s)
+    bench.tick(1500)
+    bench.robot.receive(owner.peer, payload, bench.now_s)
+    assert looked_at(bench) == frozenset()
+
+
+def test_a_watch_moves_no_arm_and_arms_none(bench: Bench) -> None:
+    owner = bench.join(2)
+    for _ in range(50):
+        watch(bench, owner, scene=True)
+        bench.tick(10)
+    assert bench.state == "disarmed"
+    assert bench.robot.session.motion_received == 0
+
+
+def test_beginning_to_look_is_counted_once_for_each_who_begins() -> None:
+    watchers = Watchers()
+    header = Bench().operator(1).link.stamp(0.0)
+    look, away = Watch(header, scene=True), Watch(header)
+    for turn in range(5):
+        watchers.heard(1, look, 0.25 * turn)
+    assert watchers.scene_begun == 1
+    watchers.heard(2, look, 1.0)
+    assert watchers.scene_begun == 2
+    watchers.heard(1, away, 1.1)
+    watchers.heard(1, look, 1.2)
+    assert watchers.scene_begun == 3
+    watchers.heard(1, look, 1.2 + WATCH_S)
+    assert watchers.scene_begun == 4
