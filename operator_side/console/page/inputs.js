@@ -1,0 +1,187 @@
+// What hands do at this page: keys by their place, whatever their layout; pointers; gamepads in the standard mapping.
+
+export const KEYS = [
+  // what it does, codes of the keys
+  ["run", ["Space"], "hold to run (arms, too)"],
+  ["advance", ["KeyW", "ArrowUp"], "advance"],
+  ["retreat", ["KeyS", "ArrowDown"], "retreat"],
+  ["left", ["KeyA"], "across: left"],
+  ["right", ["KeyD"], "right"],
+  ["up", ["KeyR"], "up"],
+  ["down", ["KeyF"], "down"],
+  ["turn_left", ["KeyQ", "ArrowLeft"], "turn: left"],
+  ["turn_right", ["KeyE", "ArrowRight"], "right"],
+  ["turn_up", ["KeyI"], "up"],
+  ["turn_down", ["KeyK"], "down"],
+  ["close", ["KeyC"], "close the gripper"],
+  ["open", ["KeyO"], "open it"],
+  ["next_target", ["KeyT"], "next target"],
+  ["hand_over", ["KeyH"], "hand the robot over"],
+];
+const DOES = new Map(KEYS.flatMap(([does, codes]) => codes.map((code) => [code, does])));
+const WORDS = { Space: "Space", ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
+const LEVEL = /^(?:Digit|Numpad)([1-9])$/;
+const RAMP_S = 0.6;
+const PULLED = 0.05; // of a gamepad's trigger
+const DEFLECTED = 0.12; // of its sticks
+
+export const REST = Object.freeze({
+  run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
+});
+
+export const atRest = (hands) =>
+  !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.hand_over &&
+  [...hands.lateral, ...hands.turning].every((part) => part === 0);
+
+// Keys that are down, and how far what they do has come: up over RAMP_S, and to nothing at once.
+export class Keys {
+  level = 4; // of 9
+  #down = new Set();
+  #ways = new Map();
+
+  press(code) {
+    const digit = LEVEL.exec(code);
+    if (digit) this.level = Number(digit[1]);
+    else if (DOES.has(code)) this.#down.add(code);
+    else return false;
+    return true;
+  }
+
+  lift(code) {
+    this.#down.delete(code);
+  }
+
+  clear() {
+    this.#down.clear();
+    this.#ways.clear();
+  }
+
+  get any() {
+    return this.#down.size > 0;
+  }
+
+  // `moves`: only then ways grow; keys that are held count as pressed in any case.
+  read(passed_s, moves) {
+    const held = new Set([...this.#down].map((code) => DOES.get(code)));
+    const most = this.level / 9;
+    const way = (does, against) => {
+      const before = this.#ways.get(does) ?? 0;
+      const now = !held.has(does) || held.has(against) || !moves ? 0 : Math.min(most, before + (most * passed_s) / RAMP_S);
+      this.#ways.set(does, now);
+      return now;
+    };
+    const axis = (plus, minus) => way(plus, minus) - way(minus, plus);
+    const hands = {
+      run: held.has("run"),
+      r2: way("advance", "retreat"),
+      l2: way("retreat", "advance"),
+      lateral: [axis("right", "left"), axis("up", "down")],
+      turning: [axis("turn_right", "turn_left"), axis("turn_up", "turn_down")],
+      gripper: Number(held.has("close")) - Number(held.has("open")),
+      next_target: held.has("next_target"),
+      hand_over: held.has("hand_over"),
+    };
+    return { hands, pressed: held.size > 0 };
+  }
+}
+
+export async function keyWords() {
+  // The words on this keyboard where the browser knows them, else those of the keys' own places.
+  const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => null);
+  return (code) => WORDS[code] ?? (layout?.get(code) ?? code.replace("Key", "")).toUpperCase();
+}
+
+const beyond = (value, dead) => Math.max(0, Math.min(1, (value - dead) / (1 - dead)));
+
+function stick(x, y) {
+  const length = Math.hypot(x, y);
+  const part = length ? beyond(length, DEFLECTED) / length : 0;
+  return [x * part + 0, -y * part + 0]; // a gamepad's y points down
+}
+
+// `swapped`: left and right exchanged, as for a controller of ours.
+export function readGamepads(swapped) {
+  const found = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
+  const known = found.filter((pad) => pad.mapping === "standard");
+  let hands = REST, stop = false;
+  for (const pad of known) {
+    const value = (number) => pad.buttons[number]?.value ?? 0;
+    const pressed = (number) => pad.buttons[number]?.pressed ?? false;
+    const [left, right] = [beyond(value(6), PULLED), beyond(value(7), PULLED)];
+    const sticks = [stick(pad.axes[0] ?? 0, pad.axes[1] ?? 0), stick(pad.axes[2] ?? 0, pad.axes[3] ?? 0)];
+    if (swapped) sticks.reverse();
+    stop ||= pressed(1);
+    hands = both(hands, {
+      run: pressed(swapped ? 5 : 4),
+      l2: swapped ? right : left,
+      r2: swapped ? left : right,
+      lateral: sticks[0],
+      turning: sticks[1],
+      gripper: Number(pressed(0)) - Number(pressed(2)),
+      next_target: pressed(3),
+      hand_over: pressed(8),
+    });
+  }
+  return { hands, stop, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
+}
+
+// Two ways to do things at once: the farther one of each.
+export function both(one, other) {
+  const farther = (a, b) => (Math.hypot(...a) >= Math.hypot(...b) ? a : b);
+  return {
+    run: one.run || other.run,
+    l2: Math.max(one.l2, other.l2),
+    r2: Math.max(one.r2, other.r2),
+    lateral: farther(one.lateral, other.lateral),
+    turning: farther(one.turning, other.turning),
+    gripper: Math.sign(one.gripper + other.gripper),
+    next_target: one.next_target || other.next_target,
+    hand_over: one.hand_over || other.hand_over,
+  };
+}
+
+// Places on the page that are held with a pointer; each holds to run, too, and what it says grows from where it began.
+export class Grips {
+  #held = new Map();
+
+  constructor(changed) {
+    this.changed = changed;
+  }
+
+  // `says(right, up)`: what so much of the way from where the pointer went down says; 1 is `reach` pixels.
+  add(element, says, reach = 90) {
+    const share = (pixels) => Math.max(-1, Math.min(1, pixels / reach));
+    element.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      event.preventDefault();
+      element.setPointerCapture(event.pointerId);
+      this.#held.set(event.pointerId, { element, says, from: [event.clientX, event.clientY], hands: says(0, 0) });
+      element.dataset.held = "";
+      this.changed();
+    });
+    element.addEventListener("pointermove", (event) => {
+      const grip = this.#held.get(event.pointerId);
+      if (grip?.element !== element) return;
+      grip.hands = says(share(event.clientX - grip.from[0]), share(grip.from[1] - event.clientY));
+      this.changed();
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
+      element.addEventListener(end, (event) => this.#lift(event.pointerId));
+  }
+
+  #lift(pointer) {
+    const grip = this.#held.get(pointer);
+    if (!grip) return;
+    this.#held.delete(pointer);
+    delete grip.element.dataset.held;
+    this.changed();
+  }
+
+  clear() {
+    for (const pointer of [...this.#held.keys()]) this.#lift(pointer);
+  }
+
+  read() {
+    return [...this.#held.values()].reduce((hands, grip) => both(hands, { ...REST, run: true, ...grip.hands }), REST);
+  }
+}

@@ -1,0 +1,119 @@
+// What the hands' part of the page shows, and what of it can be held.
+import { KEYS, keyWords } from "./inputs.js";
+
+const FULL = "How far a key goes: 1 to 9";
+
+export class Panel {
+  #section;
+  #places = {};
+  #shown = new Map();
+
+  constructor(document, { drive, stop, giveBack }) {
+    const make = (tag, properties = {}, ...content) => {
+      const element = Object.assign(document.createElement(tag), properties);
+      element.append(...content);
+      return element;
+    };
+    const place = (name, element) => (this.#places[name] = element);
+    const style = make("link", { rel: "stylesheet", href: new URL("hands.css", import.meta.url).href });
+    document.head.append(style);
+    this.#section = document.getElementById("hands");
+    const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "Emergency stop (Esc)"));
+    stopButton.addEventListener("pointerdown", () => stop(true));
+    for (const end of ["pointerup", "pointercancel", "pointerleave"]) stopButton.addEventListener(end, () => stop(false));
+    stopButton.addEventListener("click", () => (stop(true), stop(false)));
+    const held = (name, text, label) => {
+      const element = make("div", { className: "grip", id: `grip_${name}` }, text);
+      element.setAttribute("role", "img");
+      element.setAttribute("aria-label", label);
+      return place(name, element);
+    };
+    const keys = place("keys", make("dl"));
+    this.#section.replaceChildren(
+      make("h2", {}, "Hands"),
+      place("drive", make("button", { type: "button", id: "drive", onclick: drive }, "Drive from here")),
+      stopButton,
+      place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true },
+        "Let the person go on")),
+      place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
+      place("rest", make("p", { id: "hands_rest" })),
+      place("stopped", make("p", { id: "hands_stopped", role: "alert" })),
+      place("level", make("p", { id: "hands_level" })),
+      make("div", { className: "grips" },
+        held("run", "hold to run", "Hold to run, with the pointer"),
+        held("advance", "advance ↑", "Hold and drag up to advance"),
+        held("retreat", "retreat ↓", "Hold and drag down to retreat"),
+        held("across", "across ✥", "Hold and drag to move across"),
+        held("turn", "turn ↻", "Hold and drag to turn"),
+        held("close", "close", "Hold to close the gripper"),
+        held("open", "open", "Hold to open the gripper"),
+        held("next", "next target", "Hold to choose the next target")),
+      place("pad", make("p", { id: "hands_gamepad" })),
+      make("details", {}, make("summary", {}, "Keys"), keys));
+    keyWords().then((word) => {
+      keys.replaceChildren(...KEYS.flatMap(([, codes, does]) => [
+        make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
+      ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "how far keys go"),
+      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, whoever drives"));
+    });
+  }
+
+  grip(grips) {
+    const part = (value) => Math.max(0, value);
+    grips.add(this.#places.run, () => ({}));
+    grips.add(this.#places.advance, (right, up) => ({ r2: part(up) }));
+    grips.add(this.#places.retreat, (right, up) => ({ l2: part(-up) }));
+    grips.add(this.#places.across, (right, up) => ({ lateral: [right, up] }), 60);
+    grips.add(this.#places.turn, (right, up) => ({ turning: [right, up] }), 60);
+    grips.add(this.#places.close, () => ({ gripper: 1 }));
+    grips.add(this.#places.open, () => ({ gripper: -1 }));
+    grips.add(this.#places.next, () => ({ next_target: true }));
+  }
+
+  focus() {
+    this.#places.state.focus();
+  }
+
+  #text(name, text) {
+    if (this.#shown.get(name) === text) return;
+    this.#shown.set(name, text);
+    this.#places[name].textContent = text;
+    this.#places[name].hidden = text === "";
+  }
+
+  showGamepad({ name, unknown }, there) {
+    if (unknown) this.#text("pad", `Gamepad not used, as its mapping is unknown: ${unknown}`);
+    else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (not while the page has no focus)"}` : "");
+  }
+
+  show({ state, why, restMs, armed, facts, hands, mine, level, stop }) {
+    const { drive, giveBack } = this.#places;
+    this.#section.dataset.state = state;
+    const cannot = hands === null ? "Nothing to drive is known yet."
+      : !hands.may_drive ? "A real controller drives here; this page can stop the robot."
+      : facts.status.owner === "observing" ? "Another operator owns the robot; this one observes."
+      : "";
+    const taken = hands?.driver && !mine && state === "watching" ? "Another page drives." : "";
+    const words = state === "watching" ? "Drive from here" : "Let go";
+    if (drive.textContent !== words) drive.textContent = words;
+    drive.disabled = state === "watching" && (hands === null || !hands.may_drive || taken !== "");
+    giveBack.hidden = !(hands?.person && facts.hands === "browser" && (mine || !hands.driver));
+    this.#text("state", {
+      watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
+      resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
+      ready: "Ready: hold Space to arm and run.",
+      running: armed ? "You drive." : "Arming: keep holding.",
+    }[state]);
+    this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
+    this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);
+    this.#text("stopped", this.#aboutStop(stop, facts));
+  }
+
+  #aboutStop(stop, facts) {
+    if (stop === null) return "";
+    if (facts?.status.state === "stopped") return "STOPPED. Hold-to-run arms again after a second of rest.";
+    if (facts?.status.owner === "observing") return "Only the owner can stop the robot: this operator observes.";
+    if (stop.goesOn) return "Stop sent; the robot side has not confirmed it yet.";
+    return stop.sinceMs < 10_000 ? "THE STOP WAS NOT CONFIRMED by the robot side." : "";
+  }
+}
