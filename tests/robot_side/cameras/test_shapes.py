@@ -146,6 +146,6 @@ def test_a_robots_mesh_without_room_becomes_a_box_around_it() -> None:
     box = scene_view._boxed(shape)
     assert box.kind == "box"
     position_m, rotation = placed(box, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
-    inside = ((turned.apply(vertices_m) + [0.1, 0.2, 0.3]) - position_m) @ rotation
+    inside = ((turned.apply(vertices_m) + np.array([0.1, 0.2, 0.3])) - position_m) @ rotation
     assert (np.abs(inside) <= np.array(box.size_m) + 1e-6).all()
     np.testing.assert_allclose(np.abs(inside).max(axis=0), box.size_m, atol=1e-6)
