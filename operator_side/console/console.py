@@ -41,7 +41,8 @@ class Console:
         self.tuning: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         """What the pages said, the oldest first, for whoever takes it."""
         self._notes: list[str] = []
-        self._gone = False
+        self.gone = False
+        """Whether there is none any more; a note says why."""
         self._companion = Companion("operator_side.console", [str(port)])
         run = {"title": title, "live": live, "tunable": list(tunable)}
         self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
@@ -80,7 +81,7 @@ class Console:
     def receive(self) -> None:
         """Take what the console says; call it often."""
         channel = self._companion.channel
-        if self._gone:
+        if self.gone:
             return
         for message in channel.receive():
             kind, content = message[:1], message[1:]
@@ -98,7 +99,7 @@ class Console:
 
     def _end(self, why: str) -> None:
         """Whoever watched sees no more; whose hands moved something through a page is gone, too."""
-        self._gone, self.address = True, None
+        self.gone, self.address = True, None
         if self.pages:
             self.pages = 0
             self.hands.append(PageWords(page=0))
