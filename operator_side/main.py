@@ -236,20 +236,20 @@ class _Loop:
                 raise
             self._core.calibrate(TravelCalibration())
             self._told_travel.discard(controller.address)
-            self._status.note(f"{error}; its travel is read by the defaults")
+            self._viewing.note(f"{error}; its travel is read by the defaults")
             return
         self._core.calibrate(stored or TravelCalibration())
         if controller.address in self._told_travel:
             return
         self._told_travel.add(controller.address)
         if stored is None:
-            self._status.note("its travel has not been calibrated: feelahead calibrate does that")
+            self._viewing.note("its travel has not been calibrated: feelahead calibrate does that")
         else:
-            self._status.note(f"its travel calibration: {calibration_path(controller.address)}")
+            self._viewing.note(f"its travel calibration: {calibration_path(controller.address)}")
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
-            self._status.note(text)
+            self._viewing.note(text)
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
@@ -257,7 +257,7 @@ class _Loop:
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
-                self._status.note(text)
+                self._viewing.note(text)
         shows, tells = self._viewing.facts_due(now_s), self._status.due(now_s)
         values = self._values(now_s) if shows or tells else {}
         if shows:

@@ -38,6 +38,12 @@ class Viewing:
         self._told: str | None = None
         self._watch_s = self._facts_s = -math.inf
 
+    def note(self, text: str) -> None:
+        """Say it to everybody: a line that stays."""
+        self._status.note(text)
+        if self.console is not None:
+            self.console.note(text)
+
     def take(self, topic: bytes, payload: bytes) -> bool:
         """Whether a view payload is for who looks, and not for the core."""
         if topic not in (VIDEO_TOPIC, SCENE_TOPIC):

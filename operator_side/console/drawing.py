@@ -129,6 +129,7 @@ class Drawing:
         )
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.scene.configure_default_lights(enabled=False)
+        server.scene.configure_environment_map(None)
         server.scene.add_light_ambient("/light", intensity=0.9)
         server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
 
@@ -193,7 +194,6 @@ class Drawing:
             self._label = self._server.scene.add_label("/target", text, position=position, anchor="bottom-center")
         elif self._label.text != text or not np.array_equal(self._label.position, position):
             self._label.text, self._label.position, self._label.visible = text, position, True
-
 
     def _place_of(self, index: int) -> Floats:
         """The middle (3,) of an object's first shape: its own frame may be anywhere."""

@@ -100,7 +100,8 @@ class Pages:
         number, page = self._number, _Page()
         page.newest.update(self._lasting)
         page.notes.extend(self._notes)
-        page.something.set()
+        if page.newest or page.notes:
+            page.something.set()
         self._pages[number] = page
         self._changed(len(self._pages))
         sending = asyncio.create_task(self._send(page, connection))

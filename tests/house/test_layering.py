@@ -66,11 +66,13 @@ ARROWS = """
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
     operator_side/facts.py: common/command
+    operator_side/console: common common/command common/companion common/protocol operator_side
+        operator_side/dualsense/reports
     operator_side/terminal_view: common common/command common/companion operator_side operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
-        operator_side/terminal_view
+    operator_side: operator_side common common/command common/emulation common/files common/protocol common/realtime
+        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
+        operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
+        operator_side/feel operator_side/hands operator_side/simulated_person operator_side/terminal_view
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
@@ -88,6 +90,8 @@ What has no row of its own counts to the room around it.
 """
 
 LIBRARIES = {
+    "viser": ("operator_side/console",),
+    "websockets": ("operator_side/console",),
     "zmq": ("common/sockets", "feelahead/benchmarks/link/peers.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),

@@ -111,7 +111,7 @@ byId("drawn").onclick = ({ currentTarget }) => {
   drawn = !drawn;
   currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
   currentTarget.setAttribute("aria-pressed", drawn);
-  frame.hidden = !drawn;
+  frame.hidden = true;
   if (!drawn) frame.removeAttribute("src");
 };
 
@@ -133,6 +133,7 @@ function sceneAddress() {
 function showScene(scene) {
   // Only now does viser know where to look at the scene from.
   if (drawn && !frame.src) frame.src = sceneAddress();
+  frame.hidden = !drawn;
   charts.overlap.add(scene.overlap_mm3);
   charts.tick.add(scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {

@@ -72,7 +72,10 @@ export class View {
   }
 
   look() {
-    if (this.#capturedS === null) return;
+    if (this.#capturedS === null) {
+      this.#place.classList.add("old");
+      return;
+    }
     const silent = performance.now() - this.#shownMs > SILENT_MS;
     const ageS = this.#clock.ageS(this.#capturedS);
     const old = silent || (ageS !== null && ageS > OLD_S);
