@@ -25,7 +25,8 @@ ARROWS = """
     common/realtime: common
     common/companion:
     common/sockets: common common/files
-    common/command: common common/emulation common/files
+    common/recording: common common/companion common/protocol
+    common/command: common common/emulation common/files common/recording
 
     robot_side/compiled: common
     robot_side/overlap/checks: common robot_side/compiled
@@ -50,8 +51,8 @@ ARROWS = """
         robot_side/overlap/meshes
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
-    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper
+    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper
         robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
@@ -65,18 +66,20 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
     operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
+    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets operator_side/calibration operator_side/dualsense/hid operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/feel operator_side/hands operator_side/simulated_person
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
+    feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
     feelahead/commands: common/* operator_side/* feelahead/both_sides feelahead/benchmarks/* feelahead/experiments/*
+        feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, `X/*` also those further down.
@@ -91,6 +94,8 @@ LIBRARIES = {
     "mujoco": ("robot_side/simulation", "feelahead/benchmarks/overlap/distances.py"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
+    "foxglove": ("common/recording",),
+    "mcap": ("common/recording",),
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",
@@ -100,6 +105,7 @@ LIBRARIES = {
         "feelahead/experiments",
     ),
     "common.clock.MonotonicClock": (
+        "common/recording",
         "common/sockets/shell.py",
         "robot_side/main.py",
         "robot_side/compiled/warm_up.py",
