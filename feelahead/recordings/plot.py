@@ -74,10 +74,10 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
 def _title(recording: Recording, tables: Tables) -> str:
     header = next(iter(recording.headers.values()))
     settings = recording.headers.get("robot", header)["settings"]
-    links = {side: found["settings"].get("link") or "none" for side, found in recording.headers.items()}
+    links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
     told = [
         f"{recording.path.name}: {tables.duration_s:.1f} s, {header.get('recorded_at', '')}",
-        ", ".join(f"link emulated by the {side} side: {link}" for side, link in links.items()),
+        f"emulated link: {'; '.join(sorted(links))}",
         f"scene {settings.get('scene') or settings.get('model') or 'table'}, law {settings.get('law', 'unknown')},"
         f" P {settings.get('probability', 'unknown')}, seed {settings.get('seed')},"
         f" feelahead {header['versions'].get('feelahead', 'unknown')}",

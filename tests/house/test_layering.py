@@ -52,8 +52,8 @@ ARROWS = """
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
     robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
-        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement robot_side/gripper
-        robot_side/objects robot_side/operators robot_side/simulation
+        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/compiled robot_side/enlargement
+        robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
