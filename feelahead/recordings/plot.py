@@ -63,8 +63,10 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
             draw(figure, axis, joined, times_s)
             axis.margins(x=0)
         axes[-1].set_xlabel("time since the recording began (s)")
-        axes[0].legend(*_band_legend(axes[0]), loc="upper right", ncols=6)
+        axes[0].legend(loc="upper right", ncols=2)
+        figure.align_ylabels()
         figure.suptitle(_title(recording, tables), fontsize=8.5, x=0.01, ha="left")
+        figure.legend(handles=_band_handles(), loc="upper right", title="state of the robot side", fontsize=7)
         figure.savefig(out, dpi=200)
         pyplot.close(figure)
 
@@ -72,10 +74,10 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
 def _title(recording: Recording, tables: Tables) -> str:
     header = next(iter(recording.headers.values()))
     settings = recording.headers.get("robot", header)["settings"]
-    links = {side: found["settings"].get("link") or "none" for side, found in recording.headers.items()}
+    links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
     told = [
         f"{recording.path.name}: {tables.duration_s:.1f} s, {header.get('recorded_at', '')}",
-        ", ".join(f"link emulated by the {side} side: {link}" for side, link in links.items()),
+        f"emulated link: {'; '.join(sorted(links))}",
         f"scene {settings.get('scene') or settings.get('model') or 'table'}, law {settings.get('law', 'unknown')},"
         f" P {settings.get('probability', 'unknown')}, seed {settings.get('seed')},"
         f" feelahead {header['versions'].get('feelahead', 'unknown')}",
@@ -93,12 +95,10 @@ def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
             axis.axvspan(times_s[start], last_s, color=_STATES[str(states[start])], lw=0, zorder=0)
 
 
-def _band_legend(axis: Any) -> tuple[list[Any], list[str]]:
+def _band_handles() -> list[Any]:
     from matplotlib.patches import Patch  # noqa: PLC0415
 
-    handles, labels = axis.get_legend_handles_labels()
-    patches = [Patch(color=color, label=state) for state, color in _STATES.items()]
-    return [*handles, *patches], [*labels, *_STATES]
+    return [Patch(color=color, label=state) for state, color in _STATES.items()]
 
 
 def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
@@ -107,7 +107,7 @@ def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         ways = np.stack([1e3 * joined.numbers(f"stiffness.{side}.fast_m.{k}") for k in range(8)])
         ways[ways >= horizon_mm - 1e-6] = np.nan
         axis.fill_between(times_s, ways[0], ways[-1], color=color, alpha=0.25, lw=0)
-        axis.plot(times_s, ways[-1], color=color, lw=0.9, label=f"{label}: strength 1 (edge) to 8 (line)")
+        axis.plot(times_s, ways[-1], color=color, lw=0.9, label=f"{label}, strengths 1 to 8")
         delta = 1e3 * joined.numbers(f"stiffness.{side}.displacement_m")
         axis.plot(times_s, delta, color=color, lw=0.7, ls=":", label=f"δ of {side.upper()}")
     axis.axhline(0.0, color=_GREY, lw=0.5)
@@ -130,12 +130,15 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
             interpolation="nearest",
             zorder=1,
         )
-        axis.plot(times_s, joined.numbers(f"controller.{side}_raw"), color="black", lw=0.9, label="travel")
+        travel = joined.numbers(f"controller.{side}_raw")
+        # Seen on light and on dark.
+        axis.plot(times_s, travel, color="white", lw=2.4)
+        axis.plot(times_s, travel, color="black", lw=1.0)
         axis.set_ylim(0.0, 1.0)
         axis.set_ylabel("raw travel")
         axis.set_title(f"{name}: the finger's travel, and the strength of its tenths as written to the controller")
-        axis.legend(loc="upper right")
-        figure.colorbar(shown, ax=axis, pad=0.005, aspect=12, ticks=[0, 4, 8], label="strength")
+        bar = figure.colorbar(shown, cax=axis.inset_axes((1.01, 0.0, 0.012, 1.0)), ticks=[0, 4, 8])
+        bar.set_label("strength")
 
     return draw
 
@@ -158,8 +161,12 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
             axis.plot(
                 times_s, terms, color=color, lw=0.7, label={"sigma_m": "D_σ of R2", "mean_m": "means of R2"}[name]
             )
+    of_objects = [column for column in joined.columns() if column.startswith("overlap.") and column.endswith("_mm3")]
+    if of_objects:
+        sums = np.nansum([joined.numbers(column) for column in of_objects], axis=0)
+        axis.plot(times_s, np.cbrt(sums), color=_BLUE, lw=0.7, label="overlap, edge of a cube of it")
     axis.set_ylabel("enlargement (mm)")
-    axis.set_title("Enlargement and its terms; how far along each trigger the overlap stiffens it")
+    axis.set_title("Enlargement and its terms, overlap, and the strength s(δ) along each trigger")
     other = axis.twinx()
     for side, _label, color in _SIDES:
         strength = joined.numbers(f"stiffness.{side}.stiffness")
@@ -190,6 +197,11 @@ def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         values = joined.numbers(column)
         if np.isfinite(values).any():
             axis.plot(times_s, values, color=color, lw=0.8, label=label)
+    # From the worst case that is reckoned with at first one sees nothing.
+    armed = np.array([row.get("stiffness.state") == "armed" for row in joined.rows], dtype=bool)
+    settled = joined.numbers("robot_status.loop_age_ms")[armed]
+    if np.isfinite(settled).any():
+        axis.set_ylim(top=2.0 * float(np.nanmedian(settled)) + 10.0)
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel("age (ms)")
     axis.set_title("How old what is used is")

@@ -40,6 +40,7 @@ _JOINED: Final = (
     "telemetry",
     "ages",
     "enlargement",
+    "overlap",
     "robot_status",
 )
 

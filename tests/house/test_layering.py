@@ -53,8 +53,8 @@ ARROWS = """
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
     robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
-        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled robot_side/enlargement
-        robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
+        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled
+        robot_side/enlargement robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -82,6 +82,7 @@ ARROWS = """
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
+    feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
@@ -107,6 +108,8 @@ LIBRARIES = {
     "mujoco": ("robot_side/simulation", "robot_side/cameras", "feelahead/benchmarks/overlap/distances.py"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
+    "foxglove": ("common/recording",),
+    "mcap": ("common/recording",),
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",
@@ -117,7 +120,7 @@ LIBRARIES = {
     ),
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
-        "common/recording/recorder.py",
+        "common/recording",
         "robot_side/main.py",
         "robot_side/cameras",
         "robot_side/compiled/warm_up.py",
