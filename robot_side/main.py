@@ -58,7 +58,8 @@ def command(arguments: Sequence[str]) -> int:
     ):
         assembled = assemble(settings, secrets.randbits(53), clock_domain(), announce=status.note)
         core = assembled.core
-        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
+        sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
+        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         with StopSignal() as stop:
@@ -162,7 +163,9 @@ class _Loop:
             "duration_s": self._clock.now() - self._start_s,
             "tick_us": tick_microseconds(self._tick_time),
             **paced,
-            "link": link_summary("to_operator", self._lines),
+            "link": link_summary(
+                "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}
+            ),
             "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {
