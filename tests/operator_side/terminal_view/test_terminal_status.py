@@ -27,7 +27,7 @@ from common.clock import MonotonicClock
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError
 from operator_side.terminal_view.status import TerminalStatus
-from tests.helpers.made_up_facts import facts_in_motion
+from tests.operator_side.terminal_view.made_up_facts import facts_in_motion
 
 clock, sent = MonotonicClock(), 0
 with StopSignal() as stop, TerminalStatus("player") as status:
