@@ -24,8 +24,8 @@ from tests.console.checks_of_views import both_views_move, triggers_agree, words
 from tests.console.provide import default_cache, provide_playwright, provided_browser
 from tests.console.run import running
 from tests.console.stage import Check, Stage
+from tests.containers.debian import Say
 from tests.containers.watch import CheckFailedError
-from tests.helpers.debian import Say
 from tests.kernel.skipped import SkippedError
 
 _LINK: Final = ("--link", "delay 20ms 2ms distribution normal")
