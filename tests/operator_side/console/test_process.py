@@ -23,8 +23,8 @@ from common.clock import MonotonicClock
 from common.protocol.view_messages import VIEW_NAMES
 from operator_side.console.console import Console
 from operator_side.console.pages import MOST_PAGES, ROUND_ENDS
-from tests.operator_side.console_feed import OBJECTS, Feed
 from tests.helpers.repository import ROOT
+from tests.operator_side.console_feed import OBJECTS, Feed
 
 pytestmark = pytest.mark.processes
 LIMIT_S = 60.0
