@@ -64,7 +64,8 @@ def command(arguments: Sequence[str]) -> int:
         epoch = secrets.randbits(53)
         assembled = assemble(settings, epoch, clock_domain(), announce=status.note, side=recorded_by(recording))
         core = assembled.core
-        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
+        sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
+        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         if recording is not None:
@@ -184,7 +185,9 @@ class _Loop:
             "tick_us": tick_microseconds(self._tick_time),
             "tick_cpu_us": tick_microseconds(self._tick_cpu_time),
             **paced,
-            "link": link_summary("to_operator", self._lines),
+            "link": link_summary(
+                "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}
+            ),
             "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {

@@ -77,10 +77,7 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, five times a second at most, ten with facts.
-
-        BrokenPipeError, once, when the reader has gone.
-        """
+        """Show the values, at most five times a second, ten with facts; BrokenPipeError, once, when the reader left."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)

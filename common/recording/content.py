@@ -87,7 +87,7 @@ class Content:
 
     def _block(self, side: str, content: bytes) -> None:
         block = unpack_block(content)
-        self._file.write(f"/{side}/inputs", block.last_s, content)
+        self._file.write(f"/{side}/inputs", block.first_s, content)
         lost = block.dropped - self._dropped.get(side, 0)
         if lost > 0:
             self._dropped[side] = block.dropped

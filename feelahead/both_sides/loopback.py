@@ -31,7 +31,7 @@ from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
-from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
+from robot_side.main import TICK_PERIOD_S
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
 
@@ -39,6 +39,8 @@ _WALL = MonotonicClock()
 """For how long a tick takes, and nothing else."""
 _PEER = b"loopback"
 VIRTUAL_CLOCK = "virtual"
+_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
+"""Nobody looks here."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ class Loopback:
         self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
         self._to_operator: dict[Stream, DelayLine[bytes]] = {
-            stream: DelayLine(self._back.profile("to_operator", stream)) for stream in SENT_STREAMS
+            stream: DelayLine(self._back.profile("to_operator", stream)) for stream in _STREAMS
         }
         self._ticks = 0
         self._motions = 0

@@ -121,9 +121,9 @@ def read_tables(recording: Recording) -> Tables:
             continue
         block = unpack_block(message.content)
         for entry in block.unpacked():
-            # A block is stamped with its end.
+            # A block is stamped with its begin.
             if (found := _row(entry, zones)) is not None:
-                tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.last_s, found[1])
+                tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.first_s, found[1])
     sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
     duration_s = _NANOSECONDS * (last_ns - first_ns)
     return Tables(_NANOSECONDS * first_ns, duration_s, sorted_tables)

@@ -4,13 +4,13 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Final
 
 from common.errors import FeelaheadError
-from tests.console.browser import browser
+from tests.console.browser import Browser, browser
 from tests.console.checks_of_gate import another_site_is_refused, wrong_addresses_are_refused
 from tests.console.checks_of_hands import (
     escape_stops,
@@ -18,14 +18,15 @@ from tests.console.checks_of_hands import (
     hidden_or_left_page_lets_go,
     space_drives,
 )
+from tests.console.checks_of_keys import CHECKS as CHECKS_OF_KEYS
 from tests.console.checks_of_layout import keyboard_reaches_everything, nothing_overflows
 from tests.console.checks_of_link import frozen_robot_is_unmistakable, silent_operator_side_is_unmistakable
 from tests.console.checks_of_views import both_views_move, triggers_agree, words_agree
 from tests.console.provide import default_cache, provide_playwright, provided_browser
 from tests.console.run import running
 from tests.console.stage import Check, Stage
+from tests.containers.debian import Say
 from tests.containers.watch import CheckFailedError
-from tests.helpers.debian import Say
 from tests.kernel.skipped import SkippedError
 
 _LINK: Final = ("--link", "delay 20ms 2ms distribution normal")
@@ -58,8 +59,11 @@ def main() -> int:
     try:
         program = provided_browser(say)
         provide_playwright(given.cache.absolute(), say)
+        alone = [tried for tried in CHECKS_OF_KEYS if _is_wanted(tried.__name__, given.only)]
+        if alone:
+            failed += _try_alone(program, given.out.absolute(), alone, say)
         for arguments, checks in _RUNS:
-            wanted = [tried for tried in checks if not given.only or any(word in tried.__name__ for word in given.only)]
+            wanted = [tried for tried in checks if _is_wanted(tried.__name__, given.only)]
             if wanted:
                 failed += _try(program, given.out.absolute(), arguments, wanted, say)
     except SkippedError as reason:
@@ -67,6 +71,23 @@ def main() -> int:
         return 0
     print(f"{'failed' if failed else 'passed'} in {time.monotonic() - started_s:.0f} s")
     return 1 if failed else 0
+
+
+def _is_wanted(name: str, only: Sequence[str]) -> bool:
+    return not only or any(word in name for word in only)
+
+
+def _try_alone(program: str, out: Path, checks: Sequence[Callable[[Browser], str]], say: Say) -> int:
+    """How many of `checks`, which need a browser and no run, failed."""
+    failed = 0
+    with browser(program, out) as opened:
+        for tried in checks:
+            try:
+                say(f"{tried.__name__}: {tried(opened)}")
+            except CheckFailedError as error:
+                failed += 1
+                say(f"{tried.__name__}: FAILED: {error}")
+    return failed
 
 
 def _try(program: str, out: Path, arguments: Sequence[str], checks: Sequence[Check], say: Say) -> int:

@@ -85,7 +85,8 @@ ARROWS = """
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
-    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
+    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
+        feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*

@@ -1,5 +1,6 @@
 """Whoever looks is fed, and the robot side is asked for pictures only while anybody looks."""
 
+from collections import deque
 from typing import cast
 
 import pytest
@@ -8,9 +9,11 @@ from common.command.status import Status
 from common.protocol.codec import decode
 from common.protocol.messages import Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
-from operator_side.console.console import Console
+from operator_side.console.console import Console, PageWords
 from operator_side.facts import OperatorFacts
 from operator_side.facts_of_core import Surroundings
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.settings import OperatorSettings
 from operator_side.viewing import Viewing, view_topics
 from tests.operator_side.operator_bench import Bench
 
@@ -25,6 +28,8 @@ class FakeConsole:
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
         self.told: list[str] = []
+        self.hands: deque[PageWords] = deque()
+        self.tuning: deque[PageWords] = deque()
 
     def receive(self) -> None: ...
 
@@ -41,13 +46,19 @@ class FakeConsole:
         self.told.append(text)
 
 
+def surroundings(now_s: float) -> Surroundings:
+    del now_s
+    return Surroundings(hands="person")
+
+
 class Looking:
     """A turn of the operator side each 4 ms."""
 
     def __init__(self) -> None:
         self.bench, self.console = Bench(), FakeConsole()
         status = Status("json", "test")
-        self.viewing = Viewing(self.bench.side, Surroundings(hands="person"), status, cast(Console, self.console))
+        console = cast(Console, self.console)
+        self.viewing = Viewing(self.bench.side, surroundings, status, DrivingPage(), console)
 
     def turns(self, duration_s: float) -> list[Watch]:
         asked = []
@@ -91,12 +102,12 @@ def test_pictures_and_scenes_go_to_the_console_and_the_rest_to_the_core() -> Non
 
 def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -> None:
     bench = Bench()
-    viewing = Viewing(bench.side, Surroundings(hands="person"), Status("none", "test"), None)
+    viewing = Viewing(bench.side, surroundings, Status("none", "test"), DrivingPage(), None)
     assert viewing.requests(1.0) == []
     assert not viewing.facts_due(1.0)
     assert viewing.take(VIDEO_TOPIC, b"a picture")
-    assert view_topics(watches=False) == (b"telemetry",)
-    assert set(view_topics(watches=True)) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
+    assert view_topics(OperatorSettings()) == (b"telemetry",)
+    assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 
 
 def test_the_address_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,3 +122,17 @@ def test_notes_go_to_the_line_and_to_the_page() -> None:
     looking = Looking()
     looking.viewing.note("a note")
     assert looking.console.told == ["a note"]
+
+
+def test_what_pages_say_reaches_whoever_follows_them() -> None:
+    looking = Looking()
+    looking.console.hands.append(PageWords(page=3, hands={"page": "ours", "number": 1, "driving": True}))
+    looking.console.tuning.append(PageWords(page=3, tune={"probability": 0.9}))
+    looking.turns(0.02)
+    pages = looking.viewing._pages
+    assert pages.driver == "ours"
+    assert (wish := pages.take_wish()) is not None
+    assert wish.probability == 0.9
+    looking.console.hands.append(PageWords(page=3))
+    looking.turns(0.02)
+    assert pages.driver is None

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from common.arrays import FloatArray
 from common.command.command_line import parse_settings
+from common.errors import FeelaheadError
 from common.protocol.view_messages import SceneState, VideoFrame
 from feelahead.benchmarks.viewing.companion_process import companion_of, processor_s
 from feelahead.benchmarks.viewing.viewer import Seen, Viewer
@@ -25,6 +26,7 @@ _PROGRAM: Final = "feelahead bench viewing"
 _SLOW: Final = "video: rate 2mbit"
 _SETTLING_S: Final = 0.2
 """At the beginning of each turn: the last pictures of the turn before are still under way."""
+_LEAST_TICKS: Final = 10
 _WARMING_S: Final = 3.0
 _STARTING_S: Final = 600.0
 _ONE_SIDED_95: Final = 1.645
@@ -68,6 +70,10 @@ class Turns:
         found = []
         for turn in turns:
             within = self.ticks[(self.ticks[:, 0] >= turn.began_s + _SETTLING_S) & (self.ticks[:, 0] < turn.ended_s)]
+            if len(within) < _LEAST_TICKS:
+                raise FeelaheadError(
+                    f"{len(within)} ticks in {turn.ended_s - turn.began_s:.1f} s: this machine is too busy to measure"
+                )
             span_s = within[-1, 0] - within[0, 0]
             found.append(
                 {
@@ -117,6 +123,7 @@ def _measure(link: str, count: int, seconds: float, advance: Callable[[], None])
             found.companion_share = busy_s / looked_s
             viewer.close()
             robot.stop()
+            robot.check()
         found.ticks = np.load(log)
     return found
 

@@ -93,7 +93,8 @@ export class Hands {
       this.#release("A key for the browser was pressed."); // whose keys up it may keep to itself
       return;
     }
-    if (this.#state === "watching" || !this.#keys.press(event.code)) return;
+    // While we only watch, too: a key that is down already has to come up first.
+    if (!this.#keys.press(event.code) || this.#state === "watching") return;
     event.preventDefault(); // no scrolling, and no button pressed by Space
     if (!event.repeat) this.#step();
   }
@@ -192,7 +193,8 @@ export class Hands {
     const keys = this.#keys.read(passedMs / 1000, moves);
     let hands = both(keys.hands, this.#grips.read());
     if (there) hands = both(hands, pads.hands);
-    this.#follow(hands, atRest(hands) && !keys.pressed && !this.#stops, nowMs);
+    // Without the focus no key is known to be up.
+    this.#follow(hands, there && atRest(hands) && !keys.pressed && !this.#stops, nowMs);
     this.#say(this.#state === "running" ? hands : REST);
     this.#draw();
   }

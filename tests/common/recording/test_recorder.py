@@ -25,6 +25,7 @@ class Bytes:
     """An encoder of notes that are bytes already."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
+        del views
         now_s, content = noted
         return now_s, entry(Kind.REPORT, now_s, content)
 
@@ -165,7 +166,7 @@ def test_what_a_recorder_has_no_room_for_is_dropped_counted_and_said(tmp_path: P
 def test_a_file_that_cannot_be_made_is_told_in_one_line(tmp_path: Path) -> None:
     there = tmp_path / "there.mcap"
     there.touch()
-    with pytest.raises(ConfigurationError, match="--record .*there.mcap: File exists"):
+    with pytest.raises(ConfigurationError, match=r"--record .*there\.mcap: File exists"):
         recording_to(there)
     silent = tmp_path / "silent"
     with pytest.raises(ConfigurationError, match="No such file or directory; valid: "):

@@ -49,11 +49,12 @@ def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> 
 
 def test_without_the_extra_the_command_that_mends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(packages, "find_spec", lambda _: None)
-    for attempt in (lambda: demo(["--record", str(tmp_path / "run.mcap")]), lambda: replay(["run.mcap"])):
+    for command, arguments in ((demo, ["--record", str(tmp_path / "run.mcap")]), (replay, ["run.mcap"])):
         with pytest.raises(ConfigurationError, match=r"pip install 'feelahead\[record\]'"):
-            attempt()
+            command(arguments)
 
 
+@pytest.mark.processes
 def test_no_side_imports_what_it_does_not_need() -> None:
     code = (
         "import sys, robot_side.main, operator_side.main, feelahead.main;"

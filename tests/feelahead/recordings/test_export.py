@@ -79,10 +79,7 @@ def test_lerobot_has_what_its_own_reader_asks_for(run: Recording, tmp_path: Path
         column = data.column(name)
         assert column.null_count == 0
         if feature["shape"] == [1]:
-            assert str(column.type).replace("float", "float32").replace("32double", "") in (
-                feature["dtype"],
-                "float32",
-            ) or str(column.type) == {"float32": "float"}.get(feature["dtype"], feature["dtype"])
+            assert str(column.type).replace("float", "float32") == feature["dtype"]
         else:
             assert column.type.list_size == feature["shape"][0] == len(feature["names"])
     assert data.column("index").to_pylist() == list(range(data.num_rows))
@@ -111,7 +108,8 @@ def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes
     file = RecordingFile(path, 0.0)
     content = Content(file)
     content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
-    payloads, next_s = [], 0.0
+    payloads: list[bytes] = []
+    next_s = 0.0
     began_ns = run.began_ns()
     for message in run.messages(("/stiffness", "/command", "/robot/inputs")):
         now_s = 1e-9 * (message.log_ns - began_ns)

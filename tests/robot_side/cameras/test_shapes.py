@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,3 +150,21 @@ def test_a_robots_mesh_without_room_becomes_a_box_around_it() -> None:
     inside = ((turned.apply(vertices_m) + np.array([0.1, 0.2, 0.3])) - position_m) @ rotation
     assert (np.abs(inside) <= np.array(box.size_m) + 1e-6).all()
     np.testing.assert_allclose(np.abs(inside).max(axis=0), box.size_m, atol=1e-6)
+
+
+def test_what_is_moved_without_a_joint_is_said_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(scene_view, "_FEW", 3)
+    path = planar_arm(tmp_path, world=SHAPES, extra_top=STONE)
+    robot, view = looked_at(RobotSettings(model=path, site="tcp"))
+    said = shapes_of(robot, view)
+    sensed, situation = robot.core.newest or pytest.fail("no tick")
+    positions_m = situation.objects.positions_m
+    assert positions_m is not None
+    wall = said.objects.index("wall")
+    shifted_m = positions_m + 0.01 * (np.arange(len(positions_m)) == wall)[:, None]
+    elsewhere = replace(situation, objects=replace(situation.objects, positions_m=shifted_m))
+    state = view.state(HEADER, sensed, elsewhere, 0.0, TickFigures())
+    index = np.frombuffer(state.object_index, "<u4").tolist()
+    assert {said.objects[one] for one in index} == {"post", "Target_egg", "wall"}
+    poses = np.frombuffer(state.object_poses, "<f4").reshape(-1, 7)
+    assert poses[index.index(wall), :3] == pytest.approx(shifted_m[wall], abs=1e-6)

@@ -1,0 +1,177 @@
+"""The hands of the page alone: real keys in a real browser, the operator side judging them, in virtual time."""
+
+import functools
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, Final
+
+import msgspec
+
+from common.protocol.messages import Telemetry
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.intent import OperatorIntent, operator_intent
+from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
+from tests.console.browser import Browser, Page
+from tests.containers.watch import CheckFailedError
+from tests.helpers.repository import ROOT
+from tests.helpers.simulated_desk import VIEW
+
+_PLACE: Final = ROOT / "operator_side" / "console" / "page"
+_FRAME_MS: Final = 20
+_PAGE: Final = b"""<!doctype html><meta charset="utf-8"><title>hands</title><link rel="icon" href="data:,">
+<section id="hands"></section><section id="tuning"></section>
+<p><input id="field" aria-label="a field"><button id="other" type="button">other</button></p>
+<iframe id="scene" srcdoc="<p tabindex=0>scene</p>"></iframe>
+<script type="module">
+  import { Hands } from "./hands.js";
+  window.sent = [];
+  window.clicked = 0;
+  document.getElementById("other").onclick = () => { window.clicked += 1; };
+  window.hands = new Hands(document, (message) => { window.sent.push([performance.now(), JSON.stringify(message)]); });
+</script>"""
+_SILENT_STATUS: Final = {"state": "disarmed", "link": "up", "owner": "ready"}
+
+
+class _Handler(SimpleHTTPRequestHandler):
+    def do_GET(self) -> None:
+        if self.path != "/":
+            super().do_GET()
+            return
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.send_header("Content-Length", str(len(_PAGE)))
+        self.end_headers()
+        self.wfile.write(_PAGE)
+
+    def log_message(self, *arguments: object) -> None:
+        """Nothing: whoever runs this looks at the checks."""
+
+
+@contextmanager
+def served() -> Iterator[str]:
+    """The address of the page, while the context lasts."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, directory=str(_PLACE)))
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+@dataclass
+class HandsAlone:
+    """The page, and an operator side whose robot arms as soon as it is asked to. Time stands unless it is let pass."""
+
+    page: Page
+    person: bool = False
+    pages: DrivingPage = field(default_factory=DrivingPage)
+    facts: dict[str, Any] = field(default_factory=dict)
+    """What differs from a robot that is there, is owned from here, and permits tuning"""
+    now_ms: float = 0.0
+    state: str = "disarmed"
+    hears: bool = True
+    """Whether what the page sends arrives, and whether facts come"""
+    messages: list[dict[str, Any]] = field(default_factory=list)
+    intent: OperatorIntent | None = None
+
+    def __post_init__(self) -> None:
+        self.device = SimulatedDualSense()
+        self.shared = SharedHands(self.device, self.pages, None)
+        self.let_pass(0.1)
+
+    def let_pass(self, for_s: float) -> None:
+        """Virtual time passes, here and there, in frames of 20 ms."""
+        for _ in range(round(1000 * for_s / _FRAME_MS)):
+            self.now_ms += _FRAME_MS
+            self.page.raw.clock.run_for(_FRAME_MS)
+            self._frame()
+
+    def _frame(self) -> None:
+        now_s = self.now_ms / 1000
+        said = self.page.ask("() => window.sent.splice(0)")
+        for _, text in said if self.hears else ():
+            message = msgspec.json.decode(text)
+            self.messages.append(message)
+            self.pages.receive(1, message, now_s)
+        if self.pages.rejected:
+            raise CheckFailedError(f"the page sent what is no message: {self.messages[-1]}")
+        if self.pages.stopping(now_s):
+            self.state = "stopped"
+        screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
+        self.shared.tick(now_s, screen, 0.0)
+        if (report := self.device.read(now_s)) is not None:
+            self.intent = operator_intent(parse_input_report(report))
+            if self.intent.arm:
+                self.state = "armed"
+        if self.hears:
+            self.page.ask("(facts) => window.hands.show(facts)", self._facts(now_s))
+
+    def _facts(self, now_s: float) -> dict[str, Any]:
+        rest_s = self.pages.rest_s(now_s)
+        nothing_asked = {"asked": "", "mean_ms": None, "p99_ms": None, "newest_ms": None}
+        return {
+            "status": _SILENT_STATUS | {"state": self.state},
+            "hands": "person" if self.person and not self.pages.driver else "browser",
+            "advancing": "R2",
+            "may_tune": True,
+            "probability": 0.99,
+            "to_robot": nothing_asked,
+            "to_operator": nothing_asked,
+            "page": {
+                "may_drive": self.pages.may_drive,
+                "driver": self.pages.driver,
+                "readiness": str(self.pages.readiness),
+                "rest_s": rest_s,
+                "person": self.person,
+                "doing": self.shared.doing,
+                "tuning_refused": "",
+                "link_asked": None,
+            },
+        } | self.facts
+
+    def drive(self) -> None:
+        """Up to where hold-to-run counts."""
+        self.page.raw.click("#drive")
+        self.let_pass(1.3)
+        self.expect("Ready")
+
+    def run(self) -> None:
+        """Up to where this page moves the arm: Space is held."""
+        self.drive()
+        self.page.raw.keyboard.down("Space")
+        self.let_pass(0.2)
+        self.expect("You drive")
+
+    def expect(self, words: str) -> None:
+        """The page says so of the hands; CheckFailedError otherwise."""
+        if words not in (said := self.page.text("#hands_state")):
+            raise CheckFailedError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
+
+    @property
+    def pulled(self) -> tuple[float, float]:
+        """What the controller's triggers mean by now: retreat and advance."""
+        return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
+
+    @property
+    def runs(self) -> bool:
+        """Whether hold-to-run is held."""
+        return self.intent is not None and self.intent.run
+
+
+@contextmanager
+def hands_alone(browser: Browser, *, person: bool = False, may_drive: bool = True) -> Iterator[HandsAlone]:
+    """The page open in a browser of its own, at time 0."""
+    with served() as address, browser.page("about:blank", gamepad=True) as page:
+        page.raw.clock.install(time=0)
+        page.raw.goto(address)
+        page.wait("window.hands !== undefined", "loaded")
+        page.raw.clock.pause_at(1000)
+        yield HandsAlone(page, person, DrivingPage(may_drive=may_drive))
