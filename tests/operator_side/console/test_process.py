@@ -159,6 +159,28 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
     asyncio.run(story())
 
 
+def test_the_hands_of_a_console_that_is_killed_are_gone() -> None:
+    async def story(console: Console) -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, None, ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as first, page(console):
+            await first.send('{"hands": {"Space": true}}')
+            while not console.hands:
+                await asyncio.sleep(0.002)
+            assert console.hands.popleft().hands == {"Space": True}
+            os.kill(console.process_id, signal.SIGKILL)
+            while not console.gone:
+                await asyncio.sleep(0.002)
+        ends.set()
+        await feeding
+
+    with Console("a test") as console:
+        until(console, lambda: console.address is not None)
+        asyncio.run(story(console))
+        assert [(words.page, words.hands) for words in console.hands] == [(1, None)]
+        assert console.pages == 0
+
+
 def test_a_message_that_is_too_large_ends_its_page_alone(console: Console) -> None:
     async def story() -> None:
         ends = asyncio.Event()
