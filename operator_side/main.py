@@ -70,6 +70,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         core = build_operator_side(settings, epoch, clock_domain(), recorded_by(recording))
         if recording is not None:
             recording.begin(provenance(settings, epoch, clock_domain()))
+            status.also = recording.note
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
         person: Whoever | None = None
