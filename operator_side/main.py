@@ -71,6 +71,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         recording_to(settings.record, "operator", OperatorEncoder()) as recording,
     ):
         core = build_recorded(settings, secrets.randbits(53), recording)
+        if recording is not None:
+            status.also = recording.note
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
         person: SharedHands | None = None

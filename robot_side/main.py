@@ -69,7 +69,8 @@ def command(arguments: Sequence[str]) -> int:
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
         if recording is not None:
-            recording.begin(robot_header(settings, epoch, clock_domain()))
+            recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": core.notes})
+            status.also = recording.note
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             for text in _admission_notes(settings, keys):

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import Companion
 from common.errors import ConfigurationError
@@ -71,6 +72,7 @@ class SideRecording:
         """Blocks that the recorder had no room for."""
         self._side = side
         self._channel, self._recorder = connect(path)
+        self._clock = MonotonicClock()
         self._encoder = encoder
         self._entries = bytearray()
         self._number = 0
@@ -109,9 +111,9 @@ class SideRecording:
         """Keep what the operator side showed at one moment."""
         self._channel.send(FACTS, stamped(now_s), msgspec.json.encode(facts))
 
-    def note(self, now_s: float, text: str) -> None:
-        """Keep a line that a person was told."""
-        self._channel.send(NOTE, stamped(now_s), text.encode())
+    def note(self, text: str) -> None:
+        """Keep a line that a person is told now."""
+        self._channel.send(NOTE, stamped(self._clock.now()), text.encode())
 
     def _send_block(self) -> None:
         block = pack_block(self._number, self.dropped, self._first_s, self._last_s, bytes(self._entries))
