@@ -94,7 +94,7 @@ def _try(program: str, out: Path, arguments: Sequence[str], checks: Sequence[Che
     """How many of `checks` failed on one run."""
     failed = 0
     try:
-        with running(arguments) as run, browser(program, out) as opened:
+        with browser(program, out) as opened, running(arguments) as run:
             say(f"a demo {' '.join(arguments)}")
             for tried in checks:
                 try:

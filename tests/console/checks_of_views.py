@@ -35,6 +35,7 @@ def triggers_agree(stage: Stage) -> str:
     """What stands beside the triggers, and how high their zones are drawn, is what the operator side wrote."""
     with stage.browser.page(stage.run.address) as page:
         page.wait("document.querySelectorAll('#r2 .zones b').length == 10", "drawn the zones")
+        stage.run.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
         script = """() => ['l2', 'r2'].map((side) => [...document.querySelectorAll(`#${side} .zones div`)]
             .map((zone) => {
             const bar = zone.querySelector('i').getBoundingClientRect();
