@@ -89,10 +89,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
-            # Before our own priority is raised, which it would inherit.
-            console = Console(settings.connect, port=settings.console_port) if settings.console else None
             surroundings = functools.partial(surroundings_of, core, line, pages, person, swap_sides=settings.swap_sides)
-            viewing = Viewing(core, surroundings, status, pages, console and stack.enter_context(console))
+            # The console before our own priority is raised, which it would inherit.
+            viewing = Viewing(core, surroundings, status, pages, _console(settings, stack), recording)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
@@ -117,6 +116,12 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             if failure is not None:
                 raise failure
     return 0
+
+
+def _console(settings: OperatorSettings, stack: ExitStack) -> Console | None:
+    if not settings.console:
+        return None
+    return stack.enter_context(Console(settings.connect, port=settings.console_port))
 
 
 def _find(find: Finder, preferred: str | None) -> OpenController:

@@ -12,6 +12,7 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
+from operator_side.commanding import StopButton
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
@@ -28,6 +29,7 @@ class RecordedOperatorSide(OperatorSide):
         super().__init__(epoch, clock_domain, **settings)
         self._note = note
         self._now_s = 0.0
+        self.stop_button = _NotedStop(note)
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """As the core's."""
@@ -43,6 +45,11 @@ class RecordedOperatorSide(OperatorSide):
         """As the core's."""
         self._note((Kind.REPORT, now_s, report))
         super().read_report(report, now_s)
+
+    def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
+        """As the core's."""
+        self._note((Kind.TUNED, now_s, msgspec.json.encode({"probability": probability, "link": link})))
+        super().tune(probability, link, now_s)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """As the core's, which asks for no time: it happened after the last call that had one."""
@@ -71,6 +78,18 @@ class RecordedOperatorSide(OperatorSide):
         report = super().output_report(now_s)
         self._note((Kind.OUTPUT, now_s, report))
         return report
+
+
+class _NotedStop(StopButton):
+    """A stop that was pressed away from the controller."""
+
+    def __init__(self, note: Note) -> None:
+        super().__init__()
+        self._note = note
+
+    def press(self, now_s: float) -> None:
+        self._note((Kind.STOPPED, now_s, b""))
+        super().press(now_s)
 
 
 class OperatorEncoder:

@@ -9,6 +9,8 @@ from common.command.status import Status
 from common.protocol.codec import encode
 from common.protocol.messages import Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
+from common.recording.entries import Kind
+from common.recording.side import SideRecording
 from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.facts import FACTS_PERIOD_S
@@ -38,10 +40,12 @@ class Viewing:
         status: Status,
         pages: DrivingPage,
         console: Console | None,
+        recording: SideRecording | None = None,
     ) -> None:
         """`surroundings`: those of a moment. `pages`: are told what the console's say."""
         self.console = console
         self._pages = pages
+        self._recording = recording
         self._core = core
         self._surroundings = surroundings
         self._status = status
@@ -74,25 +78,32 @@ class Viewing:
             return []
         self._watch_s = now_s
         watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True)
+        if self._recording is not None:
+            self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
 
     def facts_due(self, now_s: float) -> bool:
         """Whether to call `show`."""
-        if self.console is None:
-            return False
-        for text in self.console.take_notes():
+        shown = self.console is not None and self._looks_at_console(self.console)
+        return (shown or self._recording is not None) and now_s - self._facts_s >= FACTS_PERIOD_S
+
+    def _looks_at_console(self, console: Console) -> bool:
+        for text in console.take_notes():
             self._status.note(text)
-        if self.console.address not in (None, self._told):
-            self._told = self.console.address
+        if console.address not in (None, self._told):
+            self._told = console.address
             if not self._status.event("console", address=self._told):
                 self._status.note(f"console: {self._told}")
-        return self.console.pages > 0 and now_s - self._facts_s >= FACTS_PERIOD_S
+        return console.pages > 0
 
     def show(self, status: Mapping[str, Value], now_s: float) -> None:
-        """Show the facts of `now_s`; `status`: what the status line is made of."""
+        """Show and record the facts of `now_s`; `status`: what the status line is made of."""
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
+        facts = operator_facts(self._core, status, self._surroundings(now_s), now_s)
         if self.console is not None:
-            self.console.facts(operator_facts(self._core, status, self._surroundings(now_s), now_s))
+            self.console.facts(facts)
+        if self._recording is not None:
+            self._recording.facts(now_s, facts)
 
     def tell(self, status: Mapping[str, Value], now_s: float) -> None:
         """Tell the status of `now_s`, and the facts where somebody wants them."""

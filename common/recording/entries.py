@@ -49,6 +49,12 @@ class Kind(IntEnum):
     """It was asked what to write to the controller; what it wrote follows as WRITTEN."""
     WRITTEN = 13
     """An output report for the controller."""
+    STOPPED = 14
+    """The emergency stop was pressed away from the controller."""
+    TUNED = 15
+    """A wish for other settings of the run, as JSON."""
+    WATCHED = 16
+    """The operator side told what it looks at, under the next of its core's sequence numbers."""
 
 
 class Entry(NamedTuple):

@@ -1,7 +1,6 @@
 """`feelahead replay`, `export` and `plot`: what can be done with a recording."""
 
 import sys
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Annotated, Literal
 import tyro
 
 from common.command.command_line import parse_settings
-from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
@@ -32,10 +30,16 @@ class ReplaySettings:
     code 1 where they differ by more than another processor may: 1 of 8 in strength, 1e-12 m in ways."""
     speed: float = 1.0
     """How many times as fast as it was to show it."""
+    tui: bool = False
+    """On the whole terminal, instead of the console's page."""
+    console_port: int = 0
+    """Where the page is on this machine; 0: any port that is free."""
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.speed <= 1000.0:
             raise ValueError(f"--speed {self.speed}: valid: 0.01 to 1000")
+        if not 0 <= self.console_port <= 65535:
+            raise ValueError(f"--console-port {self.console_port}: valid: 0 to 65535")
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,13 @@ def replay(arguments: Sequence[str]) -> int:
     """Show or check."""
     settings = parse_settings(ReplaySettings, "feelahead replay", arguments)
     recording = _open(settings.file)
-    return _check(recording) if settings.check else _show(recording, settings.speed)
+    if settings.check:
+        return _check(recording)
+    from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415
+
+    if settings.tui:
+        return play_in_terminal(recording, settings.speed)
+    return play_on_page(recording, settings.speed, settings.console_port)
 
 
 def _check(recording: Recording) -> int:
@@ -91,27 +101,6 @@ def _check(recording: Recording) -> int:
             sys.stdout.write("\n".join(compared.lines()) + "\n")
     sys.stdout.write("the same, within what is promised\n" if within else "NOT the same\n")
     return 0 if within else 1
-
-
-def _show(recording: Recording, speed: float) -> int:
-    from feelahead.recordings.showing import show  # noqa: PLC0415
-
-    # The console takes `send`, once it is there; until then what would be shown is counted.
-    sent: dict[bytes, int] = {}
-
-    def send(kind: bytes, content: bytes) -> None:
-        sent[kind] = sent.get(kind, 0) + bool(content)
-
-    with StopSignal() as stop:
-        pause = threading.Event()
-
-        def wait(seconds: float) -> bool:
-            pause.wait(seconds)
-            return not stop.is_set
-
-        show(recording, send, wait, speed)
-    sys.stdout.write(f"shown: {sent.get(b'f', 0)} facts and {sent.get(b'v', 0)} views\n")
-    return 0
 
 
 def export(arguments: Sequence[str]) -> int:

@@ -116,6 +116,12 @@ def replay_operator(recording: Recording) -> Comparison:
                 core.controller_found(now_s)
             case Kind.LOST:
                 core.controller_lost(now_s)
+            case Kind.WATCHED:
+                core.link.stamp(now_s)
+            case Kind.STOPPED:
+                core.stop_button.press(now_s)
+            case Kind.TUNED:
+                core.tune(**msgspec.json.decode(content), now_s=now_s)
             case Kind.MOTION:
                 _compare_rest(compared, sent)
                 sent.extend(core.motion(now_s))
