@@ -47,6 +47,11 @@ class VirtualClock:
         self._now_s = now_s
 
 
+def wall_clock_offset_s() -> float:
+    """What the wall clock is ahead of the monotonic one now: to be read once, as people set the wall clock."""
+    return time.time() - time.monotonic()
+
+
 @functools.cache
 def clock_domain() -> str:
     """Name the monotonic clock that this process reads, or "" where that is not known.

@@ -10,6 +10,7 @@ from feelahead.commands.calibrate import calibrate
 from feelahead.commands.demo import demo
 from feelahead.commands.doctor.command import doctor
 from feelahead.commands.keys import keys
+from feelahead.commands.recordings import export, plot, replay
 from feelahead.commands.virtual_dualsense import virtual_dualsense
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
@@ -18,6 +19,9 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
+    "replay": (replay, "show a recording, or compute it anew and compare"),
+    "export": (export, "turn a recording into CSV, Parquet, a LeRobot dataset, or a whole file"),
+    "plot": (plot, "draw a recording on one page"),
     "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
     "try": (try_out, "what happens to people and robots under delay, faults and attacks"),
 }

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
-from common.clock import MonotonicClock, clock_domain
+from common.clock import MonotonicClock
 from common.command.command_line import given_fields, parse_settings, run_command
 from common.command.live_view import Value
 from common.command.status import Status
@@ -21,6 +21,7 @@ from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
+from common.recording.side import SideRecording, recording_to
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.calibration.store import calibration_path, load_calibration
@@ -38,6 +39,7 @@ from operator_side.following_pages import follow_pages, shared_hands, surroundin
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
+from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
 from operator_side.settings import OperatorSettings
 from operator_side.terminal_view.status import TerminalStatus
 from operator_side.viewing import Viewing, view_topics
@@ -60,24 +62,17 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
-    core = OperatorSide(
-        secrets.randbits(53),
-        clock_domain(),
-        haptics=settings.haptics,
-        calibration=settings.calibration,
-        rendering=settings.rendering,
-        compensation=settings.compensation,
-        swap_sides=settings.swap_sides,
-        seed=settings.seed,
-        asymmetry_s=settings.asymmetry_s(),
-    )
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
         OperatorSockets(settings.connect, settings.view_connect, topics=view_topics(settings), keys=keys) as sockets,
         StopSignal() as stop,
         TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
+        recording_to(settings.record, "operator", OperatorEncoder()) as recording,
     ):
+        core = build_recorded(settings, secrets.randbits(53), recording)
+        if recording is not None:
+            status.also = recording.note
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
         person: SharedHands | None = None
@@ -104,6 +99,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             given = "calibration" in given_fields(arguments, OperatorSettings)
             people = _People(person, pages, viewing)
             loop = _Loop(settings, core, line, sockets, connection, guard, people, status, stored_travel=not given)
+            loop.recording = recording
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -112,7 +108,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             except Exception as error:
                 failure = error
         errors = [] if failure is None else [str(failure)]
-        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors}
+        kept = {} if recording is None else {"recording": recording.close()}
+        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors} | kept
         try:
             if settings.summary is not None:
                 write_json("--summary", settings.summary, summary)
@@ -155,6 +152,8 @@ class _Loop:
         stored_travel: bool,
     ) -> None:
         """`stored_travel`: take on the calibration that is stored for a controller, as none was given."""
+        self.recording: SideRecording | None = None
+        """Who keeps what happens"""
         self._stored_travel = stored_travel
         self._calibrated = 0
         self._told_travel: set[str] = set()
@@ -262,6 +261,9 @@ class _Loop:
 
     def _use_idle_time(self, now_s: float) -> None:
         """What no message should wait for."""
+        if self.recording is not None:
+            for text in self.recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+                self._status.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S

@@ -75,9 +75,10 @@ def build_robot_side(
     scene: Scene | None = None,
     other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
+    side: Callable[..., RobotSide] = RobotSide,
 ) -> RobotSide:
     """As `assemble`: the core alone."""
-    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce).core
+    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce, side).core
 
 
 def assemble(
@@ -88,12 +89,13 @@ def assemble(
     scene: Scene | None = None,
     other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
+    side: Callable[..., RobotSide] = RobotSide,
 ) -> Assembled:
     """Put a robot side together; ConfigurationError for a model that cannot be used.
 
     `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
     that the settings name, so that the caller can look at it. `other_law`: makes another law of the settings' own.
-    `announce`: told once, in one line, what takes long.
+    `announce`: told once, in one line, what takes long. `side`: makes the core, as one that notes what happens to it.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -125,7 +127,7 @@ def assemble(
         joint_limits,
         settings.motion,
     )
-    core = RobotSide(
+    core = side(
         arm if watch is None else watch(arm),
         kinematics,
         camera,

@@ -121,7 +121,7 @@ class Looking:
             self._frame_age.add(now_s - picture.captured_s)
             width, height = cameras.size
             frame = VideoFrame(
-                self._core.session.view_header(now_s),
+                self._core.session.shown_header(now_s),
                 view=picture.view,
                 captured_s=picture.captured_s,
                 width=width,
@@ -140,7 +140,7 @@ class Looking:
             self._begun = session.watchers.scene_begun
             self._next_shapes_s = now_s
             if not view.complete:
-                view.begin_shapes(session.view_header(now_s), situation)
+                view.begin_shapes(session.shown_header(now_s), situation)
         if not view.work_on_shapes() or view.shapes is None:
             return []
         if now_s >= self._next_shapes_s:
@@ -148,13 +148,13 @@ class Looking:
             if view.shapes_bytes > VIEW_MAXIMUM_BYTES:
                 return []
             self._shapes_sent += 1
-            return [Outgoing("scene", b"", view.shapes.under(session.view_header(now_s)))]
+            return [Outgoing("scene", b"", view.shapes.under(session.shown_header(now_s)))]
         if is_due and self._backlog_s("scene", now_s) > _BACKLOG_S:
             self._counts["scene"]["behind"] += 1
         elif is_due:
             view.begin_state(sensed, situation, taken_s)
             return []
-        state = view.work_on_state(lambda: session.view_header(now_s), self._ticks)
+        state = view.work_on_state(lambda: session.shown_header(now_s), self._ticks)
         if state is None:
             return []
         self._counts["scene"]["sent"] += 1

@@ -14,9 +14,11 @@ from common.emulation.delay_line import BitFlip, DelayLine, link_summary
 from common.emulation.spec import LinkSpec, Stream, unused_clauses
 from common.emulation.tuned import tuned_link
 from common.files.output_file import write_json
+from common.protocol.view_messages import VIEW_NAMES
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_descriptor_limit, raise_priority
+from common.recording.side import SideRecording, recording_to
 from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
 from common.sockets.keys import passed_over_note
@@ -29,6 +31,7 @@ from robot_side.compiled.warm_up import warm_up
 from robot_side.figures import tick_microseconds
 from robot_side.looking import Looking
 from robot_side.outgoing_messages import TOPICS, Outgoing
+from robot_side.recorded import RobotEncoder, recorded_by, recorded_status, robot_header
 from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
 
@@ -56,12 +59,18 @@ def command(arguments: Sequence[str]) -> int:
     with (
         RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
+        recording_to(settings.record, "robot", RobotEncoder()) as recording,
     ):
-        assembled = assemble(settings, secrets.randbits(53), clock_domain(), announce=status.note)
+        epoch = secrets.randbits(53)
+        assembled = assemble(settings, epoch, clock_domain(), announce=status.note, side=recorded_by(recording))
         core = assembled.core
-        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in SENT_STREAMS])):
+        sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
+        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
         warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
+        if recording is not None:
+            recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": core.notes})
+            status.also = recording.note
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             for text in _admission_notes(settings, keys):
@@ -70,7 +79,7 @@ def command(arguments: Sequence[str]) -> int:
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, assembled, link, sockets, status)
+            loop = _Loop(settings, assembled, link, sockets, status, recording)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -80,6 +89,8 @@ def command(arguments: Sequence[str]) -> int:
                 failure = error
             # A run that failed has figures, too.
             summary = loop.summary() | core.summary() | {"errors": [] if failure is None else [str(failure)]}
+            if recording is not None:
+                summary["recording"] = recording.close()
             try:
                 if settings.summary is not None:
                     write_json("--summary", settings.summary, summary)
@@ -108,8 +119,15 @@ class _Loop:
     """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
 
     def __init__(
-        self, settings: RobotSettings, assembled: Assembled, link: LinkSpec, sockets: RobotSockets, status: Status
+        self,
+        settings: RobotSettings,
+        assembled: Assembled,
+        link: LinkSpec,
+        sockets: RobotSockets,
+        status: Status,
+        recording: SideRecording | None,
     ) -> None:
+        self._recording = recording
         self._duration_s = settings.duration
         self._core = core = assembled.core
         self._link = link
@@ -129,6 +147,7 @@ class _Loop:
             SceneView(SceneModel(assembled.scene), assembled.kinematics, assembled.law),
             Cameras(assembled.scene, settings.cameras, status.note) if settings.cameras.on else None,
             lambda stream, now_s: self._lines[stream].backlog_s(now_s),
+            always=() if recording is None else (*VIEW_NAMES, "scene"),
             seed=settings.seed,
         )
         self._collection = IdleCollection(self._clock)
@@ -167,7 +186,9 @@ class _Loop:
             "tick_us": tick_microseconds(self._tick_time),
             "tick_cpu_us": tick_microseconds(self._tick_cpu_time),
             **paced,
-            "link": link_summary("to_operator", self._lines),
+            "link": link_summary(
+                "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}
+            ),
             "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {
@@ -219,8 +240,14 @@ class _Loop:
 
     def _use_idle_time(self, now_s: float, ticked_s: float) -> None:
         """What no tick should wait for. ticked_s: the newest tick's `now`."""
-        for message in self._looking.idle(now_s, ticked_s):
+        seen = self._looking.idle(now_s, ticked_s)
+        for message in seen:
             self._lines[message.stream].push(now_s, message, len(message.payload))
+        if self._recording is not None:
+            for message in seen:
+                self._recording.view(now_s, message.payload)
+            for text in self._recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+                self._status.note(text)
         if self._status.due(now_s):
             self._status.show(now_s, self._core.status(now_s) | self._paced())
         if now_s >= self._next_keys_s:

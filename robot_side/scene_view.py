@@ -46,7 +46,8 @@ class _Begun:
     taken_s: float
     version: int
     link_poses: bytes
-    object_poses: FloatArray
+    object_index: IntArray
+    object_poses: bytes
     explained: dict[Trigger, TriggerExplained] = field(default_factory=dict)
 
 
@@ -63,7 +64,8 @@ class SceneView:
         self._kinematics = kinematics
         self._law = law
         self._links: tuple[tuple[Shape, ...], int] | None = None
-        self._poses: FloatArray = np.empty((0, 7))
+        self._base: PerceivedObjects | None = None
+        """As they stood when the shapes were made"""
         self._making: Iterator[None] | None = None
         self._begun: _Begun | None = None
 
@@ -89,7 +91,9 @@ class SceneView:
     def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
         """Begin a SceneState of the newest tick, which found `sensed` in `situation` at `taken_s`."""
         links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
-        self._begun = _Begun(sensed, situation, taken_s, self.version, links, object_poses(situation.objects))
+        index = self._moved(situation.objects)
+        poses = object_poses(situation.objects, index)
+        self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
 
     def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
         """Go on with what was begun, for some 200 us: an explanation, or at last the message under a new header."""
@@ -114,7 +118,6 @@ class SceneView:
 
     def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
         objects, pose = begun.situation.objects, begun.situation.pose
-        index = self._moved(begun.object_poses)
         l2, r2 = begun.explained["l2"], begun.explained["r2"]
         touched = sorted(l2.overlaps_m3.keys() | r2.overlaps_m3.keys())
         return SceneState(
@@ -122,8 +125,8 @@ class SceneView:
             version=begun.version,
             taken_s=begun.taken_s,
             link_poses=begun.link_poses,
-            object_index=index.astype("<u4").tobytes(),
-            object_poses=_row_bytes(begun.object_poses[index]),
+            object_index=begun.object_index.astype("<u4").tobytes(),
+            object_poses=begun.object_poses,
             roles=bytes([_ROLES[role] for role in objects.roles]),
             tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
             spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),
@@ -137,13 +140,15 @@ class SceneView:
             overruns=ticks.overruns,
         )
 
-    def _moved(self, poses: FloatArray) -> IntArray:
-        """The objects whose poses (k, 7) have to be said."""
-        if len(poses) <= _FEW:
-            return np.arange(len(poses))
-        if len(self._poses) != len(poses):
+    def _moved(self, objects: PerceivedObjects) -> IntArray:
+        """The objects whose poses have to be said."""
+        if len(objects.names) <= _FEW:
+            return np.arange(len(objects.names))
+        if self._base is None:
             return self._model.may_move
-        moved = np.abs(poses - self._poses).max(axis=1) > _STANDS_M
+        (positions_m, rotations), (at_first_m, turned_first) = _frames(objects), _frames(self._base)
+        moved = np.abs(positions_m - at_first_m).max(axis=1) > _STANDS_M
+        moved |= np.abs(rotations - turned_first).max(axis=(1, 2)) > _STANDS_M
         moved[self._model.may_move] = True
         return np.flatnonzero(moved)
 
@@ -159,7 +164,7 @@ class SceneView:
                 yield
             links = tuple(made)
             self._links = links, room
-        poses = object_poses(objects)
+        poses = object_poses(objects, np.arange(len(objects.names)))
         room -= sum(len(name) + _ENTRY_BYTES for name in model.objects)
         shapes, left_out = list(links), 0
         distances_m = np.linalg.norm(poses[:, :3] - tool_m, axis=1)
@@ -173,20 +178,28 @@ class SceneView:
                 left_out += 1
             yield
         self.version += 1
-        self._poses, self.left_out = poses, left_out
+        self._base, self.left_out = objects, left_out
         said = SceneShapes(header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses))
         self.shapes = Prepared(said)
         self.shapes_bytes = len(self.shapes.under(header))
 
 
-def object_poses(objects: PerceivedObjects) -> FloatArray:
-    """Where the objects are perceived (k, 7): positions and quaternions, w first; ValueError where nobody knows."""
+def object_poses(objects: PerceivedObjects, index: IntArray) -> FloatArray:
+    """Where the objects of `index` (n,) are perceived (n, 7): positions and quaternions, w first.
+
+    ValueError where nobody knows.
+    """
+    positions_m, rotations = _frames(objects)
+    if index.size == 0:
+        return np.empty((0, 7))
+    turned = Rotation.from_matrix(rotations[index]).as_quat(scalar_first=True)
+    return np.concatenate([positions_m[index], turned], axis=1)
+
+
+def _frames(objects: PerceivedObjects) -> tuple[FloatArray, FloatArray]:
     if objects.positions_m is None or objects.rotations is None:
         raise ValueError("objects.positions_m is None; valid: objects of a camera that knows their poses")
-    if len(objects.positions_m) == 0:
-        return np.empty((0, 7))
-    turned = Rotation.from_matrix(objects.rotations).as_quat(scalar_first=True)
-    return np.concatenate([objects.positions_m, turned], axis=1)
+    return objects.positions_m, objects.rotations
 
 
 def _boxed(shape: Shape) -> Shape:

@@ -11,6 +11,7 @@ from common.emulation.clauses import LinkModel
 from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.files.output_file import require_output_file
+from common.recording.side import require_recordable
 from common.units import parse_duration
 
 _LARGEST_ASYMMETRY_S = 10.0
@@ -42,6 +43,8 @@ class RunOptions:
     """For every random draw: the same seed gives the same noise and delays."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the run's figures there at the end."""
+    record: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mcap")] = None
+    """Record the run into a new file: all that happened, to be looked at, exported, and computed anew bit for bit."""
     status: StatusMode = "line"
     """A live line for people, JSON lines for programs, the same with all that the console shows, or nothing."""
 
@@ -56,6 +59,7 @@ class RunOptions:
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
         require_output_file("--summary", self.summary)
+        require_recordable(self.record)
 
     def link_spec(self) -> LinkSpec:
         """The emulated link, with this run's seed; ConfigurationError for a bad one."""

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import IO, Any, Literal, cast
 
@@ -44,6 +44,8 @@ class Status:
         self._live: Live | None = None
         self._story = Story()
         self._next_s = -1.0
+        self.also: Callable[[str], None] | None = None
+        """Who is told each note, too"""
 
     def __enter__(self) -> "Status":
         self._output.__enter__()
@@ -77,10 +79,7 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, five times a second at most, ten with facts.
-
-        BrokenPipeError, once, when the reader has gone.
-        """
+        """Show the values, at most five times a second, ten with facts; BrokenPipeError, once, when the reader left."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
@@ -109,6 +108,8 @@ class Status:
 
     def note(self, text: str) -> None:
         """A line that stays, for people; an event of its own in the modes for programs."""
+        if self.also is not None:
+            self.also(text)
         if self._mode in _LINES_OF_JSON:
             self.event("note", text=text)
         elif self._mode == "line":

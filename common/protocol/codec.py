@@ -34,10 +34,9 @@ class Prepared:
     def __init__(self, message: Message) -> None:
         names = message.__struct_fields__
         tag = cast(str, message.__struct_config__.tag)
-        # An array of few elements is one byte and these.
-        self._before: bytes = (
-            b"\x92" + msgpack.packb(PROTOCOL_VERSION) + bytes([0x91 + len(names)]) + msgpack.packb(tag)
-        )
+        packer = msgpack.Packer()
+        heads = packer.pack_array_header(2), packer.pack(PROTOCOL_VERSION), packer.pack_array_header(1 + len(names))
+        self._before = b"".join((*heads, packer.pack(tag)))
         self._after = b"".join(msgspec.msgpack.encode(getattr(message, name)) for name in names[1:])
 
     def under(self, header: Header) -> bytes:

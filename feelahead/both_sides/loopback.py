@@ -15,6 +15,7 @@ from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
+from operator_side.assembly import build_operator_side
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.port import OpenController
@@ -30,14 +31,16 @@ from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.figures import tick_microseconds
-from robot_side.main import SENT_STREAMS, TICK_PERIOD_S
+from robot_side.main import TICK_PERIOD_S
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
 
 _WALL = MonotonicClock()
 """For how long a tick takes, and nothing else."""
 _PEER = b"loopback"
-_VIRTUAL_CLOCK = "virtual"
+VIRTUAL_CLOCK = "virtual"
+_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
+"""Nobody looks here."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ class Loopback:
         after_robot_tick: Callable[[float], None] | None = None,
         other_law: Callable[[Law], Law] | None = None,
         tick_period_s: float = TICK_PERIOD_S,
+        robot_side: Callable[..., RobotSide] = RobotSide,
+        operator_side: Callable[..., OperatorSide] = OperatorSide,
     ) -> None:
         """`scene`: instead of the one that the settings name; `person`: instead of the scripted one.
 
@@ -77,25 +82,16 @@ class Loopback:
 
         pages: of the console, as the person knows them.
         other_law: makes another law of the one that the settings name.
+        robot_side, operator_side: make the cores, as ones that note what happens to them.
         after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
         """
         self.clock = VirtualClock()
         self.robot: RobotSide = build_robot_side(
-            settings.robot, epoch=1, clock_domain=_VIRTUAL_CLOCK, scene=scene, other_law=other_law
+            settings.robot, 1, VIRTUAL_CLOCK, scene=scene, other_law=other_law, side=robot_side
         )
         # After the scene, which decides what kernels there are.
         warm_up()
-        self.operator = OperatorSide(
-            2,
-            _VIRTUAL_CLOCK,
-            haptics=settings.operator.haptics,
-            compensation=settings.operator.compensation,
-            calibration=settings.operator.calibration,
-            rendering=settings.operator.rendering,
-            swap_sides=settings.operator.swap_sides,
-            seed=settings.operator.seed,
-            asymmetry_s=settings.operator.asymmetry_s(),
-        )
+        self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_side)
         self.device = device or SimulatedDualSense()
         self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
         self.pages = pages or DrivingPage(may_drive=False)
@@ -116,7 +112,7 @@ class Loopback:
         self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
         self._to_operator: dict[Stream, DelayLine[bytes]] = {
-            stream: DelayLine(self._back.profile("to_operator", stream)) for stream in SENT_STREAMS
+            stream: DelayLine(self._back.profile("to_operator", stream)) for stream in _STREAMS
         }
         self._ticks = 0
         self._motions = 0

@@ -9,7 +9,7 @@ from typing import Any
 def merge_summaries(robot: Mapping[str, Any], operator: Mapping[str, Any], errors: Sequence[str]) -> dict[str, Any]:
     """The robot side's summary with the operator side's part of the figures that both sides know.
 
-    Counts that both sides have (`rejected`, `stale`) are added; nested tables are joined.
+    Counts that both sides have (`rejected`, `stale`, `dropped_blocks`) are added; nested tables are joined.
     """
     merged = _joined(robot, operator)
     merged["errors"] = [*robot.get("errors", []), *operator.get("errors", []), *errors]
@@ -23,7 +23,7 @@ def _joined(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
             joined[key] = value
         elif isinstance(value, Mapping):
             joined[key] = _joined(joined[key], value)
-        elif key in ("rejected", "stale"):
+        elif key in ("rejected", "stale", "dropped_blocks"):
             joined[key] += value
     return joined
 

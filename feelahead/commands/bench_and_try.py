@@ -103,6 +103,12 @@ bench = Menu(
             "bench_effects",
             "how long it takes from a change of stiffness until the controller is told",
         ),
+        "viewing": Entry(
+            "feelahead.benchmarks.viewing.bench",
+            "bench_viewing",
+            "what pictures and the scene's state cost a real robot side while somebody looks",
+            "pip install 'feelahead[robot]'",
+        ),
     },
 )
 

@@ -22,6 +22,7 @@ from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.protocol.messages import Compensation
+from common.recording.side import Recorder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import merge_summaries, read_summary
 from feelahead.commands.open_browser import show_address
@@ -103,10 +104,13 @@ def demo(arguments: Sequence[str]) -> int:
             with tempfile.TemporaryDirectory(prefix="feelahead-") as folder, StopSignal() as stop:
                 for text in unused_clauses(settings.link_spec(), _SENT):
                     status.note(text)
+                recorder = None if settings.record is None else Recorder(settings.record, Path(folder) / "recorder")
                 summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
                 with contextlib.suppress(BrokenPipeError):
                     errors = _run_both(settings, given, summaries, stop, status)
                 merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+                if recorder is not None:
+                    merged["recording"] = merged.get("recording", {}) | recorder.finish()
             # Before the report, which waits for its reader.
             if settings.summary is not None:
                 write_json("--summary", settings.summary, merged)
@@ -198,6 +202,8 @@ def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: P
     ]
     if "realtime" in given:
         arguments.append("--realtime" if settings.realtime else "--no-realtime")
+    if settings.record is not None:
+        arguments.append(f"--record={summary.with_name('recorder')}")  # where one recorder listens to both
     return [*arguments, f"--summary={summary}"]
 
 

@@ -70,7 +70,11 @@ class _Process:
         token, port = secrets.token_urlsafe(24), part.getsockname()[1]
         gate = Gate(token, port)
         self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
-        server = Server(gate, self._pages, part)
+        try:
+            server = Server(gate, self._pages, part)
+        except RuntimeError as error:
+            self._give_up(str(error))
+            return
         self._drawing = Drawing(server.viser)
         if (hole := prove(port, token)) is not None:
             self._give_up(f"its gate is not tight: {hole}")

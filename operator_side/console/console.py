@@ -40,8 +40,11 @@ class Console:
         self.hands: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         self.tuning: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         """What the pages said, the oldest first, for whoever takes it."""
+        self._handling: set[int] = set()
+        """The pages that have said something of their hands, and are not gone."""
         self._notes: list[str] = []
-        self._gone = False
+        self.gone = False
+        """Whether there is none any more; a note says why."""
         self._companion = Companion("operator_side.console", [str(port)])
         run = {"title": title, "live": live, "tunable": list(tunable)}
         self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
@@ -80,7 +83,7 @@ class Console:
     def receive(self) -> None:
         """Take what the console says; call it often."""
         channel = self._companion.channel
-        if self._gone:
+        if self.gone:
             return
         for message in channel.receive():
             kind, content = message[:1], message[1:]
@@ -92,16 +95,23 @@ class Console:
                 self._end(f"no console: {content.decode()}")
                 return
             elif kind in (b"h", b"t"):
-                (self.hands if kind == b"h" else self.tuning).append(msgspec.msgpack.decode(content, type=PageWords))
+                self._hear(msgspec.msgpack.decode(content, type=PageWords), hands=kind == b"h")
         if channel.ended:
             self._end("the console has ended; the run goes on without it")
 
+    def _hear(self, words: PageWords, *, hands: bool) -> None:
+        (self.hands if hands else self.tuning).append(words)
+        if hands and words.hands is None:
+            self._handling.discard(words.page)
+        elif hands:
+            self._handling.add(words.page)
+
     def _end(self, why: str) -> None:
         """Whoever watched sees no more; whose hands moved something through a page is gone, too."""
-        self._gone, self.address = True, None
-        if self.pages:
-            self.pages = 0
-            self.hands.append(PageWords(page=0))
+        self.gone, self.address = True, None
+        self.pages = 0
+        for page in sorted(self._handling):
+            self._hear(PageWords(page), hands=True)
         self._notes.append(why)
 
     def take_notes(self) -> list[str]:

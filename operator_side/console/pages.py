@@ -10,6 +10,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
 MOST_PAGES: Final = 8
+"""At once; as many may draw the scene."""
 _MOST_NOTES: Final = 50
 _A_SECOND: Final = 500
 """Messages that a page may send in a second: hands at 60 Hz, and every key's edge."""

@@ -25,6 +25,8 @@ from operator_side.console.pages import MOST_PAGES, Pages
 _LARGEST_MESSAGE: Final = 1 << 16
 """From a page: its hands, or where viser's camera is."""
 _PING_S: Final = 5.0
+_CLOSE_S: Final = 0.5
+"""Who is shown out for talking too much still talks."""
 _TYPES: Final[Mapping[str, str]] = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -79,6 +81,7 @@ class Server:
         def serve(handler: Handler, *_: object, process_request: ProcessRequest, **options: Any) -> Any:
             self.loop = asyncio.get_running_loop()
             options |= {"max_size": _LARGEST_MESSAGE, "ping_interval": _PING_S, "ping_timeout": _PING_S}
+            options |= {"close_timeout": _CLOSE_S, "server_header": None}
 
             async def handle(connection: ServerConnection) -> None:
                 request = connection.request
@@ -95,7 +98,7 @@ class Server:
             def answer(connection: ServerConnection, request: Request) -> Response | None:
                 return self._answer(connection, request, process_request)
 
-            return opens(handle, sock=self._part, process_request=answer, server_header=None, **options)
+            return opens(handle, sock=self._part, process_request=answer, **options)
 
         websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
         try:

@@ -12,7 +12,7 @@ from common.command.status import Status
 from common.companion.process import Companion
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.messages import NewFacts, Note
-from operator_side.terminal_view.terminal import attributes_of, leave, require_terminal
+from operator_side.terminal_view.terminal import attributes_of, leave, required_terminal
 
 _PERIOD_S: Final = 0.1
 _END_LIMIT_S: Final = 0.5
@@ -26,8 +26,7 @@ class TerminalStatus(Status):
     def __init__(self, program: str) -> None:
         """ConfigurationError unless standard output is a terminal."""
         super().__init__("line", program)
-        self._terminal = sys.stdout.fileno()
-        require_terminal(self._terminal)
+        self._terminal = required_terminal(sys.stdout)
         self._companion: Companion | None = None
         self._encoder = msgspec.msgpack.Encoder()
 

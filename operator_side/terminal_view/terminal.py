@@ -3,7 +3,7 @@
 import contextlib
 import os
 import termios
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 from common.errors import ConfigurationError
 
@@ -17,12 +17,13 @@ _NO_LETTER: Final = b"\x00"
 Attributes = list[Any]
 
 
-def require_terminal(descriptor: int) -> None:
-    """ConfigurationError unless `descriptor` leads to a terminal that can be drawn on."""
-    if not os.isatty(descriptor):
+def required_terminal(stream: TextIO | None) -> int:
+    """The descriptor of a stream that leads to a terminal; ConfigurationError where it cannot be drawn on."""
+    if stream is None or not stream.isatty():
         raise ConfigurationError("--tui: standard output is no terminal; valid: a terminal, or no --tui")
     if os.environ.get("TERM", "dumb") == "dumb":
         raise ConfigurationError("--tui: TERM says that the terminal cannot be drawn on; valid: TERM=xterm, as a rule")
+    return stream.fileno()
 
 
 def attributes_of(descriptor: int) -> Attributes | None:

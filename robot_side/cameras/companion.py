@@ -18,8 +18,8 @@ from robot_side.cameras.off_screen import BACKENDS, REMEDY, silenced, trouble_wi
 if TYPE_CHECKING:
     from robot_side.cameras.rendering import Renderer
 
-_NICENESS = 5
-"""Behind whatever ticks."""
+_LATER = 5
+"""By so much niceness behind the process that ticks."""
 
 
 def main() -> None:
@@ -46,7 +46,7 @@ def _step_back() -> None:
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+        os.nice(_LATER)
 
 
 def _refuse(channel: Channel, reason: str) -> None:

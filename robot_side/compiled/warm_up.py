@@ -1,9 +1,11 @@
 """Compiling every kernel beforehand, so that no tick waits for one."""
 
+import hashlib
 from collections.abc import Callable
 
 from common.clock import MonotonicClock
 from robot_side.compiled.kernel import imported_kernels
+from robot_side.compiled.sources import digest
 
 NOTEWORTHY_WARM_UP_S = 1.0
 """A person is told about a longer one."""
@@ -25,3 +27,9 @@ def warm_up(announce: Callable[[], None] | None = None) -> float:
             announce()
             announce = None
     return clock.now() - start_s
+
+
+def kernels_digest() -> str:
+    """Digest what every kernel so far is compiled from, as the cache's keys do: equal ones compute the same bits."""
+    digests = sorted(digest(kernel.function) for kernel in imported_kernels())
+    return hashlib.sha256("".join(digests).encode()).hexdigest()

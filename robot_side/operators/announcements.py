@@ -34,7 +34,7 @@ class Announcements:
         self._lease = lease
         self._tuning = tuning
         self._link = new_link()
-        self._sequence = itertools.count(1)
+        self._sequence, self._shown = itertools.count(1), itertools.count(1)
         self._answers: list[Answer] = []
         self._answered_stranger_s = -math.inf
         self._noticed_s = -math.inf
@@ -45,6 +45,12 @@ class Announcements:
         """The next header of our epoch, which has one sequence whoever it goes to; `link` None: to nobody named."""
         header = (link or self._link).stamp(now_s)
         return msgspec.structs.replace(header, sequence=next(self._sequence))
+
+    def stamp_shown(self, now_s: float) -> Header:
+        """The next header of what is made between the ticks, in a sequence of its own: what the core sends is the same
+        whoever looks.
+        """
+        return msgspec.structs.replace(self._link.stamp(now_s), sequence=next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:
         """Answer a Hello, at a bounded rate: ours, and where it stands."""

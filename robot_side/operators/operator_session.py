@@ -146,6 +146,10 @@ class OperatorSession:
         """Where to send what observers may feel."""
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
+    def shown_header(self, now_s: float) -> Header:
+        """The header of pictures and of the scene, which are made between the ticks."""
+        return self._announcements.stamp_shown(now_s)
+
     def view_header(self, now_s: float) -> Header:
         """The header of what goes to whoever looks."""
         return self._announcements.stamp(now_s)

@@ -25,6 +25,7 @@ SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 20_000
 _LOOK_S: Final = 0.02
+_DRAWS_SCENE: Final = "button#drawn[aria-pressed=true]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
 window.pretended = null;
@@ -40,8 +41,13 @@ class Browser:
         self._out = out
 
     @contextmanager
-    def page(self, address: str, size: tuple[int, int] = SMALL, *, gamepad: bool = False) -> Iterator["Page"]:
-        """`address` open at `size`; whatever the page complained of fails the context's end."""
+    def page(
+        self, address: str, size: tuple[int, int] = SMALL, *, scene: bool = False, gamepad: bool = False
+    ) -> Iterator["Page"]:
+        """`address` open at `size`; whatever the page complained of fails the context's end.
+
+        `scene`: with the drawn scene, which without a graphics processor takes most of a core.
+        """
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
         from playwright.sync_api import Error  # noqa: PLC0415  # not part of our environment
@@ -52,6 +58,8 @@ class Browser:
                 opened.add_init_script(_FAKE_GAMEPAD)
             page = Page(opened, self._out)
             opened.goto(address)
+            if not scene and (button := opened.query_selector(_DRAWS_SCENE)) is not None:
+                button.click()
             yield page
             if page.complaints:
                 raise CheckFailedError(f"the page complained: {'; '.join(page.complaints[:3])}")

@@ -29,7 +29,7 @@ def nothing_overflows(stage: Stage) -> str:
     """1280x720 and 1920x1080: no scroll bars of the page, no words cut, both views large."""
     said = []
     for size in (SMALL, LARGE):
-        with stage.browser.page(stage.run.address, size) as page:
+        with stage.browser.page(stage.run.address, size, scene=True) as page:
             page.wait(DRAWN, "drawn both views")
             width, height = page.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
             check((width, height) == size, f"{size}: the page takes {width}x{height}")

@@ -16,7 +16,7 @@ _LEAST_DETAIL: Final = 8.0
 
 def both_views_move(stage: Stage) -> str:
     """Both cameras' pictures are drawn, have something on them, change, and say their age."""
-    with stage.browser.page(stage.run.address) as page:
+    with stage.browser.page(stage.run.address, scene=True) as page:
         page.wait(DRAWN, "drawn both views")
         said = []
         for view in VIEWS:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from tests.helpers.debian import Say, install, run_or_skip
+from tests.containers.debian import Say, install, run_or_skip
 from tests.kernel.skipped import SkippedError
 
 _LOCK: Final = Path(__file__).parents[1] / "requirements-console.lock"

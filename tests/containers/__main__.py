@@ -10,9 +10,9 @@ from types import FrameType
 from common.errors import FeelaheadError
 from feelahead.containers.engine import Engine, EngineError
 from tests.containers.checks import CHECKS
+from tests.containers.debian import Say
 from tests.containers.provide import base_image, default_cache, provided_engine
 from tests.containers.watch import CheckFailedError
-from tests.helpers.debian import Say
 from tests.kernel.skipped import SkippedError
 
 _BUILD_LIMIT_S = 1500.0

@@ -10,7 +10,7 @@ from typing import Final
 
 from common.errors import ConfigurationError
 from feelahead.containers.engine import COMPOSE_FILE, Engine, EngineError
-from tests.helpers.debian import Say, install, run_or_skip
+from tests.containers.debian import Say, install, run_or_skip
 from tests.kernel.skipped import SkippedError
 
 PROJECT: Final = "feelahead-test"

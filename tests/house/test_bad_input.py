@@ -75,6 +75,10 @@ DEMO: Command = lambda arguments: feelahead.main.command(["demo", *arguments])  
         (OPERATOR, ["--compensation", "nobody"], "nobody", "robot"),
         (DEMO, ["--compensation", "nobody"], "nobody", "robot"),
         (feelahead.main.command, ["dmeo"], "dmeo", "demo"),
+        (DEMO, ["--tui"], "--tui", "a terminal"),
+        (OPERATOR, ["--tui"], "--tui", "a terminal"),
+        (DEMO, ["--tui", "--status", "json"], "--status json", "one of them"),
+        (OPERATOR, ["--tui", "--status", "none"], "--status none", "one of them"),
     ],
 )
 def test_one_line_names_the_value_and_what_is_valid(

@@ -24,8 +24,9 @@ ARROWS = """
     common/protocol: common common/timing
     common/realtime: common
     common/companion:
+    common/recording: common common/companion common/protocol
     common/sockets: common common/files
-    common/command: common common/emulation common/files
+    common/command: common common/emulation common/files common/recording
 
     robot_side/compiled: common
     robot_side/overlap/checks: common robot_side/compiled
@@ -51,9 +52,9 @@ ARROWS = """
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/enlargement
         robot_side/gripper robot_side/objects robot_side/overlap/meshes
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
-    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled robot_side/enlargement
-        robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
+    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled
+        robot_side/enlargement robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
     operator_side/dualsense/effects: common
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -73,19 +74,24 @@ ARROWS = """
         operator_side/simulated_person
     operator_side/console: common common/command common/companion common/protocol operator_side/facts.py
         operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/sockets
-        operator_side/calibration operator_side/console operator_side/dualsense/effects operator_side/dualsense/hid
-        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/facts.py operator_side/feel
-        operator_side/hands operator_side/page_hands operator_side/simulated_person operator_side/terminal_view
+    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
+        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
+        operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
+        operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands
+        operator_side/simulated_person operator_side/terminal_view
 
     feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
+    feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
-    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/documents
+    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
+        feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
+    feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/commands: common/* operator_side/* feelahead/both_sides feelahead/benchmarks/* feelahead/experiments/*
+        feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of
@@ -103,6 +109,8 @@ LIBRARIES = {
     "mujoco": ("robot_side/simulation", "robot_side/cameras", "feelahead/benchmarks/overlap/distances.py"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
+    "foxglove": ("common/recording",),
+    "mcap": ("common/recording",),
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",
@@ -113,6 +121,7 @@ LIBRARIES = {
     ),
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
+        "common/recording",
         "robot_side/main.py",
         "robot_side/cameras",
         "robot_side/compiled/warm_up.py",

@@ -162,9 +162,20 @@ def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     assert settings.motion == RobotSettings().motion
 
 
+def test_cameras_are_switched_off_by_a_flag_or_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text("[cameras]\non = false\nwidth = 320\nrate_hz = 15.0\n")
+    from_file = parse_settings(RobotSettings, "robot", ["--config", str(path)]).cameras
+    assert (from_file.on, from_file.width, from_file.height, from_file.rate_hz) == (False, 320, 480, 15.0)
+    assert parse_settings(RobotSettings, "robot", ["--config", str(path), "--cameras"]).cameras.on
+    assert not parse_settings(RobotSettings, "robot", ["--no-cameras"]).cameras.on
+    assert parse_settings(RobotSettings, "robot", ["--cameras.quality", "50"]).cameras.quality == 50
+
+
 @pytest.mark.parametrize(
     ("content", "named"),
     [
+        ("[cameras]\nquality = 0", "quality = 0"),
         ('[roles]\npost = "enemy"', "enemy"),
         ("kinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
         ("[camera]\nmean_m = [0.0, 0.001]", "mean_m"),

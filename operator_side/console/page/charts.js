@@ -58,7 +58,7 @@ export class Chart {
       context.moveTo(left, y(value));
       context.lineTo(right, y(value));
       context.stroke();
-      context.fillText(`${value}`, right + 4, y(value) + 4);
+      context.fillText(value < 1000 ? `${value}` : `${value / 1000}k`, right + 4, y(value) + 4);
     }
     context.font = `600 12px ${FONT}`;
     context.fillStyle = color("--text");

@@ -5,6 +5,7 @@ import os
 import sys
 from typing import Any
 
+import msgspec
 import pytest
 
 from common.command.live_view import Value
@@ -79,6 +80,31 @@ def test_notes_are_for_people_and_programs_and_events_for_programs(capsys: pytes
     # Long notes are not broken into lines, and brackets are no markup.
     of_programs = [json.dumps({"event": "note", "text": text}), '{"event": "listening"}']
     assert of_mode == {"line": [f"robot: {text}"], "json": of_programs, "none": []}
+
+
+class Facts(msgspec.Struct):
+    a: float
+    b: str | None = None
+
+
+def test_facts_are_for_programs_that_want_them_ten_times_a_second(capsys: pytest.CaptureFixture[str]) -> None:
+    modes: tuple[StatusMode, ...] = ("line", "json", "none")
+    for mode in modes:
+        with Status(mode, "robot") as status:
+            assert not status.wants_facts
+            status.show_facts(Facts(0.5))
+    assert shown(capsys) == []
+    with Status("facts", "robot") as status:
+        assert status.wants_facts
+        for tick in range(1000):
+            if status.due(now_s := 50.0 + tick / 1000):
+                status.show(now_s, {"tick": tick})
+                status.show_facts(Facts(now_s))
+        status.note("noted")
+        assert status.event("bare")
+    found = events(capsys)
+    assert [event["event"] for event in found] == [*["status", "facts"] * 10, "note", "bare"]
+    assert found[1]["facts"] == {"a": 50.0, "b": None}
 
 
 def test_nothing_is_due_when_nothing_is_shown(capsys: pytest.CaptureFixture[str]) -> None:

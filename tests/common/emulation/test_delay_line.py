@@ -259,7 +259,9 @@ def test_refuses_bad_names_and_lists_the_valid_ones(spec: str, named: str) -> No
     assert "\n" not in text
     assert repr(spec) in text
     assert named in text
-    assert re.search("valid: .*to_robot, to_operator, haptics, telemetry, video, or both as to_robot.haptics", text)
+    assert re.search(
+        "valid: .*to_robot, to_operator, haptics, telemetry, video, scene, or both as to_robot.haptics", text
+    )
 
 
 def test_a_bad_clause_is_reported_with_the_whole_specification() -> None:
@@ -272,7 +274,7 @@ def test_a_bad_clause_is_reported_with_the_whole_specification() -> None:
 def test_unknown_directions_and_streams_are_refused() -> None:
     with pytest.raises(ValueError, match="'to_mars'; valid: to_robot, to_operator"):
         LinkSpec.parse("").profile("to_mars")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="'smell'; valid: haptics, telemetry, video"):
+    with pytest.raises(ValueError, match="'smell'; valid: haptics, telemetry, video, scene"):
         LinkSpec.parse("").profile("to_robot", "smell")  # type: ignore[arg-type]
 
 

@@ -1,9 +1,10 @@
 import struct
 
+import msgspec
 import pytest
 
 from common.errors import RemoteProtocolError
-from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode, decode_view, encode
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared, decode, decode_view, encode
 from common.protocol.messages import Header, Hello
 from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneShapes, SceneState, Shape, VideoFrame
 
@@ -80,3 +81,18 @@ def test_pictures_have_a_size(size: int) -> None:
 def test_more_than_a_view_may_be_is_not_looked_into() -> None:
     with pytest.raises(RemoteProtocolError, match="valid: up to"):
         decode_view(bytes(VIEW_MAXIMUM_BYTES + 1))
+
+
+def test_a_message_that_is_prepared_is_the_same_under_any_header() -> None:
+    for message in (
+        state(),
+        SceneShapes(HEADER, 1, ("palm",), ("ball",), (Shape(0, False, "sphere", (0.1, 0.0, 0.0), POSE),), 2, FLOATS),
+    ):
+        prepared = Prepared(message)
+        for header in (HEADER, Header(7, 2**40, 1e6, 0.25, 0.5, 0.125, 0.75)):
+            assert decode_view(prepared.under(header)) == msgspec.structs.replace(message, header=header)
+
+
+def test_poses_of_objects_are_a_row_for_each_or_none() -> None:
+    with pytest.raises(ValueError, match="object_poses"):
+        SceneShapes(HEADER, 1, (), ("ball", "box"), (), object_poses=FLOATS)

@@ -10,7 +10,7 @@ from operator_side.following_pages import hands_facts, shared_hands
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
-from tests.helpers.talking_page import AtThePage, Does, TalkingPage
+from tests.operator_side.page_hands.talking_page import AtThePage, Does, TalkingPage
 
 pytestmark = pytest.mark.long
 

@@ -22,11 +22,19 @@ from feelahead.commands.doctor.controller_checks import (
     missing_grants,
 )
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
-from feelahead.commands.doctor.machine_checks import PORTS, check_ports, check_realtime
+from feelahead.commands.doctor.machine_checks import (
+    PORTS,
+    RENDERING,
+    RENDERING_PACKAGES,
+    check_ports,
+    check_realtime,
+    check_rendering,
+)
 from feelahead.commands.doctor.python_checks import EXTRAS, OLDEST_PYTHON, check_extra, check_python, modules_of
 from feelahead.main import command
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
+from robot_side.cameras.off_screen import BACKENDS, REMEDY
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
 from tests.helpers.repository import ROOT
 
@@ -272,3 +280,29 @@ def test_here_it_tells_of_everything(capsys: pytest.CaptureFixture[str]) -> None
 def test_a_flag_that_it_does_not_have() -> None:
     with pytest.raises(ConfigurationError, match="--colour"):
         command(["doctor", "--colour"])
+
+
+def test_one_way_to_render_is_enough() -> None:
+    found = check_rendering({"egl": "egl: no such library", "osmesa": None})
+    assert (found.verdict, found.remedy) == (OK, None)
+    assert "OSMESA" in found.said
+
+
+def test_without_a_way_to_render_the_packages_are_named_and_the_demo_runs_all_the_same() -> None:
+    found = check_rendering({"egl": "egl: no such library", "osmesa": "osmesa: nor this one"})
+    assert found.verdict is NOTE
+    assert "egl: no such library; osmesa: nor this one" in found.said
+    assert found.remedy is not None
+    assert "libegl1" in found.remedy
+    assert fit_for_demo([found])
+
+
+def test_doctor_tries_what_the_robot_side_tries_and_says_the_same() -> None:
+    assert (RENDERING, RENDERING_PACKAGES) == (BACKENDS, REMEDY)
+
+
+@pytest.mark.processes
+def test_a_way_to_render_that_does_not_work_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+    monkeypatch.setenv("EGL_PLATFORM", "none")
+    assert str(facts.rendering_troubles(["egl"])["egl"]).startswith("egl: ")

@@ -35,7 +35,7 @@ class Desk:
 
 @contextlib.asynccontextmanager
 async def served(desk: Desk) -> AsyncIterator[Opens]:
-    async with serve(desk.pages.serve, "127.0.0.1", 0) as server:
+    async with serve(desk.pages.serve, "127.0.0.1", 0, close_timeout=0.1) as server:
         port = next(iter(server.sockets)).getsockname()[1]
         yield lambda: connect(f"ws://127.0.0.1:{port}/")
 

@@ -18,7 +18,7 @@ from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import BROWSER, PERSON, SharedHands
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
 from tests.helpers.simulated_desk import VIEW, armed
-from tests.helpers.talking_page import PERIOD_S, TalkingPage
+from tests.operator_side.page_hands.talking_page import PERIOD_S, TalkingPage
 
 TICK_S = 0.004
 WORN = TravelCalibration(

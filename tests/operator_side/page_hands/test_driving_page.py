@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from operator_side.page_hands.driving_page import REST_S, SILENCE_S, DrivingPage, Readiness
 from operator_side.page_hands.page_messages import PageHands, TuneWish, read_page_message
-from tests.helpers.talking_page import PERIOD_S, TalkingPage
+from tests.operator_side.page_hands.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
     None,

@@ -5,7 +5,7 @@ import pytest
 
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.history import SPAN_S, History
-from tests.operator_side.made_up_facts import PULLED, facts_of
+from tests.operator_side.terminal_view.made_up_facts import PULLED, facts_of
 
 
 def at(now_s: float, newest_ms: float | None = None, **status: float) -> OperatorFacts:

@@ -13,7 +13,7 @@ from operator_side.terminal_view.history import History
 from operator_side.terminal_view.lines import Line, Look
 from operator_side.terminal_view.screen import SILENT_AFTER_S, Moment, screen
 from operator_side.terminal_view.signs import ASCII, BLOCKS, Signs, signs_for
-from tests.operator_side.made_up_facts import PULLED, STATUS, facts_in_motion, facts_of
+from tests.operator_side.terminal_view.made_up_facts import PULLED, STATUS, facts_in_motion, facts_of
 
 floats = st.floats() | st.floats(-10.0, 10.0)
 unknown = st.none() | floats

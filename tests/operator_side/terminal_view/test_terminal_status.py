@@ -1,33 +1,27 @@
-import fcntl
 import os
 import pty
 import re
-import select
 import signal
-import struct
-import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
 from common.errors import ConfigurationError
 from operator_side.terminal_view.status import TerminalStatus
-from tests.helpers.repository import ROOT
+from tests.operator_side.terminal_view.on_terminal import LEFT, LIMIT_S, OnTerminal
 
 pytestmark = pytest.mark.processes
 
-ENTERED, LEFT = b"\x1b[?1049h", b"\x1b[?1049l"
-LIMIT_S = 60.0
 PLAYER = """
 import sys, time
 from common.clock import MonotonicClock
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError
 from operator_side.terminal_view.status import TerminalStatus
-from tests.operator_side.made_up_facts import facts_in_motion
+from tests.operator_side.terminal_view.made_up_facts import facts_in_motion
 
 clock, sent = MonotonicClock(), 0
 with StopSignal() as stop, TerminalStatus("player") as status:
@@ -43,58 +37,12 @@ status.note("the result")
 """
 
 
-class Player:
-    """A program that shows made-up facts on a terminal, whose other end we hold."""
+class Player(OnTerminal):
+    """A program that shows made-up facts."""
 
-    def __init__(self, *arguments: str, size: tuple[int, int] = (80, 24)) -> None:
-        self.ours, self.theirs = pty.openpty()
-        self.seen = b""
-        self.resize(*size)
-        self.before = termios.tcgetattr(self.ours)
-        environment = {name: value for name, value in os.environ.items() if name not in ("LC_CTYPE", "NO_COLOR")}
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-c", PLAYER, *arguments],
-            stdin=self.theirs,
-            stdout=self.theirs,
-            stderr=subprocess.PIPE,
-            env={**environment, "TERM": "xterm", "LC_ALL": "C.UTF-8", "PYTHONPATH": str(ROOT)},
-            start_new_session=True,
-            text=True,
-        )
+    def __init__(self, *arguments: str) -> None:
+        super().__init__([sys.executable, "-P", "-c", PLAYER, *arguments])
         self.companion = int(self.said())
-
-    def said(self) -> str:
-        """A line of its errors; all that is there once it has ended."""
-        assert self.process.stderr is not None
-        return self.process.stderr.readline()
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.communicate()
-        os.close(self.ours)
-        os.close(self.theirs)
-
-    def resize(self, columns: int, rows: int) -> None:
-        fcntl.ioctl(self.ours, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-
-    def read_until(self, holds: Callable[[bytes], object]) -> None:
-        end_s = time.monotonic() + LIMIT_S
-        while not holds(self.seen):
-            assert time.monotonic() < end_s, self.seen[-2000:]
-            if not select.select([self.ours], [], [], 0.1)[0]:
-                continue
-            self.seen += os.read(self.ours, 1 << 16)
-
-    def end(self) -> int:
-        """Ctrl-C, and its exit code; what it writes meanwhile is read."""
-        self.process.send_signal(signal.SIGINT)
-        self.read_until(lambda seen: b"the result" in seen)
-        return self.process.wait(LIMIT_S)
-
-    def is_put_back(self) -> bool:
-        """Whether the screen is the first one, with its cursor and its ways of reading."""
-        after = self.seen.rpartition(ENTERED)[2]
-        return LEFT in after and b"\x1b[?25h" in after and termios.tcgetattr(self.ours) == self.before
 
 
 @pytest.fixture
@@ -109,7 +57,7 @@ def test_the_screen_is_drawn_and_everything_put_back_on_ctrl_c(player: Player) -
     typed = termios.tcgetattr(player.ours)
     assert not typed[3] & termios.ECHO
     assert typed[3] & termios.ISIG
-    assert player.end() == 0
+    assert player.end(b"the result") == 0
     assert player.is_put_back()
     # A result stays on the first screen.
     assert b"player: the result" in player.seen.partition(LEFT)[2]
@@ -132,7 +80,7 @@ def test_a_kill_of_what_draws_puts_the_terminal_back(player: Player) -> None:
     player.read_until(lambda seen: LEFT in seen)
     assert player.is_put_back()
     assert player.process.poll() is None
-    assert player.end() == 0
+    assert player.end(b"the result") == 0
 
 
 def test_a_new_size_is_drawn_in_and_never_scrolls(player: Player) -> None:
@@ -143,7 +91,7 @@ def test_a_new_size_is_drawn_in_and_never_scrolls(player: Player) -> None:
     rows = {int(row) for row in re.findall(rb"\x1b\[(\d+);1H", player.seen.partition(b"\x1b[2J")[2])}
     assert rows == set(range(1, 21))
     assert b"\n" not in player.seen
-    player.end()
+    player.end(b"the result")
     assert player.is_put_back()
 
 
@@ -153,7 +101,7 @@ def test_a_terminal_that_stalls_holds_nobody_up() -> None:
     termios.tcflow(player.theirs, termios.TCOOFF)
     assert player.said() == "sent\n"
     termios.tcflow(player.theirs, termios.TCOON)
-    assert player.end() == 0
+    assert player.end(b"the result") == 0
     assert player.is_put_back()
     player.close()
 

@@ -11,7 +11,7 @@ from common.protocol.view_messages import VIEW_NAMES, ViewName
 from robot_side.cameras.exchange import Viewpoint
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.picture_taking import HEIGHT, WIDTH, Image, around, picture_taker
+from tests.robot_side.cameras.picture_taking import HEIGHT, WIDTH, Image, around, picture_taker
 
 pytestmark = pytest.mark.processes
 

@@ -6,7 +6,7 @@ import pytest
 from robot_side.cameras.viewpoints import viewpoints
 from robot_side.simulation.scene import load_scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.picture_taking import HEIGHT, WIDTH, project
+from tests.robot_side.cameras.picture_taking import HEIGHT, WIDTH, project
 
 CAMERA = '<camera name="{}" pos="0.5 0 3" fovy="50"/>'
 CARRIED = '<camera name="mine" pos="0.3 0 0" quat="{}"/>'

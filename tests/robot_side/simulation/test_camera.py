@@ -30,7 +30,7 @@ def index_of(seen: PerceivedObjects, name: str) -> int:
 def test_every_array_is_contiguous(shapes: Scene) -> None:
     seen = MujocoCamera(shapes).perceive(0.0)
     arrays = [getattr(seen, field.name) for field in fields(seen) if isinstance(getattr(seen, field.name), np.ndarray)]
-    assert len(arrays) == 17
+    assert len(arrays) == 19
     assert all(array.flags.c_contiguous for array in arrays)
 
 

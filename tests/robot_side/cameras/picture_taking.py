@@ -8,7 +8,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import numpy.typing as npt
 import pytest
-import simplejpeg  # type: ignore[import-untyped]
+import simplejpeg
 
 from common.arrays import FloatArray
 from common.companion.process import Companion

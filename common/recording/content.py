@@ -1,0 +1,133 @@
+"""What the recorder makes of each message of a side: inputs as they are, and beside them what people and tools read."""
+
+import json
+from typing import Any, Final, Protocol
+
+import msgspec
+
+from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
+from common.recording.decoding import Decoder, Shown, shown_view, view_message
+from common.recording.drawing import Drawing
+from common.recording.entries import unpack_block
+from common.recording.topics import FORMAT
+from common.recording.wire import BLOCK, FACTS, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
+
+_OTHER: Final = {"robot": "operator", "operator": "robot"}
+
+
+class File(Protocol):
+    """Where it goes."""
+
+    def describe(self, name: str, values: dict[str, str]) -> None:
+        """Keep what holds for the whole file."""
+        ...
+
+    def write(self, topic: str, now_s: float, content: bytes) -> None:
+        """One message of a topic of ours."""
+        ...
+
+    def log(self, topic: str, now_s: float, content: Any, make: Any) -> None:
+        """One message of one of Foxglove's types."""
+        ...
+
+    def typed(self, kind: str) -> Any:
+        """Something that makes channels of a type."""
+        ...
+
+    def wall_ns(self, now_s: float) -> int:
+        """The wall clock's nanoseconds at a stamp."""
+        ...
+
+
+class Content:
+    """Sorts messages of one or both sides into topics."""
+
+    def __init__(self, file: File) -> None:
+        self._file = file
+        self._sides: dict[int, str] = {}
+        self._decoders: dict[str, Decoder] = {}
+        self._dropped: dict[str, int] = {}
+        self._stopped_because: str | None = None
+        self._drawing = Drawing(file)
+        self._objects: tuple[str, ...] = ()
+
+    def take(self, source: int, message: bytes) -> None:
+        """One message from one side; ValueError, or KeyError before its header, for what is none."""
+        kind, content = message[:1], message[1:]
+        if kind == HEADER:
+            self._begin(source, content)
+            return
+        side = self._sides[source]
+        if kind == BLOCK:
+            self._block(side, content)
+            return
+        now_s, content = unstamped(content)
+        if kind == VIEW:
+            self._view(side, now_s, content)
+        elif kind == STATUS:
+            self._status(side, now_s, json.loads(content))
+        elif kind == FACTS:
+            self._file.write("/operator/facts", now_s, content)
+        elif kind == NOTE:
+            self._drawing.log(side, now_s, content.decode(errors="replace"))
+        else:
+            raise ValueError(f"a message of kind {kind!r}")
+
+    def _begin(self, source: int, content: bytes) -> None:
+        header = json.loads(content)
+        side = header["side"]
+        if side not in _OTHER or side in self._decoders:
+            raise ValueError(f"side {side!r}; valid: robot and operator, once each")
+        self._sides[source] = side
+        self._decoders[side] = Decoder(side)
+        for decoder in self._decoders.values():
+            decoder.alone = len(self._decoders) == 1
+        values = {name: value if isinstance(value, str) else json.dumps(value) for name, value in header.items()}
+        self._file.describe(f"feelahead.{side}", {"format": str(FORMAT), **values})
+
+    def _block(self, side: str, content: bytes) -> None:
+        block = unpack_block(content)
+        self._file.write(f"/{side}/inputs", block.first_s, content)
+        lost = block.dropped - self._dropped.get(side, 0)
+        if lost > 0:
+            self._dropped[side] = block.dropped
+            self._drawing.log(side, block.first_s, f"{lost} blocks of inputs were dropped before this", warning=True)
+        self._write(self._decoders[side].shown(block))
+
+    def _view(self, side: str, now_s: float, payload: bytes) -> None:
+        if side == "operator" and "robot" in self._decoders:
+            return  # it is in the file as it was sent
+        message = view_message(payload)
+        if message is None:
+            return
+        if isinstance(message, VideoFrame):
+            # The picture itself is in its own topic, at the same time.
+            self._drawing.image(message, now_s)
+            payload = _without_picture(payload)
+        elif isinstance(message, SceneShapes):
+            self._objects = message.objects
+            self._drawing.shapes(message, now_s)
+        elif isinstance(message, SceneState):
+            self._drawing.state(message, now_s)
+        self._file.write("/view", now_s, payload)
+        self._write(shown_view(message, now_s, self._objects))
+
+    def _status(self, side: str, now_s: float, status: dict[str, Any]) -> None:
+        self._decoders[side].offset_s = status.get("offset_s")
+        self._file.write(f"/{side}/status", now_s, as_json({"time_s": now_s} | status))
+        why = status.get("stopped_because")
+        if side == "robot" and why != self._stopped_because:
+            self._stopped_because = why
+            if why is not None:
+                self._drawing.log(side, now_s, f"stopped: {why}", warning=True)
+
+    def _write(self, messages: Any) -> None:
+        shown: Shown
+        for shown in messages:
+            self._file.write(*shown)
+
+
+def _without_picture(payload: bytes) -> bytes:
+    version, message = msgspec.msgpack.decode(payload)
+    message[-1] = b""
+    return msgspec.msgpack.encode([version, message])

@@ -1,0 +1,137 @@
+"""From what happened to a core to what people and tools read: one JSON message a topic, in the recorder's process."""
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import Any, Final, NamedTuple
+
+import msgspec
+
+from common.errors import RemoteProtocolError
+from common.protocol.codec import decode, decode_view
+from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneState
+from common.recording.entries import Block, Entry, Kind, split_text
+from common.recording.wire import as_json
+
+AGES_PERIOD_S: Final = 0.01
+
+
+class Shown(NamedTuple):
+    """One message for people."""
+
+    topic: str
+    now_s: float
+    content: bytes
+
+
+class Decoder:
+    """Of one side: keeps what ages are measured from.
+
+    Where both sides are recorded, the robot side tells of fields and the operator side of commands, as each sent
+    them; a side that is recorded alone tells of both, of the other's as they arrived.
+    """
+
+    def __init__(self, side: str) -> None:
+        self.alone = True
+        """Whether the other side is not in this file."""
+        self.offset_s: float | None = None
+        """What the other side's clock is ahead of this one's, by its status."""
+        self._side = side
+        self._ages_s = -math.inf
+        self._field_sent_s: float | None = None
+        self._field_number = 0
+        self._frame_s: float | None = None
+
+    def shown(self, block: Block) -> Iterator[Shown]:
+        """What the entries of a block tell; what cannot be decoded is left to the inputs."""
+        for entry in block.unpacked():
+            try:
+                yield from self._shown(entry)
+            except (RemoteProtocolError, ValueError, struct.error):
+                continue
+
+    def _shown(self, entry: Entry) -> Iterator[Shown]:
+        if entry.kind in (Kind.SENT, Kind.RECEIVED):
+            rest = split_text(entry.content)[1]
+            yield from self._message(entry, split_text(rest)[1] if entry.kind == Kind.SENT else rest)
+        elif entry.kind == Kind.FRAME:
+            self._frame_s = struct.unpack_from("<d", entry.content)[0]
+        elif entry.kind == Kind.TICK and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
+            self._ages_s = entry.now_s
+            (applied_s,) = struct.unpack_from("<d", entry.content)
+            yield self._ages(
+                entry.now_s,
+                command_ms=None if math.isnan(applied_s) else self._since_ms(entry.now_s, applied_s),
+                frame_ms=None if self._frame_s is None else 1e3 * (entry.now_s - self._frame_s),
+            )
+        elif entry.kind == Kind.MOTION and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
+            self._ages_s = entry.now_s
+            sent_s = self._field_sent_s
+            yield self._ages(entry.now_s, field_ms=None if sent_s is None else self._since_ms(entry.now_s, sent_s))
+
+    def _message(self, entry: Entry, payload: bytes) -> Iterator[Shown]:
+        message = decode(payload)
+        header, sent = message.header, entry.kind == Kind.SENT
+        stamps: dict[str, Any] = {
+            "time_s": entry.now_s,
+            "side": self._side,
+            "sequence": header.sequence,
+            "sent_s": header.sent_s,
+            "age_ms": 0.0 if sent else self._since_ms(entry.now_s, header.sent_s),
+            "loop_age_ms": None if sent or header.echo_sent_s is None else 1e3 * (entry.now_s - header.echo_sent_s),
+        }
+        if isinstance(message, StiffnessUpdate):
+            if not sent and header.sequence > self._field_number:
+                self._field_number, self._field_sent_s = header.sequence, header.sent_s
+            if sent or self.alone:
+                values = msgspec.structs.asdict(message) | {
+                    name: msgspec.structs.asdict(getattr(message, name)) for name in ("l2", "r2")
+                }
+                yield _shown("/stiffness", entry.now_s, stamps, values)
+        elif isinstance(message, MotionCommand) and (sent or self.alone):
+            yield _shown("/command", entry.now_s, stamps, msgspec.structs.asdict(message))
+
+    def _since_ms(self, now_s: float, sent_s: float) -> float | None:
+        """How long ago the other side's clock showed `sent_s`; None while its offset is unknown."""
+        return None if self.offset_s is None else 1e3 * (now_s - (sent_s - self.offset_s))
+
+    def _ages(self, now_s: float, **ages_ms: float | None) -> Shown:
+        values = {"command_ms": None, "field_ms": None, "frame_ms": None} | ages_ms
+        return Shown("/ages", now_s, as_json({"time_s": now_s, "side": self._side} | values))
+
+
+def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:
+    """What a view payload says; None for what is no valid message."""
+    try:
+        return decode_view(payload)
+    except RemoteProtocolError:
+        pass
+    try:
+        message = decode(payload)
+    except RemoteProtocolError:
+        return None
+    return message if isinstance(message, Telemetry) else None
+
+
+def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple[str, ...]) -> Iterator[Shown]:
+    """The terms and overlaps of a state, or a telemetry; `objects`: the names of the newest SceneShapes."""
+    stamps = {"time_s": now_s, "sequence": message.header.sequence, "sent_s": message.header.sent_s}
+    if isinstance(message, Telemetry):
+        yield _shown("/telemetry", now_s, stamps, msgspec.structs.asdict(message))
+    elif isinstance(message, SceneState):
+        yield _shown("/enlargement", now_s, stamps, {"l2": _terms(message.l2), "r2": _terms(message.r2)})
+        of_objects = [
+            {"object": objects[index] if index < len(objects) else str(index), "l2_mm3": 1e9 * l2, "r2_mm3": 1e9 * r2}
+            for index, l2, r2 in message.overlaps
+        ]
+        yield _shown("/overlap", now_s, stamps, {"objects": of_objects})
+
+
+def _terms(terms: EnlargementTerms) -> dict[str, Any]:
+    return msgspec.structs.asdict(terms)
+
+
+def _shown(topic: str, now_s: float, stamps: dict[str, Any], values: dict[str, Any]) -> Shown:
+    values.pop("header", None)
+    return Shown(topic, now_s, as_json(stamps | values))

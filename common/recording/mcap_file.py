@@ -1,0 +1,149 @@
+"""The file itself, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
+
+import errno
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import foxglove
+from foxglove import channels
+from foxglove.mcap import MCAPCompression, MCAPWriteOptions
+
+from common.recording.topics import BINARY, ENCODING, PROFILE, SCHEMAS
+
+_NANOSECONDS: Final = 1e9
+
+
+class RecordingFile:
+    """One new file. A failure to write is kept in `error`; from then on nothing is written, and nothing raises."""
+
+    def __init__(self, path: Path, wall_offset_s: float) -> None:
+        """`wall_offset_s`: what the wall clock is ahead of the stamps. FileExistsError for a file that is there."""
+        self.error: str | None = None
+        self.kept_bytes = 0
+        """Up to the end of the last whole chunk"""
+        self.kept_s = 0.0
+        """From the first message to the last one of that chunk"""
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self._offset_s = wall_offset_s
+        self._output = _Output(path)
+        self._context = foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        self._writer = foxglove.open_mcap(
+            self._output,
+            context=self._context,
+            writer_options=MCAPWriteOptions(
+                profile=PROFILE,
+                compression=MCAPCompression.Zstd,
+                # We say where a chunk ends.
+                chunk_size=None,
+                compression_threads=0,
+            ),
+        )
+        self._closed = False
+
+    def describe(self, name: str, values: Mapping[str, str]) -> None:
+        """Keep what holds for the whole file."""
+        if self.error is None:
+            self._attempt(lambda: self._writer.write_metadata(name, dict(values)))
+
+    def write(self, topic: str, now_s: float, content: bytes) -> None:
+        """One message of a topic of ours."""
+        self.log(topic, now_s, content, self._own_channel)
+
+    def log(self, topic: str, now_s: float, content: Any, make: Any) -> None:
+        """One message; `make(topic)` makes the topic's channel when it is the first."""
+        if self.error is not None:
+            return
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._channels[topic] = make(topic)
+        self._first_s = now_s if self._first_s is None else min(self._first_s, now_s)
+        self._last_s = max(self._last_s, now_s)
+        self._attempt(lambda: channel.log(content, log_time=self.wall_ns(now_s)))
+
+    def wall_ns(self, now_s: float) -> int:
+        """The wall clock's nanoseconds at a stamp."""
+        return max(0, round((now_s + self._offset_s) * _NANOSECONDS))
+
+    def typed(self, kind: str) -> Any:
+        """Something that makes channels of one of Foxglove's own types, for `log`."""
+        return lambda topic: getattr(channels, f"{kind}Channel")(topic, context=self._context)
+
+    def flush(self) -> None:
+        """End the chunk: what was written so far survives us."""
+        if self.error is None and self._attempt(self._writer.flush):
+            self.kept_bytes = self._output.end
+            self.kept_s = 0.0 if self._first_s is None else self._last_s - self._first_s
+
+    def close(self) -> None:
+        """Finish the file with its index; after a failure, cut it to the last whole chunk."""
+        if self._closed:
+            return
+        self._closed = True
+        if self.error is None:
+            self.flush()
+        if self.error is None and self._attempt(self._writer.close):
+            self.kept_bytes = self._output.end
+        if self.error is not None:
+            self._output.give_up()
+            self._attempt(self._writer.close)
+        self._output.finish(None if self.error is None else self.kept_bytes)
+
+    def figures(self) -> dict[str, Any]:
+        """What is known to be on the disk."""
+        return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
+
+    def _own_channel(self, topic: str) -> foxglove.Channel:
+        if topic in BINARY:
+            schema = foxglove.Schema(name=BINARY[topic], encoding="", data=b"")
+            return foxglove.Channel(topic, schema=schema, message_encoding=ENCODING, context=self._context)
+        return foxglove.Channel(topic, schema=SCHEMAS[topic], context=self._context)
+
+    def _attempt(self, write: Any) -> bool:
+        try:
+            write()
+        # The library says OSError as RuntimeError, in its own words.
+        except (RuntimeError, OSError) as error:
+            if self.error is None:
+                self.error = self._output.error or str(error)
+            return False
+        return True
+
+
+class _Output:
+    """The file as the library writes it; remembers why a write failed."""
+
+    def __init__(self, path: Path) -> None:
+        self.error: str | None = None
+        self.end = 0
+        self._given_up = False
+        self._file = path.open("xb", buffering=0)
+
+    def write(self, data: bytes | bytearray) -> int:
+        if self._given_up:
+            return len(data)
+        try:
+            if self._file.write(data) != len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            self.error = error.strerror or str(error)
+            raise
+        self.end = max(self.end, self._file.tell())
+        return len(data)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._file.seek(offset, whence)
+
+    def flush(self) -> None:
+        """Nothing waits here."""
+
+    def give_up(self) -> None:
+        self._given_up = True
+
+    def finish(self, length: int | None) -> None:
+        if length is not None:
+            self._file.truncate(length)
+        self._file.close()

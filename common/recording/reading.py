@@ -1,0 +1,145 @@
+"""Recordings read, whole or cut off anywhere: up to the last complete second.
+
+The file is gone through record by record, as an index stands at the end, where a cut file has none.
+"""
+
+import io
+import json
+import os
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from common.errors import ConfigurationError
+from common.recording.packages import require_packages
+from common.recording.topics import FORMAT, PROFILE
+
+_MAGIC: Final = b"\x89MCAP0\r\n"
+_RECORD: Final = struct.Struct("<BQ")
+_METADATA: Final = 0x0C
+_CHUNK: Final = 0x06
+_DATA_END: Final = 0x0F
+_SIDES: Final = ("robot", "operator")
+
+
+class Message(NamedTuple):
+    """One message of the file."""
+
+    topic: str
+    log_ns: int
+    """Nanoseconds on the wall clock"""
+    content: bytes
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A file that has been looked through."""
+
+    path: Path
+    headers: Mapping[str, Mapping[str, Any]]
+    """What each recorded side's core was made from, by side"""
+    whole: bool
+    """Whether it was finished; else it ends at the last complete second"""
+
+    def began_ns(self) -> int:
+        """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
+        return next((message.log_ns for message in self.messages()), 0)
+
+    def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
+        """Every message in the file's order, which is nearly that of time; of `topics` only, if any are named."""
+        from mcap.records import Channel  # noqa: PLC0415
+        from mcap.records import Message as Logged  # noqa: PLC0415
+
+        names: dict[int, str] = {}
+        for records in whole_chunks(self.path):
+            for record in records:
+                if isinstance(record, Channel):
+                    names[record.id] = record.topic
+                elif isinstance(record, Logged):
+                    topic = names.get(record.channel_id, "")
+                    if not topics or topic in topics:
+                        yield Message(topic, record.log_time, record.data)
+
+
+def open_recording(path: Path) -> Recording:
+    """Look through the file at `path`; ConfigurationError, in one line, for what is no recording of ours."""
+    require_packages("a recording", "foxglove", "mcap")
+    headers: dict[str, Mapping[str, Any]] = {}
+    for name, values in described(path):
+        side = name.removeprefix(f"{PROFILE}.")
+        if side in _SIDES and side != name:
+            headers[side] = _header(path, values)
+    if not headers:
+        raise ConfigurationError(
+            f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
+        )
+    return Recording(path, headers, any(opcode == _DATA_END for opcode, _ in _records(path, (_DATA_END,))))
+
+
+def described(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
+    """What holds for the whole file: names with texts."""
+    from mcap.records import Metadata  # noqa: PLC0415
+
+    for _, content in _records(path, (_METADATA,)):
+        metadata = Metadata.read(_stream(content))
+        yield metadata.name, metadata.metadata
+
+
+def whole_chunks(path: Path) -> Iterator[list[Any]]:
+    """The records of each chunk that is whole and as it was written; what follows one that is not is left."""
+    from mcap.records import Chunk  # noqa: PLC0415
+    from mcap.stream_reader import breakup_chunk  # noqa: PLC0415
+
+    for _, content in _records(path, (_CHUNK,)):
+        try:
+            yield breakup_chunk(Chunk.read(_stream(content)), validate_crc=True)
+        # What a flipped bit does is the decompressor's to say, in classes of its own.
+        except Exception:
+            return
+
+
+def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
+    if values.get("format") != str(FORMAT):
+        raise ConfigurationError(f"{path}: recorded in format {values.get('format')}; valid: {FORMAT}")
+    return {name: _value(text) for name, text in values.items()}
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def _records(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, bytes]]:
+    """Each whole record of a wanted kind, as (opcode, content)."""
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
+    with file:
+        size = os.fstat(file.fileno()).st_size
+        try:
+            magic = file.read(len(_MAGIC))
+        except OSError as error:
+            raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
+        if magic != _MAGIC:
+            raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made")
+        while len(head := file.read(_RECORD.size)) == _RECORD.size:
+            opcode, length = _RECORD.unpack(head)
+            if file.tell() + length > size:
+                return  # it was being written
+            if opcode in wanted:
+                yield opcode, file.read(length)
+            else:
+                file.seek(length, os.SEEK_CUR)
+            if opcode == _DATA_END:
+                return
+
+
+def _stream(content: bytes) -> Any:
+    from mcap.data_stream import ReadDataStream  # noqa: PLC0415
+
+    return ReadDataStream(io.BytesIO(content))

@@ -1,0 +1,156 @@
+"""What came out of a core the second time beside the first: equal bit for bit, or by how much not."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from common.errors import ConfigurationError, RemoteProtocolError
+from common.protocol.codec import decode
+from common.protocol.messages import StiffnessUpdate
+from common.recording.entries import Block, Entry, unpack_block
+from common.recording.reading import Recording
+from operator_side.dualsense.reports.output_report import OutputReport, parse_output_report
+
+WITHIN_EIGHTHS = 1.0
+WITHIN_M = 1e-12
+
+
+@dataclass
+class Comparison:
+    """Of one side."""
+
+    side: str
+    counted: str
+    """What `made` counts"""
+    made: int = 0
+    equal: int = 0
+    others: int = 0
+    """Messages of other kinds, of which `others_equal` were the same"""
+    others_equal: int = 0
+    worst_eighths: float = 0.0
+    """The largest difference of a strength; infinite where a message is missing or another one"""
+    worst_m: float = 0.0
+    """And of a way"""
+    notes: list[str] = field(default_factory=list)
+    """What a person should know"""
+
+    @property
+    def within(self) -> bool:
+        """Whether it is what another processor may make of it, or better."""
+        return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
+
+    def take(self, first: bytes | None, second: bytes | None, *, report: bool = False) -> None:
+        """One message as recorded and as made anew; None for one that is missing. `report`: for the controller."""
+        counts = report or _is_stiffness(first if second is None else second) or self.side == "operator"
+        same = first == second
+        if counts:
+            self.made += second is not None
+            self.equal += same
+        else:
+            self.others += 1
+            self.others_equal += same
+        if same:
+            return
+        eighths, metres = math.inf, 0.0
+        if first is not None and second is not None:
+            eighths, metres = _report_difference(first, second) if report else _message_difference(first, second)
+        self.worst_eighths = max(self.worst_eighths, eighths)
+        self.worst_m = max(self.worst_m, metres)
+
+    def lines(self) -> list[str]:
+        """For people."""
+        difference = "none"
+        if not math.isfinite(self.worst_eighths):
+            difference = "messages that are missing or say something else"
+        elif self.worst_eighths or self.worst_m or self.equal < self.made:
+            difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in ways"
+        lines = [
+            f"{self.side}: {self.made} {self.counted} made anew, {self.equal} of them equal bit for bit;"
+            f" largest difference: {difference}"
+        ]
+        if self.others:
+            lines.append(f"{self.side}: {self.others} other messages, {self.others_equal} of them equal bit for bit")
+        return [*lines, *(f"{self.side}: {note}" for note in self.notes)]
+
+
+def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Iterator[Entry]:
+    """Every entry of a side in order, up to the first gap: a core cannot be made anew beyond one."""
+    began_s = None
+    for expected, message in enumerate(recording.messages([f"/{side}/inputs"])):
+        block: Block = unpack_block(message.content)
+        began_s = block.first_s if began_s is None else began_s
+        if block.number != expected:
+            notes.append(
+                f"{block.number - expected} blocks of inputs are missing after {block.first_s - began_s:.1f} s, as the"
+                " recorder did not keep up: compared up to there"
+            )
+            return
+        yield from block.unpacked()
+    if not recording.whole:
+        notes.append("the file was cut off: compared up to its last complete second")
+
+
+def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
+    """What this run is made from that the recorded one was not: then bits may differ."""
+    return [
+        f"recorded with {name} {str(recorded.get(name))[:60]}, here {str(present[name])[:60]}: bits may differ"
+        for name in present
+        if recorded.get(name) != present[name]
+    ]
+
+
+def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
+    """The header of a side; ConfigurationError where it was not recorded."""
+    if side not in recording.headers:
+        raise ConfigurationError(
+            f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
+        )
+    return dict(recording.headers[side])
+
+
+def _is_stiffness(payload: bytes | None) -> bool:
+    try:
+        return payload is not None and isinstance(decode(payload), StiffnessUpdate)
+    except RemoteProtocolError:
+        return False
+
+
+def _message_difference(first: bytes, second: bytes) -> tuple[float, float]:
+    """Eighths of strength and metres; infinite eighths where more differs than these."""
+    try:
+        one, other = decode(first), decode(second)
+    except RemoteProtocolError:
+        return math.inf, 0.0
+    if not isinstance(one, StiffnessUpdate) or not isinstance(other, StiffnessUpdate):
+        return math.inf, 0.0
+    if (one.header, one.state) != (other.header, other.state):
+        return math.inf, 0.0
+    eighths, metres = [8.0 * abs(one.rumble - other.rumble)], [abs(one.horizon_m - other.horizon_m)]
+    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
+        eighths.append(8.0 * abs(a.stiffness - b.stiffness))
+        metres += [abs(x - y) for x, y in zip((*a.fast_m, *a.slow_m), (*b.fast_m, *b.slow_m), strict=True)]
+        metres.append(abs(a.displacement_m - b.displacement_m))
+    return max(eighths), max(metres)
+
+
+def _report_difference(first: bytes, second: bytes) -> tuple[float, float]:
+    """Eighths of strength between two reports to a controller."""
+    try:
+        one, other = parse_output_report(first), parse_output_report(second)
+    except RemoteProtocolError:
+        return math.inf, 0.0
+    if _without_effects(one) != _without_effects(other) or (one.l2 is None, one.r2 is None) != (
+        other.l2 is None,
+        other.r2 is None,
+    ):
+        return math.inf, 0.0
+    apart = [0.0]
+    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
+        if a is not None and b is not None:
+            apart += [abs(x - y) for x, y in zip(a.zone_strengths, b.zone_strengths, strict=True)]
+    return max(apart), 0.0
+
+
+def _without_effects(report: OutputReport) -> tuple[object, ...]:
+    return report.rumble, report.lightbar, report.player_leds, report.mute_led, report.trigger_power_reduction

@@ -1,0 +1,139 @@
+"""The cores once more, with the inputs that were recorded: the same stiffness bit for bit, or by how much not."""
+
+import functools
+from collections import deque
+from typing import Any
+
+import msgspec
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from common.recording.entries import Kind, split_text
+from common.recording.provenance import processor_name, settings_from
+from common.recording.reading import Recording
+from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
+from operator_side.assembly import build_operator_side
+from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.settings import OperatorSettings
+from robot_side.arm.port import Arm, ArmState
+from robot_side.assembly import build_robot_side
+from robot_side.compiled.warm_up import kernels_digest, warm_up
+from robot_side.core import RobotSide
+from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.recorded_inputs import FrameUnpacker, unpack_state
+from robot_side.settings import RobotSettings
+
+
+class _Given:
+    """An Arm and an ObjectSource that give what was recorded; what they are told goes nowhere."""
+
+    def __init__(self) -> None:
+        self.joint_count = 0
+        self.newest_state: ArmState | None = None
+        self.newest_frame: PerceivedObjects | None = None
+        self.frames: FrameUnpacker | None = None
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Nothing moves."""
+
+    def command_gripper(self, closing: float, valid_until_s: float) -> None:
+        """Nothing moves."""
+
+    def state(self, now_s: float) -> ArmState:
+        """As recorded."""
+        if self.newest_state is None:
+            raise ConfigurationError(f"no state of the arm was recorded before {now_s}")
+        return self.newest_state
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """As recorded."""
+        if self.newest_frame is None:
+            raise ConfigurationError(f"no frame was recorded before {now_s}")
+        return self.newest_frame
+
+    def set_role(self, name: str, role: Role) -> None:
+        """The frames that were recorded have it."""
+
+
+def _side(
+    given: _Given, arm: Arm, kinematics: Any, camera: ObjectSource, law: Any, session: Any, *others: Any, **named: Any
+) -> RobotSide:
+    """The core between the recorded arm and camera. Nobody observes what is true: nothing moves in the simulation."""
+    given.joint_count = arm.joint_count
+    given.frames = FrameUnpacker(camera.perceive(0.0))
+    loop_age, limits, motion, *_ = others
+    return RobotSide(given, kinematics, given, law, session, loop_age, limits, motion, **named)
+
+
+def replay_robot(recording: Recording) -> Comparison:
+    """Make every stiffness message of the robot side anew; ConfigurationError where it was not recorded."""
+    header = require_side(recording, "robot")
+    given = _Given()
+    settings = settings_from(header["settings"], RobotSettings)
+    core = build_robot_side(settings, header["epoch"], header["clock_domain"], side=functools.partial(_side, given))
+    warm_up()
+    compared = Comparison("robot", "stiffness messages")
+    compared.notes += differing_origin(header, {"processor": processor_name(), "kernels": kernels_digest()})
+    made: deque[bytes] = deque()
+    for entry in recorded_entries(recording, "robot", compared.notes):
+        if entry.kind == Kind.RECEIVED:
+            peer, payload = split_text(entry.content)
+            core.receive(peer, payload, entry.now_s)
+        elif entry.kind == Kind.STATE:
+            given.newest_state = unpack_state(entry.content)
+        elif entry.kind == Kind.FRAME and given.frames is not None:
+            given.newest_frame = given.frames.unpack(entry.content)
+        elif entry.kind == Kind.TICK:
+            _compare_rest(compared, made)
+            made.extend(one.payload for one in core.tick(entry.now_s) if one.stream == "haptics")
+        elif entry.kind == Kind.SENT:
+            payload = split_text(split_text(entry.content)[1])[1]
+            compared.take(payload, made.popleft() if made else None)
+    _compare_rest(compared, made)
+    return compared
+
+
+def replay_operator(recording: Recording) -> Comparison:
+    """Make every motion command and report to the controller anew; ConfigurationError where it was not recorded."""
+    header = require_side(recording, "operator")
+    settings = settings_from(header["settings"], OperatorSettings)
+    core = build_operator_side(settings, header["epoch"], header["clock_domain"])
+    compared = Comparison("operator", "commands and reports to the controller")
+    sent: deque[bytes] = deque()
+    written: deque[bytes] = deque()
+    for entry in recorded_entries(recording, "operator", compared.notes):
+        now_s, content = entry.now_s, entry.content
+        match entry.kind:
+            case Kind.RECEIVED:
+                core.receive(split_text(content)[1], now_s)
+            case Kind.SEEN:
+                core.receive_view(content, now_s)
+            case Kind.REPORT:
+                core.read_report(content, now_s)
+            case Kind.CALIBRATED:
+                core.calibrate(msgspec.json.decode(content, type=TravelCalibration))
+            case Kind.FOUND:
+                core.controller_found(now_s)
+            case Kind.LOST:
+                core.controller_lost(now_s)
+            case Kind.MOTION:
+                _compare_rest(compared, sent)
+                sent.extend(core.motion(now_s))
+            case Kind.OUTPUT:
+                _compare_rest(compared, written, report=True)
+                if (report := core.output_report(now_s)) is not None:
+                    written.append(report)
+            case Kind.SENT:
+                payload = split_text(split_text(content)[1])[1]
+                compared.take(payload, sent.popleft() if sent else None)
+            case Kind.WRITTEN:
+                compared.take(content, written.popleft() if written else None, report=True)
+    _compare_rest(compared, sent)
+    _compare_rest(compared, written, report=True)
+    return compared
+
+
+def _compare_rest(compared: Comparison, made: deque[bytes], *, report: bool = False) -> None:
+    """What was made and had not been recorded."""
+    while made:
+        compared.take(None, made.popleft(), report=report)

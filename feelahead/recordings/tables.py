@@ -1,0 +1,170 @@
+"""A recording as tables: one for each thing that was kept, at its own rate, and one of all of them joined."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from common.arrays import FloatArray
+from common.errors import RemoteProtocolError
+from common.recording.entries import Entry, Kind, unpack_block
+from common.recording.reading import Recording
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import parse_output_report
+from robot_side.recorded_inputs import unpack_state
+
+JOINED_HZ: Final = 100.0
+_NANOSECONDS: Final = 1e-9
+_NO_ZONES: Final = (0.0,) * 10
+_STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
+"""What a joined table has no use for."""
+_TOPICS: Final = (
+    "/stiffness",
+    "/command",
+    "/ages",
+    "/telemetry",
+    "/enlargement",
+    "/overlap",
+    "/robot/status",
+    "/operator/status",
+    "/operator/facts",
+)
+_JOINED: Final = (
+    "stiffness",
+    "command",
+    "felt",
+    "controller",
+    "arm",
+    "telemetry",
+    "ages",
+    "enlargement",
+    "overlap",
+    "robot_status",
+)
+
+
+@dataclass
+class Table:
+    """Rows in order of time; every row has every column, with None where there was nothing."""
+
+    times_s: list[float] = field(default_factory=list)
+    """Since the recording began"""
+    rows: list[dict[str, Any]] = field(default_factory=list)
+
+    def add(self, time_s: float, row: dict[str, Any]) -> None:
+        """One row."""
+        self.times_s.append(time_s)
+        self.rows.append(row)
+
+    def columns(self) -> list[str]:
+        """Every name that any row has, in the order in which they came up."""
+        return list(dict.fromkeys(name for row in self.rows for name in row))
+
+    def numbers(self, name: str) -> FloatArray:
+        """One column as numbers, NaN where there are none."""
+        values = [row.get(name) for row in self.rows]
+        return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=np.float64)
+
+    def sorted(self) -> "Table":
+        """In order of time: two sides' messages come a little out of it."""
+        order = np.argsort(np.array(self.times_s), kind="stable")
+        return Table([self.times_s[i] for i in order], [self.rows[i] for i in order])
+
+    def before(self, times_s: FloatArray) -> list[dict[str, Any]]:
+        """The newest row at each time; empty before the first."""
+        found = np.searchsorted(np.array(self.times_s), times_s + 1e-9, side="right") - 1
+        return [self.rows[index] if index >= 0 else {} for index in found]
+
+
+@dataclass
+class Tables:
+    """All of a recording, but its pictures."""
+
+    began_s: float
+    """On the wall clock"""
+    duration_s: float
+    by_name: Mapping[str, Table]
+
+    def table(self, name: str) -> Table:
+        """One of them; an empty one where there is none."""
+        return self.by_name.get(name) or Table()
+
+    def joined(self, rate_hz: float = JOINED_HZ) -> Table:
+        """One table at an even rate: at each moment the newest of everything, as someone looking then would see."""
+        times_s = np.arange(0.0, self.duration_s, 1.0 / rate_hz)
+        rows: list[dict[str, Any]] = [{} for _ in times_s]
+        for name in _JOINED:
+            table = self.by_name.get(name)
+            if table is None:
+                continue
+            blank = dict.fromkeys(f"{name}.{column}" for column in table.columns() if column not in _STAMPS)
+            for row, found in zip(rows, table.before(times_s), strict=True):
+                row.update(blank)
+                row.update((f"{name}.{column}", value) for column, value in found.items() if column not in _STAMPS)
+        return Table(times_s.tolist(), rows)
+
+
+def read_tables(recording: Recording) -> Tables:
+    """Read everything but pictures and scenes."""
+    tables: dict[str, Table] = {}
+    first_ns = last_ns = recording.began_ns()
+    zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
+    for message in recording.messages((*_TOPICS, "/robot/inputs", "/operator/inputs")):
+        last_ns = max(last_ns, message.log_ns)
+        time_s = _NANOSECONDS * (message.log_ns - first_ns)
+        if not message.topic.endswith("/inputs"):
+            name = message.topic[1:].replace("/", "_")
+            row = dict(_flat(msgspec.json.decode(message.content)))
+            tables.setdefault(name, Table()).add(time_s, row)
+            continue
+        block = unpack_block(message.content)
+        for entry in block.unpacked():
+            # A block is stamped with its begin.
+            if (found := _row(entry, zones)) is not None:
+                tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.first_s, found[1])
+    sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
+    duration_s = _NANOSECONDS * (last_ns - first_ns)
+    return Tables(_NANOSECONDS * first_ns, duration_s, sorted_tables)
+
+
+def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[str, Any]] | None:
+    """The table and the row that an input makes; None for one that other topics tell of."""
+    try:
+        if entry.kind == Kind.STATE:
+            state = unpack_state(entry.content)
+            joints = enumerate(zip(state.joint_positions_rad, state.joint_velocities_rad_s, strict=True))
+            row: dict[str, Any] = {}
+            for index, (position, velocity) in joints:
+                row |= {f"position_rad.{index}": float(position), f"velocity_rad_s.{index}": float(velocity)}
+            row |= {"gripper_opening_m": state.gripper_opening_m, "gripper_holding": state.gripper_holding}
+            return "arm", row
+        if entry.kind == Kind.REPORT:
+            hands = parse_input_report(entry.content)
+            return "controller", {"l2_raw": hands.l2, "r2_raw": hands.r2}
+        if entry.kind == Kind.WRITTEN:
+            told = parse_output_report(entry.content)
+            for name, effect in (("l2", told.l2), ("r2", told.r2)):
+                if effect is not None:
+                    zones[name] = tuple(effect.zone_strengths)
+            return "felt", {f"{name}.{zone}": value for name in zones for zone, value in enumerate(zones[name])}
+    except (RemoteProtocolError, ValueError):
+        return None
+    return None
+
+
+def _flat(values: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """`{"l2": {"fast_m": [1, 2]}}` as `l2.fast_m.0`, `l2.fast_m.1`; overlaps by their objects' names."""
+    if isinstance(values, dict):
+        if "object" in values:
+            thing = values["object"]
+            yield from ((f"{thing}.{key}", value) for key, value in values.items() if key != "object")
+            return
+        for key, value in values.items():
+            yield from _flat(value, f"{name}.{key}" if name else key)
+    elif isinstance(values, list):
+        for index, value in enumerate(values):
+            yield from _flat(value, f"{name}.{index}")
+    else:
+        yield name, values

@@ -1,0 +1,23 @@
+"""Settings to an operator side that is ready to feel."""
+
+from collections.abc import Callable
+
+from operator_side.core import OperatorSide
+from operator_side.settings import OperatorSettings
+
+
+def build_operator_side(
+    settings: OperatorSettings, epoch: int, clock_domain: str, side: Callable[..., OperatorSide] = OperatorSide
+) -> OperatorSide:
+    """Put an operator side together. `side`: makes the core, as one that notes what happens to it."""
+    return side(
+        epoch,
+        clock_domain,
+        haptics=settings.haptics,
+        calibration=settings.calibration,
+        rendering=settings.rendering,
+        compensation=settings.compensation,
+        swap_sides=settings.swap_sides,
+        seed=settings.seed,
+        asymmetry_s=settings.asymmetry_s(),
+    )

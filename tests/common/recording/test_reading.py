@@ -1,0 +1,157 @@
+"""A recording opens wherever it was cut, up to the last complete second; what is none is told in one line."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.errors import ConfigurationError
+from common.recording.content import Content
+from common.recording.entries import Kind, entry, pack_block, unpack_block
+from common.recording.mcap_file import RecordingFile
+from common.recording.mending import mend
+from common.recording.reading import Message, open_recording
+from common.recording.topics import FORMAT
+from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, as_json, stamped
+
+SECONDS = 5
+BLOCKS_A_SECOND = 20
+
+
+def write_short(path: Path) -> list[int]:
+    """A file of five seconds; where each second's chunk ends in it."""
+    file = RecordingFile(path, 1.7e9)
+    content, ends = Content(file), []
+    generator = np.random.default_rng(0)
+    content.take(0, HEADER + as_json({"side": "robot", "settings": {"seed": 0}, "epoch": 1, "versions": {}}))
+    for second in range(SECONDS):
+        for part in range(BLOCKS_A_SECOND):
+            number, now_s = BLOCKS_A_SECOND * second + part, second + part / BLOCKS_A_SECOND
+            inside = entry(Kind.RECEIVED, now_s, b"\0", generator.bytes(40))
+            content.take(0, BLOCK + pack_block(number, 0, now_s, now_s, inside))
+        content.take(0, STATUS + stamped(now_s) + as_json({"state": "armed", "loop_age_ms": float("nan")}))
+        content.take(0, NOTE + stamped(now_s) + b"a note")
+        file.flush()
+        ends.append(file.kept_bytes)
+    file.close()
+    return ends
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, list[int]]:
+    path = tmp_path_factory.mktemp("short") / "short.mcap"
+    ends = write_short(path)
+    return path.read_bytes(), ends
+
+
+def blocks(path: Path) -> int:
+    found = [unpack_block(one.content).number for one in open_recording(path).messages(["/robot/inputs"])]
+    assert found == list(range(len(found)))
+    return len(found)
+
+
+def test_a_whole_file_has_everything(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
+    path = tmp_path / "whole.mcap"
+    path.write_bytes(short[0])
+    recording = open_recording(path)
+    assert recording.whole
+    assert recording.headers["robot"]["settings"] == {"seed": 0}
+    assert blocks(path) == SECONDS * BLOCKS_A_SECOND
+    logged = list(recording.messages(["/robot/status"]))
+    assert [one.log_ns for one in logged] == [round(1e9 * (1.7e9 + second + 0.95)) for second in range(SECONDS)]
+    assert b'"loop_age_ms":null' in logged[0].content
+
+
+def test_a_file_cut_at_any_byte_opens_up_to_its_last_complete_second(
+    short: tuple[bytes, list[int]], tmp_path: Path
+) -> None:
+    content, ends = short
+    path = tmp_path / "cut.mcap"
+    cuts = np.random.default_rng(1).integers(0, len(content), 1000).tolist()
+    for cut in (*cuts, *ends, *(end - 1 for end in ends)):
+        path.write_bytes(content[:cut])
+        # Indexes follow a chunk; they are no part of what a second needs.
+        complete = sum(end <= cut for end in ends)
+        try:
+            found = blocks(path)
+        except ConfigurationError:
+            assert complete == 0
+            continue
+        assert found % BLOCKS_A_SECOND == 0
+        assert complete <= found // BLOCKS_A_SECOND <= min(complete + 1, SECONDS)
+
+
+def test_a_flipped_bit_costs_no_more_than_what_follows(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
+    content, ends = short
+    path = tmp_path / "flipped.mcap"
+    for place in range(ends[1] + 20, ends[2] - 300, 97):
+        spoilt = bytearray(content)
+        spoilt[place] ^= 0x10
+        path.write_bytes(spoilt)
+        assert blocks(path) >= 2 * BLOCKS_A_SECOND
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"not a recording at all", b"\x89MCAP0\r\n" + bytes(50)])
+def test_what_is_no_recording_is_told_in_one_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    path.write_bytes(content)
+    with pytest.raises(ConfigurationError, match=r"other\.mcap: .*valid: ") as caught:
+        open_recording(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_and_a_missing_file(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "missing.mcap"):
+        with pytest.raises(ConfigurationError, match="cannot be read"):
+            open_recording(path)
+
+
+def test_another_format_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "newer.mcap"
+    file = RecordingFile(path, 0.0)
+    file.describe("feelahead.robot", {"format": str(FORMAT + 1)})
+    file.close()
+    with pytest.raises(ConfigurationError, match=f"format {FORMAT + 1}; valid: {FORMAT}"):
+        open_recording(path)
+
+
+def test_an_mcap_file_of_somebody_else(tmp_path: Path) -> None:
+    path = tmp_path / "other.mcap"
+    file = RecordingFile(path, 0.0)
+    file.write("/robot/status", 1.0, b"{}")
+    file.close()
+    with pytest.raises(ConfigurationError, match="nothing that feelahead recorded"):
+        open_recording(path)
+
+
+def test_a_cut_file_is_made_whole(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
+    content, ends = short
+    cut, whole = tmp_path / "cut.mcap", tmp_path / "whole.mcap"
+    cut.write_bytes(content[: ends[3] + 50])
+
+    def everything(path: Path) -> list[Message]:
+        return list(open_recording(path).messages())
+
+    assert mend(cut, whole) == len(everything(cut))
+    assert not open_recording(cut).whole
+    assert open_recording(whole).whole
+    assert everything(whole) == everything(cut)
+    assert open_recording(whole).headers == open_recording(cut).headers
+    with pytest.raises(ConfigurationError, match="is there already"):
+        mend(cut, whole)
+
+
+def test_messages_are_in_order_of_time(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
+    path = tmp_path / "whole.mcap"
+    path.write_bytes(short[0])
+    stamps = [one.log_ns for one in open_recording(path).messages(["/robot/inputs"])]
+    assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
+
+
+def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "there.mcap"
+    path.write_bytes(b"precious")
+    with pytest.raises(FileExistsError):
+        RecordingFile(path, 0.0)
+    assert path.read_bytes() == b"precious"

@@ -1,0 +1,81 @@
+"""The commands on recordings: bad input in one line, and a real demo that is computed anew to the same bits."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigurationError
+from common.recording import packages
+from common.recording.reading import open_recording
+from feelahead.commands.demo import demo
+from feelahead.commands.recordings import export, plot, replay
+from feelahead.recordings.replay import replay_operator, replay_robot
+
+COMMANDS = (replay, export, plot)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_is_no_recording(command: Callable[[Sequence[str]], int], tmp_path: Path) -> None:
+    other = tmp_path / "other.mcap"
+    other.write_bytes(b"something else")
+    for arguments, told in (
+        ([], "no recording given"),
+        ([str(other)], "is no MCAP file"),
+        ([str(tmp_path / "missing.mcap")], "cannot be read"),
+    ):
+        with pytest.raises(ConfigurationError, match=told) as caught:
+            command(arguments)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("run.txt", "ends in .mcap"),
+        ("missing/run.mcap", "its folder is not there"),
+        ("there.mcap", "is there already; valid: a path where nothing is yet"),
+    ],
+)
+def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> None:
+    (tmp_path / "there.mcap").write_bytes(b"precious")
+    with pytest.raises(ConfigurationError, match=told):
+        demo(["--record", str(tmp_path / name)])
+    assert (tmp_path / "there.mcap").read_bytes() == b"precious"
+
+
+def test_without_the_extra_the_command_that_mends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packages, "find_spec", lambda _: None)
+    for command, arguments in ((demo, ["--record", str(tmp_path / "run.mcap")]), (replay, ["run.mcap"])):
+        with pytest.raises(ConfigurationError, match=r"pip install 'feelahead\[record\]'"):
+            command(arguments)
+
+
+@pytest.mark.processes
+def test_no_side_imports_what_it_does_not_need() -> None:
+    code = (
+        "import sys, robot_side.main, operator_side.main, feelahead.main;"
+        "print(sorted({'foxglove', 'mcap', 'pyarrow', 'matplotlib'} & sys.modules.keys()))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == "[]"
+
+
+@pytest.mark.processes
+def test_a_real_run_is_computed_anew_to_the_same_bits(tmp_path: Path) -> None:
+    path, summary = tmp_path / "run.mcap", tmp_path / "summary.json"
+    arguments = ["--duration", "4", "--record", str(path), "--summary", str(summary), "--status", "none"]
+    assert demo([*arguments, "--link", "delay 20ms 5ms"]) == 0
+    told = json.loads(summary.read_text())
+    kept = told["recording"]
+    assert (kept["error"], kept["dropped_blocks"], kept["bytes"]) == (None, 0, path.stat().st_size)
+    recording = open_recording(path)
+    assert recording.whole
+    assert set(recording.headers) == {"robot", "operator"}
+    robot, operator = replay_robot(recording), replay_operator(recording)
+    assert robot.made == robot.equal == told["messages"]["stiffness_sent"] > 0
+    assert operator.made == operator.equal > 0
+    assert robot.notes == operator.notes == []

@@ -1,0 +1,188 @@
+"""Exports hold what the recording holds, in the layouts that other programs ask for."""
+
+import csv
+import io
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from common.protocol.codec import decode_view, encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import VideoFrame
+from common.recording.content import Content
+from common.recording.mcap_file import RecordingFile
+from common.recording.reading import Recording, open_recording
+from common.recording.wire import FACTS, HEADER, VIEW, as_json, stamped
+from feelahead.commands.recordings import export, plot
+from feelahead.recordings.pictures import picture_size, pictures
+from feelahead.recordings.showing import Seen, seen, show
+from feelahead.recordings.tables import read_tables
+
+pyarrow = pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
+
+
+def exported(run: Recording, kind: str, out: Path) -> Path:
+    assert export([str(run.path), "--format", kind, "--out", str(out)]) == 0
+    return out
+
+
+def test_csv_has_a_file_for_each_topic_and_one_joined(run: Recording, tmp_path: Path) -> None:
+    folder = exported(run, "csv", tmp_path / "csv")
+    with (folder / "stiffness.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(list(run.messages(["/stiffness"])))
+    first = json.loads(next(iter(run.messages(["/stiffness"]))).content)
+    assert float(rows[0]["r2.fast_m.7"]) == first["r2"]["fast_m"][7]
+    with (folder / "joined.csv").open(encoding="utf-8", newline="") as file:
+        joined = list(csv.DictReader(file))
+    times = np.array([float(row["recording_s"]) for row in joined])
+    np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-9)
+    assert joined[-1]["stiffness.state"] == "armed"
+    assert joined[0]["command.r2"] == ""  # nothing was sent yet
+
+
+def test_a_joined_row_never_knows_what_comes_later(run: Recording) -> None:
+    tables = read_tables(run)
+    joined, stiffness = tables.joined(), tables.table("stiffness")
+    times = np.array(stiffness.times_s)
+    for row in range(0, len(joined.rows), 37):
+        before = np.flatnonzero(times <= joined.times_s[row] + 1e-9)
+        expected = None if not len(before) else stiffness.rows[before[-1]]["horizon_m"]
+        assert joined.rows[row]["stiffness.horizon_m"] == expected
+
+
+def test_parquet_has_the_same_numbers(run: Recording, tmp_path: Path) -> None:
+    folder = exported(run, "parquet", tmp_path / "parquet")
+    arm = parquet.read_table(folder / "arm.parquet")
+    table = read_tables(run).table("arm")
+    assert arm.column("position_rad.0").to_pylist() == [row["position_rad.0"] for row in table.rows]
+    assert arm.num_rows > 5000
+
+
+def test_lerobot_has_what_its_own_reader_asks_for(run: Recording, tmp_path: Path) -> None:
+    folder = exported(run, "lerobot", tmp_path / "lerobot")
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert (info["codebase_version"], info["fps"], info["total_episodes"]) == ("v3.0", 30, 1)
+    place = {"chunk_index": 0, "file_index": 0}
+    data = parquet.read_table(folder / info["data_path"].format(**place))
+    assert data.num_rows == info["total_frames"] > 60
+    assert set(data.column_names) == set(info["features"])
+    for name, feature in info["features"].items():
+        column = data.column(name)
+        assert column.null_count == 0
+        if feature["shape"] == [1]:
+            assert str(column.type).replace("float", "float32") == feature["dtype"]
+        else:
+            assert column.type.list_size == feature["shape"][0] == len(feature["names"])
+    assert data.column("index").to_pylist() == list(range(data.num_rows))
+    np.testing.assert_allclose(np.diff(data.column("timestamp").to_numpy()), 1 / 30, atol=1e-4)
+    episodes = parquet.read_table(folder / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert (episodes[0]["dataset_from_index"], episodes[0]["dataset_to_index"]) == (0, data.num_rows)
+    assert episodes[0]["length"] == data.num_rows
+    tasks = parquet.read_table(folder / "meta/tasks.parquet")
+    assert tasks.column("task").to_pylist() == episodes[0]["tasks"]
+    assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
+    stats = json.loads((folder / "meta/stats.json").read_text())
+    states = np.array(data.column("observation.state").to_pylist())
+    np.testing.assert_allclose(stats["observation.state"]["mean"], states.mean(axis=0), rtol=1e-5, atol=1e-7)
+
+
+def jpeg(value: int) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", (32, 24), (value, 0, 0)).save(file, "JPEG")
+    return file.getvalue()
+
+
+@pytest.fixture
+def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
+    """The same run with a camera: its messages once more, and pictures at 10 Hz."""
+    path = tmp_path / "pictures.mcap"
+    file = RecordingFile(path, 0.0)
+    content = Content(file)
+    content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
+    payloads: list[bytes] = []
+    next_s = 0.0
+    began_ns = run.began_ns()
+    for message in run.messages(("/stiffness", "/command", "/robot/inputs")):
+        now_s = 1e-9 * (message.log_ns - began_ns)
+        if now_s >= next_s:
+            header = Header(epoch=1, sequence=len(payloads) + 1, sent_s=now_s)
+            frame = VideoFrame(header, "overview", now_s, 32, 24, jpeg(10 * len(payloads) % 256))
+            payloads.append(encode(frame))
+            content.take(0, VIEW + stamped(now_s) + payloads[-1])
+            next_s += 0.1
+        file.write(message.topic, now_s, message.content)
+    content.take(0, FACTS + stamped(now_s) + b'{"now_s":1.0}')
+    file.close()
+    return open_recording(path), payloads
+
+
+def test_pictures_are_shown_as_they_were_sent(with_pictures: tuple[Recording, list[bytes]]) -> None:
+    recording, payloads = with_pictures
+    shown = list(seen(recording))
+    assert [decode_view(one.content) for one in shown if one.kind == b"v"] == [decode_view(one) for one in payloads]
+    assert shown[-1] == Seen(shown[-1].time_s, b"f", b'{"now_s":1.0}')
+    # Each picture is in the file once.
+    assert sum(len(one.content) for one in recording.messages(["/view"])) < 200 * len(payloads)
+
+
+def test_showing_takes_as_long_as_the_speed_says(with_pictures: tuple[Recording, list[bytes]]) -> None:
+    recording, payloads = with_pictures
+    waited: list[float] = []
+    sent: list[bytes] = []
+
+    def wait(seconds: float) -> bool:
+        waited.append(seconds)
+        return len(sent) < 20
+
+    assert show(recording, lambda kind, _: sent.append(kind), wait, speed=4.0) == 20
+    assert sum(waited[:-1]) == pytest.approx(19 * 0.1 / 4.0, rel=0.1)
+    assert len(payloads) > 20
+
+
+def test_lerobot_takes_pictures_as_they_are(with_pictures: tuple[Recording, list[bytes]], tmp_path: Path) -> None:
+    recording, _ = with_pictures
+    folder = exported(recording, "lerobot", tmp_path / "lerobot")
+    data = parquet.read_table(folder / "data/chunk-000/file-000.parquet")
+    first: Any = data.column("observation.images.overview")[0].as_py()
+    assert first["bytes"] in [picture.jpeg for picture in pictures(recording, "overview")]
+    assert picture_size(first["bytes"]) == (32, 24)
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert info["features"]["observation.images.overview"]["shape"] == [24, 32, 3]
+    hints = json.loads(data.schema.metadata[b"huggingface"])["info"]["features"]
+    assert hints["observation.images.overview"] == {"_type": "Image"}
+    stats = json.loads((folder / "meta/stats.json").read_text())["observation.images.overview"]
+    assert np.array(stats["mean"]).shape == (3, 1, 1)
+
+
+@pytest.mark.parametrize("ending", [".png", ".svg"])
+def test_a_page_is_drawn(run: Recording, tmp_path: Path, ending: str) -> None:
+    pytest.importorskip("matplotlib")
+    out = tmp_path / f"page{ending}"
+    assert plot([str(run.path), "--out", str(out)]) == 0
+    if ending == ".svg":
+        assert "time since the recording began" in out.read_text(encoding="utf-8")
+    else:
+        with Image.open(out) as page:
+            assert page.size == (1654, 2338)
+            # Every panel has something in it: few rows of the page are blank.
+            dark = (np.asarray(page.convert("L")) < 250).any(axis=1)
+            assert dark.mean() > 0.8
+
+
+def test_a_cut_run_is_exported_and_drawn(run: Recording, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    shutil.copy(run.path, cut)
+    with cut.open("r+b") as file:
+        file.truncate(run.path.stat().st_size // 3)
+    assert export([str(cut), "--out", str(tmp_path / "csv")]) == 0
+    assert plot([str(cut)]) == 0
+    assert (tmp_path / "cut.png").exists()

@@ -1,0 +1,70 @@
+"""A program on a terminal whose other end we hold."""
+
+import fcntl
+import os
+import pty
+import select
+import signal
+import struct
+import subprocess
+import termios
+import time
+from collections.abc import Callable, Sequence
+
+from tests.helpers.repository import ROOT
+
+ENTERED, LEFT = b"\x1b[?1049h", b"\x1b[?1049l"
+LIMIT_S = 60.0
+
+
+class OnTerminal:
+    """Runs a command on a pseudo-terminal of its own."""
+
+    def __init__(self, command: Sequence[str], size: tuple[int, int] = (80, 24)) -> None:
+        self.ours, self.theirs = pty.openpty()
+        self.seen = b""
+        self.resize(*size)
+        self.before = termios.tcgetattr(self.ours)
+        environment = {name: value for name, value in os.environ.items() if name not in ("LC_CTYPE", "NO_COLOR")}
+        self.process = subprocess.Popen(
+            command,
+            stdin=self.theirs,
+            stdout=self.theirs,
+            stderr=subprocess.PIPE,
+            env={**environment, "TERM": "xterm", "LC_ALL": "C.UTF-8", "PYTHONPATH": str(ROOT)},
+            start_new_session=True,
+            text=True,
+        )
+
+    def said(self) -> str:
+        """A line of its errors; all that is there once it has ended."""
+        assert self.process.stderr is not None
+        return self.process.stderr.readline()
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+        os.close(self.ours)
+        os.close(self.theirs)
+
+    def resize(self, columns: int, rows: int) -> None:
+        fcntl.ioctl(self.ours, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+
+    def read_until(self, holds: Callable[[bytes], object]) -> None:
+        end_s = time.monotonic() + LIMIT_S
+        while not holds(self.seen):
+            assert time.monotonic() < end_s, self.seen[-2000:]
+            if not select.select([self.ours], [], [], 0.1)[0]:
+                continue
+            self.seen += os.read(self.ours, 1 << 16)
+
+    def end(self, last: bytes) -> int:
+        """Ctrl-C, and its exit code; what it writes up to `last` is read."""
+        self.process.send_signal(signal.SIGINT)
+        self.read_until(lambda seen: last in seen)
+        return self.process.wait(LIMIT_S)
+
+    def is_put_back(self) -> bool:
+        """Whether the screen is the first one, with its cursor and its ways of reading."""
+        after = self.seen.rpartition(ENTERED)[2]
+        return LEFT in after and b"\x1b[?25h" in after and termios.tcgetattr(self.ours) == self.before

@@ -1,0 +1,135 @@
+"""A real robot side that somebody looks at: pictures, a companion that is killed, and a slow link for video."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
+from feelahead.benchmarks.viewing.companion_process import companion_of
+from feelahead.benchmarks.viewing.viewer import Seen, Viewer
+from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.summary import read_summary
+from robot_side.cameras.pictures import RETRY_S
+
+pytestmark = pytest.mark.processes
+PATIENCE_S = 120.0
+
+
+@contextmanager
+def viewed(*arguments: str) -> Iterator[tuple[SideProcess, Viewer]]:
+    with SideProcess("robot_side.main", "robot", ["--bind=tcp://127.0.0.1:0", *arguments]) as robot:
+        listening = robot.wait_for("listening", 600.0)
+        viewer = Viewer(listening["control"], listening["view"], epoch=77)
+        try:
+            yield robot, viewer
+        finally:
+            viewer.close()
+            robot.stop()
+
+
+def look_until(viewer: Viewer, enough: Callable[[Seen], bool], **what: bool) -> Seen:
+    """Look in short stretches until one of them shows enough."""
+    for _ in range(round(PATIENCE_S)):
+        seen = viewer.look(1.0, **what)
+        if enough(seen):
+            return seen
+    return pytest.fail("nothing to be seen")
+
+
+def frames(seen: Seen) -> list[VideoFrame]:
+    return [message for _, message in seen.views if isinstance(message, VideoFrame)]
+
+
+def said_of_cameras(robot: SideProcess) -> list[str]:
+    """What a person was told, since this was last asked."""
+    texts = [str(event.get("text")) for event in robot.events()]
+    return [text for text in texts if text.startswith("cameras: ")]
+
+
+def works_here(robot: SideProcess, viewer: Viewer) -> None:
+    """Skip where nothing can be rendered, with the reason that the robot side gives."""
+    for _ in range(round(PATIENCE_S)):
+        if frames(viewer.look(1.0, overview=True, first_person=True)):
+            return
+        for said in said_of_cameras(robot):
+            pytest.skip(said)
+    pytest.fail("neither pictures nor a reason")
+
+
+def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_comes_back(tmp_path: Path) -> None:
+    path = tmp_path / "robot.json"
+    with viewed(f"--summary={path}") as (robot, viewer):
+        assert companion_of(robot.process_id) is None
+        works_here(robot, viewer)
+        both = look_until(
+            viewer,
+            lambda seen: {frame.view for frame in frames(seen)} == {"overview", "first_person"},
+            overview=True,
+            first_person=True,
+            scene=True,
+        )
+        assert any(isinstance(message, SceneShapes) for _, message in both.views)
+        assert any(isinstance(message, SceneState) for _, message in both.views)
+        for arrived_s, message in both.views:
+            if isinstance(message, VideoFrame):
+                assert message.captured_s < message.header.sent_s < arrived_s
+        companion = companion_of(robot.process_id)
+        assert companion is not None
+        os.kill(companion, signal.SIGKILL)
+        gone = viewer.look(1.0, overview=True)
+        # Ticks go on: the owner's stiffness comes as before.
+        assert len(gone.stiffness_ages_s) > 100
+        again = look_until(viewer, lambda seen: bool(frames(seen)), overview=True)
+        assert again.began_s - gone.began_s > RETRY_S - 2.0
+        assert companion_of(robot.process_id) not in (None, companion)
+        viewer.look(0.5)
+        assert viewer.look(1.0).views == []
+    summary = read_summary(path)
+    assert summary["errors"] == []
+    assert summary["looked_at"]["companion"]["starts"] == 2
+    assert summary["looked_at"]["overview"]["nobody_looks"] > 0
+
+
+def test_without_cameras_the_scene_is_seen_all_the_same() -> None:
+    with viewed("--no-cameras") as (robot, viewer):
+        seen = look_until(viewer, lambda seen: bool(seen.views), overview=True, scene=True)
+        assert frames(seen) == []
+        assert companion_of(robot.process_id) is None
+
+
+def test_a_slow_video_link_delays_video_and_not_stiffness() -> None:
+    with viewed("--link=video: rate 2mbit") as (robot, viewer):
+        works_here(robot, viewer)
+        seen = look_until(viewer, lambda seen: len(frames(seen)) > 5, overview=True, first_person=True)
+        ages_s = sorted(
+            arrived_s - frame.captured_s for arrived_s, frame in seen.views if isinstance(frame, VideoFrame)
+        )
+        # 10 kB and more at 2 Mbit/s.
+        assert ages_s[0] > 0.04
+        assert sorted(seen.stiffness_ages_s)[len(seen.stiffness_ages_s) // 2] < ages_s[0]
+
+
+def test_a_machine_that_cannot_render_is_told_what_helps(monkeypatch: pytest.MonkeyPatch) -> None:
+    # PyOpenGL takes no other way than this one, which nobody has.
+    monkeypatch.setenv("EGL_PLATFORM", "none")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+    with viewed() as (robot, viewer):
+        said: list[str] = []
+
+        def is_said(_: Seen) -> bool:
+            said.extend(said_of_cameras(robot))
+            return bool(said)
+
+        seen = look_until(viewer, is_said, overview=True)
+        if "no pictures" not in said[0]:
+            pytest.skip(f"OpenGL is there all the same: {said[0]}")
+        assert "egl: " in said[0]
+        assert "osmesa: " in said[0]
+        assert "apt-get install libegl1" in said[0]
+        assert len(seen.stiffness_ages_s) > 100
+        viewer.look(2.0, overview=True)
+        assert said_of_cameras(robot) == []
