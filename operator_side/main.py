@@ -211,6 +211,7 @@ class _Loop:
             "controller": {"found": self._connection.found, "state": str(self._connection.state)},
             "pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}},
             "link": link_summary("to_robot", {"haptics": self._line}),
+            "pages": {"rejected": self._pages.rejected, "stale": self._pages.stale, "silences": self._pages.silences},
         }
 
     def _move(self, now_s: float) -> None:

@@ -39,6 +39,8 @@ class DrivingPage:
         """Messages that were none."""
         self.stale = 0
         """Messages that others of the same page had overtaken; only a stop in them counts."""
+        self.silences = 0
+        """How often a page that drove was silent for too long"""
         self._numbers: OrderedDict[int, int] = OrderedDict()
         self._refused: set[int] = set()
         self._driver: int | None = None
@@ -69,7 +71,8 @@ class DrivingPage:
         except RemoteProtocolError:
             self.rejected += 1
             return
-        self._wish = message.tune or self._wish
+        if message.tune is not None:
+            self._wish = message.tune.over(self._wish)
         if message.hands is not None:
             self._take(page, message.hands, now_s)
 
@@ -113,7 +116,7 @@ class DrivingPage:
         return given
 
     def take_wish(self) -> TuneWish | None:
-        """The newest wish to tune since the last call."""
+        """What was wished for since the last call, the newest of each kind."""
         wish, self._wish = self._wish, None
         return wish
 
@@ -172,6 +175,7 @@ class DrivingPage:
 
     def _expire(self, now_s: float) -> None:
         if self._driver is not None and now_s - self._heard_s > SILENCE_S:
+            self.silences += 1
             self._let_go()
 
     def _let_go(self) -> None:

@@ -79,6 +79,13 @@ class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.link is not None and len(self.link) > _LONGEST:
             raise ValueError(f"link has {len(self.link)} characters; valid: up to {_LONGEST}")
 
+    def over(self, earlier: "TuneWish | None") -> "TuneWish":
+        """This wish, and of an earlier one what this one leaves."""
+        if earlier is None:
+            return self
+        probability = earlier.probability if self.probability is None else self.probability
+        return TuneWish(probability, earlier.link if self.link is None else self.link)
+
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One message of a page."""

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from operator_side.page_hands.driving_page import REST_S, SILENCE_S, DrivingPage, Readiness
-from operator_side.page_hands.page_messages import PageHands, read_page_message
+from operator_side.page_hands.page_messages import PageHands, TuneWish, read_page_message
 from tests.operator_side.page_hands.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
@@ -89,7 +89,7 @@ def test_silence_releases_and_the_page_that_comes_back_rests_first(pages: Drivin
     assert pages.hands(now_s + SILENCE_S + 0.001) is None
     page.say(now_s + 0.2, run=True, r2=1.0)
     assert pages.hands(now_s + 0.2) is None
-    assert pages.driver == "page1"
+    assert (pages.driver, pages.silences) == ("page1", 1)
     assert pages.rest_s(now_s + 0.2) == REST_S
 
 
@@ -155,6 +155,13 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
     two.say(0.06, driving=False)
     two.say(0.08, driving=False, give_back=True)
     assert pages.take_give_back()
+
+
+def test_wishes_that_come_at_once_are_kept_together_the_newest_of_each_kind(pages: DrivingPage) -> None:
+    for tune in ({"probability": 0.8}, {"link": "delay 5ms"}, {"probability": 0.9}):
+        pages.receive(1, {"tune": tune}, 0.0)
+    assert pages.take_wish() == TuneWish(0.9, "delay 5ms")
+    assert pages.take_wish() is None
 
 
 @dataclass(frozen=True)
