@@ -2,7 +2,8 @@
 
 import functools
 from collections import deque
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import msgspec
 
@@ -13,6 +14,7 @@ from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
 from operator_side.assembly import build_operator_side
+from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
@@ -93,6 +95,20 @@ def replay_robot(recording: Recording) -> Comparison:
     return compared
 
 
+_INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
+    Kind.RECEIVED: lambda core, content, now_s: core.receive(split_text(content)[1], now_s),
+    Kind.SEEN: OperatorSide.receive_view,
+    Kind.REPORT: OperatorSide.read_report,
+    Kind.CALIBRATED: lambda core, content, _: core.calibrate(msgspec.json.decode(content, type=TravelCalibration)),
+    Kind.FOUND: lambda core, _, now_s: core.controller_found(now_s),
+    Kind.LOST: lambda core, _, now_s: core.controller_lost(now_s),
+    Kind.WATCHED: lambda core, _, now_s: core.link.stamp(now_s),
+    Kind.STOPPED: lambda core, _, now_s: core.stop_button.press(now_s),
+    Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
+}
+"""What an entry of the operator side was, that is no question to its core."""
+
+
 def replay_operator(recording: Recording) -> Comparison:
     """Make every motion command and report to the controller anew; ConfigurationError where it was not recorded."""
     header = require_side(recording, "operator")
@@ -103,25 +119,10 @@ def replay_operator(recording: Recording) -> Comparison:
     written: deque[bytes] = deque()
     for entry in recorded_entries(recording, "operator", compared.notes):
         now_s, content = entry.now_s, entry.content
+        if (give := _INPUTS.get(entry.kind)) is not None:
+            give(core, content, now_s)
+            continue
         match entry.kind:
-            case Kind.RECEIVED:
-                core.receive(split_text(content)[1], now_s)
-            case Kind.SEEN:
-                core.receive_view(content, now_s)
-            case Kind.REPORT:
-                core.read_report(content, now_s)
-            case Kind.CALIBRATED:
-                core.calibrate(msgspec.json.decode(content, type=TravelCalibration))
-            case Kind.FOUND:
-                core.controller_found(now_s)
-            case Kind.LOST:
-                core.controller_lost(now_s)
-            case Kind.WATCHED:
-                core.link.stamp(now_s)
-            case Kind.STOPPED:
-                core.stop_button.press(now_s)
-            case Kind.TUNED:
-                core.tune(**msgspec.json.decode(content), now_s=now_s)
             case Kind.MOTION:
                 _compare_rest(compared, sent)
                 sent.extend(core.motion(now_s))
