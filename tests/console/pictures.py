@@ -1,6 +1,7 @@
 """Make the documents' pictures of real runs anew, into docs/: `python -m tests.console.pictures`."""
 
 import argparse
+import signal
 import sys
 import tempfile
 import time
@@ -34,6 +35,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "docs", help="the pictures' folder (%(default)s)")
     parser.add_argument("only", nargs="*", choices=(*_PARTS, []), metavar="PART", help=f"of {', '.join(_PARTS)}")
     given = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     started_s = time.monotonic()
 
     def say(line: str) -> None:

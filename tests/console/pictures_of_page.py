@@ -22,9 +22,11 @@ _PERIOD_S: Final = 0.25
 _QUALITY: Final = 60
 _STIFF: Final = 4
 _MEETS: Final = "parseInt(document.querySelector('#r2 .meets').textContent.match(/[0-9]+/)[0])"
-_FRESH: Final = (
-    f"{DRAWN} && document.querySelector('.view.old') === null && !document.querySelector('#scene iframe').hidden"
-)
+_FRESH: Final = f"{DRAWN} && document.querySelector('.view.old') === null"
+_SCENE: Final = False
+_CALM_S: Final = 1.0
+_SETTLES_S: Final = 60.0
+_LOOK_S: Final = 0.1
 _FRAMES: Final = "Object.fromEntries([...document.querySelectorAll('.view')].map((v) => [v.id, +v.dataset.frames]))"
 _DRAWING: Final = """async (seconds) => {
     const began = performance.now();
@@ -37,8 +39,8 @@ _DRAWING: Final = """async (seconds) => {
 def make_first_minute(program: str, folder: Path, paths: Sequence[Path], say: Say) -> None:
     """Open, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
     opened, near, carrying, driving, stopped = paths
-    with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
-        page.wait(_FRESH, "drawn both views in time", 60.0)
+    with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=_SCENE) as page:
+        _settle(page)
         _keep(page, folder, opened)
         _keep_stiffest(page, run, folder, near)
         run.wait_until("carrying", lambda run: _doing(run) == "carrying", 60.0)
@@ -60,8 +62,8 @@ def make_first_minute(program: str, folder: Path, paths: Sequence[Path], say: Sa
 
 def make_moving_picture(program: str, folder: Path, path: Path, say: Say) -> None:
     """The page from the moment when the arm is armed, as an animated WebP."""
-    with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
-        page.wait(_FRESH, "drawn both views in time", 60.0)
+    with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=_SCENE) as page:
+        _settle(page)
         run.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
         before, began_s = page.ask(_FRAMES), time.monotonic()
         frames = _recorded(page, _MOVING_S)
@@ -79,6 +81,22 @@ def make_moving_picture(program: str, folder: Path, path: Path, say: Say) -> Non
         quality=_QUALITY,
         method=6,
     )
+
+
+def _settle(page: Page) -> None:
+    """Let the person wait until all is drawn, which takes long without a graphics processor; then they go on."""
+    page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 60.0)
+    page.ask("document.querySelector('#drive').click()")
+    page.wait("!document.querySelector('#give_back').hidden", "the person's hands off", 60.0)
+    if _SCENE:
+        page.wait("!document.querySelector('#scene iframe').hidden", "a scene", 60.0)
+    calm_since_s = began_s = time.monotonic()
+    while time.monotonic() - calm_since_s < _CALM_S:
+        check(time.monotonic() - began_s < _SETTLES_S, f"no calm {_CALM_S:g} s within {_SETTLES_S:g} s")
+        if not page.ask(_FRESH):
+            calm_since_s = time.monotonic()
+        time.sleep(_LOOK_S)
+    page.ask("document.querySelector('#give_back').click()")
 
 
 def _recorded(page: Page, for_s: float) -> list[tuple[float, bytes]]:
