@@ -13,7 +13,7 @@ from feelahead.recordings.tables import Table, Tables
 
 PLOT_HZ: Final = 100.0
 _INCHES: Final = (8.27, 11.69)
-_BLUE, _ORANGE, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
+_BLUE, _ORANGE, _GREEN, _PURPLE, _GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 """Told apart by eyes that do not tell red from green."""
 _STATES: Final = {"armed": "#DDEEDD", "stopped": "#F6D5CC", "disarmed": "#EEEEEE"}
 _FULL: Final = 8.0
@@ -36,7 +36,8 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
         "axes.titlelocation": "left",
         "axes.spines.top": False,
         "axes.spines.right": False,
-        "legend.frameon": False,
+        "legend.framealpha": 0.8,
+        "legend.edgecolor": "none",
         "legend.fontsize": 6.5,
         "svg.fonttype": "none",
     }
@@ -164,7 +165,7 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     of_objects = [column for column in joined.columns() if column.startswith("overlap.") and column.endswith("_mm3")]
     if of_objects:
         sums = np.nansum([joined.numbers(column) for column in of_objects], axis=0)
-        axis.plot(times_s, np.cbrt(sums), color=_BLUE, lw=0.7, label="overlap, edge of a cube of it")
+        axis.plot(times_s, np.cbrt(sums), color=_PURPLE, lw=0.7, label="overlap, edge of a cube of it")
     axis.set_ylabel("enlargement (mm)")
     axis.set_title("Enlargement and its terms, overlap, and the strength s(δ) along each trigger")
     other = axis.twinx()
@@ -175,7 +176,8 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     other.set_ylabel("s(δ)")
     handles, labels = axis.get_legend_handles_labels()
     more, names = other.get_legend_handles_labels()
-    axis.legend([*handles, *more], [*labels, *names], loc="upper right", ncols=5)
+    # Of the upper one of the two, else its curves would run through the words; before it is armed there are none.
+    other.legend([*handles, *more], [*labels, *names], loc="upper left", ncols=2)
 
 
 def _distances(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:

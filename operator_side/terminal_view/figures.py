@@ -18,7 +18,7 @@ def percent(value: float | None, signs: Signs) -> str:
 def millimetres(value_m: float | None, signs: Signs) -> str:
     """A length given in metres."""
     known = number(value_m)
-    return f"{signs.unknown} mm" if known is None else f"{1e3 * known:.0f} mm"
+    return f"{signs.unknown} mm" if known is None else f"{round(1e3 * known)} mm"
 
 
 def plain(value: float | None, signs: Signs, width: int = 0) -> str:
