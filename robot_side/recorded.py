@@ -14,7 +14,7 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from robot_side.arm.port import Arm, ArmState
-from robot_side.compiled.warm_up import kernels_digest
+from robot_side.compiled.warm_up import kernel_digests
 from robot_side.core import RobotSide
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
 from robot_side.outgoing_messages import Outgoing
@@ -92,7 +92,7 @@ def recorded_by(recording: SideRecording | None) -> Callable[..., RobotSide]:
 
 def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
     """What the core was made from; to be told once its kernels are there."""
-    return provenance(settings, epoch, clock_domain) | {"kernels": kernels_digest()}
+    return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}
 
 
 def recorded_status(core: RobotSide, now_s: float) -> dict[str, Any]:

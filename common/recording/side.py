@@ -28,6 +28,7 @@ _BLOCK_BYTES: Final = 1 << 18
 STATUS_PERIOD_S: Final = 0.1
 _READY_LIMIT_S: Final = 20.0
 _LEAVE_LIMIT_S: Final = 0.5
+_FINISH_LIMIT_S: Final = 20.0
 
 
 class Encoder(Protocol):
@@ -204,7 +205,8 @@ class Recorder:
 
     def close(self) -> None:
         """Let go of it: it ends by itself as soon as nobody speaks to it any more."""
-        self._companion.close()
+        # It may still have much to write on a busy machine: what would be lost by killing it is the end of the run.
+        self._companion.close(_FINISH_LIMIT_S)
 
 
 def connect(path: Path) -> tuple[Channel, Recorder | None]:

@@ -167,9 +167,9 @@ def _too_slow(settings: DemoSettings) -> str | None:
 
 
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
-    arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0", "--permit-tuning"]
-    if settings.robot_config is not None:
-        arguments.append(f"--config={settings.robot_config}")
+    arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
+    # A file says itself whether it permits that.
+    arguments.append("--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}")
     for name in ("scene", "model", "site", "probability", "assist", "law"):
         if name in given:
             arguments.append(f"--{name}={getattr(settings, name)}")

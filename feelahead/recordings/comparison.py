@@ -93,11 +93,16 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
     """What this run is made from that the recorded one was not: then bits may differ."""
+    differing = [name for name in present if recorded.get(name) != present[name]]
     return [
-        f"recorded with {name} {str(recorded.get(name))[:60]}, here {str(present[name])[:60]}: bits may differ"
-        for name in present
-        if recorded.get(name) != present[name]
+        f"recorded with {_difference(recorded.get(name), present[name], name)}: bits may differ" for name in differing
     ]
+
+
+def _difference(recorded: object, present: object, name: str) -> str:
+    if isinstance(recorded, Mapping) and isinstance(present, Mapping):
+        return f"other {name}: {', '.join(key for key in recorded if recorded[key] != present.get(key))[:100]}"
+    return f"{name} {str(recorded)[:60]}, here {str(present)[:60]}"
 
 
 def require_side(recording: Recording, side: str) -> Mapping[str, Any]:

@@ -19,7 +19,7 @@ from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import build_robot_side
-from robot_side.compiled.warm_up import kernels_digest, warm_up
+from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
 from robot_side.recorded_inputs import FrameUnpacker, unpack_state
@@ -75,7 +75,10 @@ def replay_robot(recording: Recording) -> Comparison:
     core = build_robot_side(settings, header["epoch"], header["clock_domain"], side=functools.partial(_side, given))
     warm_up()
     compared = Comparison("robot", "stiffness messages")
-    compared.notes += differing_origin(header, {"processor": processor_name(), "kernels": kernels_digest()})
+    # There may be more of them here, for other scenes and laws.
+    here, recorded = kernel_digests(), header.get("kernels", {})
+    kernels = {name: here.get(name) for name in recorded}
+    compared.notes += differing_origin(header, {"processor": processor_name(), "kernels": kernels})
     made: deque[bytes] = deque()
     for entry in recorded_entries(recording, "robot", compared.notes):
         if entry.kind == Kind.RECEIVED:

@@ -93,6 +93,7 @@ class Cameras:
         self._wanted_s = -math.inf
         self._not_before_s = -math.inf
         self._failures = 0
+        self._has_worked = False
         self._hopeless = not settings.on
         if len(self._setup) > MESSAGE_LIMIT_BYTES:
             self._give_up(f"the model takes {len(self._setup) >> 20} MB; valid: up to {MESSAGE_LIMIT_BYTES >> 20}")
@@ -178,7 +179,7 @@ class Cameras:
                 self._end(companion, now_s)
                 return pictures
             self._ordered_s.pop(message.view, None)
-            self._failures = 0
+            self._failures, self._has_worked = 0, True
             self.took_s = [*self.took_s[-999:], message.took_s]
             pictures.append(message)
         if companion.channel.ended:
@@ -192,7 +193,7 @@ class Cameras:
 
     def _failed(self, now_s: float, why: str) -> None:
         self._failures += 1
-        if self._failures >= _NEVER_BEGAN:
+        if self._failures >= _NEVER_BEGAN and not self._has_worked:
             self._give_up(f"{why}, {self._failures} times in a row; what is missing says: feelahead doctor")
         else:
             self._not_before_s = now_s + RETRY_S

@@ -14,7 +14,7 @@ from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, LoopbackSetti
 from operator_side import recorded as operator_recorded
 from operator_side.settings import OperatorSettings
 from robot_side import recorded as robot_recorded
-from robot_side.compiled.warm_up import kernels_digest
+from robot_side.compiled.warm_up import kernel_digests
 from robot_side.settings import RobotSettings
 
 _BLOCK_S = 0.05
@@ -34,7 +34,7 @@ def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
     file = RecordingFile(path, WALL_OFFSET_S)
     content = Content(file)
     headers = {
-        "robot": provenance(robot, 1, VIRTUAL_CLOCK) | {"kernels": kernels_digest()},
+        "robot": provenance(robot, 1, VIRTUAL_CLOCK) | {"kernels": kernel_digests()},
         "operator": provenance(operator, 2, VIRTUAL_CLOCK),
     }
     encoders: dict[str, Any] = {

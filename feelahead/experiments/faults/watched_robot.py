@@ -53,7 +53,13 @@ class Watch:
         self._told_at_pause = 0
 
     def build(
-        self, settings: RobotSettings, epoch: int, clock_domain: str, *, announce: Callable[[str], None]
+        self,
+        settings: RobotSettings,
+        epoch: int,
+        clock_domain: str,
+        *,
+        announce: Callable[[str], None],
+        side: Callable[..., RobotSide],
     ) -> Assembled:
         """As robot_side.assembly's, watched."""
         assembled = assemble(
@@ -62,6 +68,7 @@ class Watch:
             clock_domain,
             lambda arm: _ToldArm(arm, settings.safety.gap_s, self),
             announce=announce,
+            side=side,
         )
         self._core = core = assembled.core
         receive = core.session.safety.receive

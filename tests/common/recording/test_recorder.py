@@ -81,6 +81,8 @@ def test_a_side_that_is_killed_loses_nothing_that_it_handed_over(tmp_path: Path)
     count, _ = note_until(recording, lambda: kept_s(recording) > 0.0)
     recording.idle(float("inf"))
     assert recording._recorder is not None
+    while recording._channel.waiting:  # what has not left the process dies with it
+        recording._channel.flush()
     # All that the system does for a process that is killed is to close what it had open.
     recording._recorder.close()
     assert open_recording(path).whole
