@@ -4,7 +4,6 @@ import dataclasses
 import importlib.metadata
 import platform
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -29,7 +28,6 @@ def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
         "versions": {"python": platform.python_version(), **_versions()},
         "processor": processor_name(),
         "system": f"{platform.system()} {platform.machine()}",
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 

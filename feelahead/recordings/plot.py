@@ -1,6 +1,7 @@
 """A run on one page: what lay ahead, what the fingers did and felt, and what the link did, over one time axis."""
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -19,6 +20,10 @@ _STATES: Final = {"armed": "#DDEEDD", "stopped": "#F6D5CC", "disarmed": "#EEEEEE
 _FULL: Final = 8.0
 _HEIGHTS: Final = (1.3, 1.1, 1.1, 1.0, 1.0, 1.0, 1.0)
 _SIDES: Final = (("r2", "R2 (advances)", _ORANGE), ("l2", "L2 (retreats)", _BLUE))
+
+
+def _when(recording: Recording) -> str:
+    return datetime.fromtimestamp(1e-9 * recording.began_ns(), UTC).isoformat(sep=" ", timespec="seconds")
 
 
 def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
@@ -77,7 +82,7 @@ def _title(recording: Recording, tables: Tables) -> str:
     settings = recording.headers.get("robot", header)["settings"]
     links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
     told = [
-        f"{recording.path.name}: {tables.duration_s:.1f} s, {header.get('recorded_at', '')}",
+        f"{recording.path.name}: {tables.duration_s:.1f} s, {_when(recording)}",
         f"emulated link: {'; '.join(sorted(links))}",
         f"scene {settings.get('scene') or settings.get('model') or 'table'}, law {settings.get('law', 'unknown')},"
         f" P {settings.get('probability', 'unknown')}, seed {settings.get('seed')},"

@@ -81,6 +81,8 @@ RUN = {
         "tests/feelahead/both_sides/test_processes.py",
         '"--link", "delay 20ms", "--summary"',
     ),
+    r"make demo --tui$": ("tests/feelahead/commands/test_demo_on_a_terminal.py", '"--tui"'),
+    r"make test-console": (".ci/run", "make test-console"),
     r"make demo --scene": ("tests/feelahead/commands/test_demo.py", "test_the_robot_side_is_told_the_scene"),
     r"make demo --link .*--no-haptics": ("tests/feelahead/both_sides/test_loopback.py", "haptics=False"),
     r"feelahead demo --link .*--link-model": ("tests/common/emulation/test_trace.py", '"stream"'),
@@ -100,6 +102,10 @@ RUN = {
         "the_operator_side_takes_its_flags",
     ),
     r"feelahead-robot --model \S+ --site \S+$": ("tests/house/test_documented_commands.py", "test_an_arm_of_ones_own"),
+    r"feelahead (replay|plot|export)": (
+        "tests/feelahead/commands/test_recordings.py",
+        "COMMANDS = (replay, export, plot)",
+    ),
     r"feelahead --help": ("tests/house/test_base_install.py", '["feelahead", "--help"]'),
     r"(nft|ufw|iw) ": None,
 }
