@@ -24,7 +24,7 @@ from common.files.output_file import write_json
 from common.protocol.messages import Compensation
 from common.recording.side import Recorder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.both_sides.summary import both_statuses, merge_summaries, read_summary
 from feelahead.commands.open_browser import show_address
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.status import TerminalStatus
@@ -39,8 +39,6 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
 )
 """What the two sides send to each other."""
 _ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
-_OPERATORS_OWN = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
-"""What both sides tell, and the operator side knows better."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +233,7 @@ def _watch(
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
             break
         if said["operator"]:
-            status.show(now_s, _together(said["robot"], said["operator"]))
+            status.show(now_s, both_statuses(said["robot"], said["operator"]))
         time.sleep(0.02)
     return []
 
@@ -247,7 +245,7 @@ def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: S
             said[side.name] = {name: value for name, value in event.items() if name != "event"}
         elif event["event"] == "facts":
             facts = msgspec.convert(event["facts"], OperatorFacts)
-            status.show_facts(msgspec.structs.replace(facts, status=_together(said["robot"], facts.status)))
+            status.show_facts(msgspec.structs.replace(facts, status=both_statuses(said["robot"], facts.status)))
         elif event["event"] == "console":
             show_address(str(event["address"]), status)
         else:
@@ -257,11 +255,6 @@ def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: S
 def _show_note(side: SideProcess, event: Mapping[str, Any], status: Status) -> None:
     if event["event"] == "note":
         status.note(f"{side.name}: {event['text']}")
-
-
-def _together(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:
-    """What both sides know: of the controller and the link what the operator side says, of the rest the robot side."""
-    return {**operator, **robot, **{name: operator[name] for name in _OPERATORS_OWN if name in operator}}
 
 
 def _report(summary: dict[str, Any]) -> list[str]:

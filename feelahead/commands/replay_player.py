@@ -6,13 +6,16 @@ from collections.abc import Callable
 
 import msgspec
 
+from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
 from common.recording.reading import Recording
+from feelahead.both_sides.summary import both_statuses
 from feelahead.commands.open_browser import show_address
-from feelahead.recordings.showing import FACTS, show
+from feelahead.recordings.showing import FACTS, ROBOT, VIEW, show
 from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
+from operator_side.scene_figures import SceneFigures
 from operator_side.terminal_view.status import TerminalStatus
 
 _PROGRAM = "feelahead replay"
@@ -40,7 +43,7 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
         def send(kind: bytes, content: bytes) -> None:
             if kind == FACTS:
                 console.facts(facts.decode(content))
-            else:
+            elif kind == VIEW:
                 console.view(content, video=False)
 
         while console.address is None and look(_GLANCE_S):
@@ -62,10 +65,18 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
     """To the end, or until Ctrl-C. ConfigurationError unless standard output is a terminal."""
     decoder, pause = msgspec.json.Decoder(OperatorFacts), threading.Event()
     with TerminalStatus(_PROGRAM) as status, StopSignal() as stop:
+        robot: dict[str, Value] = {}
+        figures = SceneFigures()
 
         def send(kind: bytes, content: bytes) -> None:
-            if kind == FACTS:
-                status.show_facts(decoder.decode(content))
+            if kind == ROBOT:
+                robot.update(msgspec.json.decode(content))
+            elif kind == VIEW:
+                figures.take(content)
+            else:
+                facts = decoder.decode(content)
+                known = both_statuses(robot, facts.status) | figures.figures()
+                status.show_facts(msgspec.structs.replace(facts, status=known))
 
         show(recording, send, _patient(pause, stop), speed)
     return 0

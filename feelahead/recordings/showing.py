@@ -13,6 +13,7 @@ from common.recording.reading import Message, Recording
 
 FACTS: Final = b"f"
 VIEW: Final = b"v"
+ROBOT: Final = b"s"
 _NANOSECONDS: Final = 1e-9
 
 
@@ -22,7 +23,7 @@ class Seen(NamedTuple):
     time_s: float
     """Since the recording began"""
     kind: bytes
-    """FACTS: OperatorFacts as JSON. VIEW: a view payload."""
+    """FACTS: OperatorFacts as JSON. VIEW: a view payload. ROBOT: the robot side's status as JSON."""
     content: bytes
 
 
@@ -30,10 +31,14 @@ def seen(recording: Recording) -> Iterator[Seen]:
     """All that can be shown, in order; pictures are put back into their payloads."""
     began_ns = recording.began_ns()
     pictures: dict[tuple[str, int], bytes] = {}
-    for message in recording.messages(("/operator/facts", "/view", "/camera/overview", "/camera/first_person")):
+    for message in recording.messages(
+        ("/robot/status", "/operator/facts", "/view", "/camera/overview", "/camera/first_person")
+    ):
         time_s = _NANOSECONDS * (message.log_ns - began_ns)
         if message.topic == "/operator/facts":
             yield Seen(time_s, FACTS, message.content)
+        elif message.topic == "/robot/status":
+            yield Seen(time_s, ROBOT, message.content)
         elif message.topic == "/view":
             yield Seen(time_s, VIEW, _with_picture(message, pictures))
         else:

@@ -21,7 +21,7 @@ from tests.console.checks_of_hands import (
 from tests.console.checks_of_keys import CHECKS as CHECKS_OF_KEYS
 from tests.console.checks_of_layout import keyboard_reaches_everything, nothing_overflows
 from tests.console.checks_of_link import frozen_robot_is_unmistakable, silent_operator_side_is_unmistakable
-from tests.console.checks_of_views import both_views_move, triggers_agree, words_agree
+from tests.console.checks_of_views import both_views_move, scene_is_drawn, triggers_agree, words_agree
 from tests.console.provide import default_cache, provide_playwright, provided_browser
 from tests.console.run import running
 from tests.console.stage import Check, Stage
@@ -32,6 +32,7 @@ from tests.kernel.skipped import SkippedError
 _LINK: Final = ("--link", "delay 20ms 2ms distribution normal")
 _RUNS: Final[Sequence[tuple[Sequence[str], Sequence[Check]]]] = (
     (_LINK, (both_views_move,)),
+    (_LINK, (scene_is_drawn,)),
     (_LINK, (triggers_agree, words_agree)),
     (_LINK, (nothing_overflows, keyboard_reaches_everything, wrong_addresses_are_refused, another_site_is_refused)),
     (_LINK, (frozen_robot_is_unmistakable, silent_operator_side_is_unmistakable)),

@@ -8,8 +8,6 @@ from tests.console.run import Run
 from tests.console.stage import Stage
 from tests.containers.watch import check
 
-_REST_S: Final = 1.3
-"""All keys are up for a second before hold-to-run counts."""
 _BUTTONS: Final = 17
 _RUN: Final = 4
 _PULL: Final = 7
@@ -22,8 +20,7 @@ def space_drives(stage: Stage) -> str:
     with stage.browser.page(run.address) as page:
         armed_s = _take_over(page, run)
         with page.held("Space"):
-            run.wait_until("armed", _is_armed, 15.0)
-            time.sleep(0.3)
+            page.wait_for_text("#hands_state", "You drive", 15.0)
             with page.held("KeyW"):
                 run.wait_until("pulled", lambda run: _pull(run) > 0.1, 5.0)
                 page.picture("hands")
@@ -39,8 +36,7 @@ def hidden_or_left_page_lets_go(stage: Stage) -> str:
         with stage.browser.page(run.address) as page:
             _take_over(page, run)
             with page.held("Space"):
-                run.wait_until("armed", _is_armed, 15.0)
-                time.sleep(0.3)
+                page.wait_for_text("#hands_state", "You drive", 15.0)
                 with page.held("KeyW"):
                     run.wait_until("pulled", lambda run: _pull(run) > 0.1, 5.0)
                     leave(page)
@@ -57,8 +53,7 @@ def gamepad_drives(stage: Stage) -> str:
         held = [0.0] * _BUTTONS
         held[_RUN] = 1.0
         page.pretend_gamepad((0.0,) * 4, tuple(held))
-        run.wait_until("armed", _is_armed, 15.0)
-        time.sleep(0.3)
+        page.wait_for_text("#hands_state", "You drive", 15.0)
         held[_PULL] = 0.6
         page.pretend_gamepad((0.0,) * 4, tuple(held))
         run.wait_until("pulled", lambda run: _pull(run) > 0.3, 5.0)
@@ -89,7 +84,7 @@ def _take_over(page: Page, run: Run) -> float:
     began_s = time.monotonic()
     page.raw.click("#drive")
     run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser", 10.0)
-    time.sleep(_REST_S)
+    page.wait_for_text("#hands_state", "Ready", 15.0)
     return time.monotonic() - began_s
 
 

@@ -14,6 +14,7 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import ConfigurationError
+from feelahead.both_sides.summary import both_statuses
 from feelahead.commands import demo as module
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
@@ -152,8 +153,8 @@ def test_each_side_says_what_it_knows_better() -> None:
     robot: dict[str, Value] = {"link": "up", "L2": 0.1, "target": "carton", "stopped_because": "no command for 101 ms"}
     operator: dict[str, Value] = {"link": "lost: all", "L2": None, "target": "?", "person": "done"}
     operator["stopped_because"] = "no command for the gap limit"
-    assert module._together(robot, operator) == {**robot, "link": "lost: all", "L2": None, "person": "done"}
-    assert module._together(robot, {}) == robot
+    assert both_statuses(robot, operator) == {**robot, "link": "lost: all", "L2": None, "person": "done"}
+    assert both_statuses(robot, {}) == robot
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
