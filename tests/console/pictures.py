@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import FeelaheadError
-from tests.console.pictures_of_page import make_first_minute, make_moving_picture
+from tests.console.pictures_of_page import make_first_minute
 from tests.console.pictures_of_recording import make_pictures_of_recording
 from tests.console.provide import default_cache, provide_playwright, provided_browser
 from tests.containers.debian import Say
@@ -18,14 +18,13 @@ from tests.containers.watch import CheckFailedError
 from tests.helpers.repository import ROOT
 from tests.kernel.skipped import SkippedError
 
-FIRST_MINUTE: Final = tuple(f"console/first-minute-{step}.png" for step in range(1, 6))
-MOVING: Final = "console/demo.webp"
+FIRST_MINUTE: Final = tuple(f"console/first-minute-{step}.png" for step in range(1, 4))
 TERMINAL: Final = "console/terminal.svg"
 PLOT: Final = "recording/run.png"
-FILES: Final = (*FIRST_MINUTE, MOVING, TERMINAL, PLOT)
+FILES: Final = (*FIRST_MINUTE, TERMINAL, PLOT)
 """Within docs/, and nothing else is in these folders."""
 _TRIES: Final = 3
-_PARTS: Final = ("first-minute", "moving", "recording")
+_PARTS: Final = ("first-minute", "recording")
 
 
 def main() -> int:
@@ -61,10 +60,7 @@ def _make(part: str, docs: Path, cache: Path, say: Say) -> None:
             return
         program = provided_browser(say)
         provide_playwright(cache, say)
-        if part == "first-minute":
-            _place(docs, FIRST_MINUTE, lambda to: make_first_minute(program, folder, to, say), say)
-        else:
-            _place(docs, (MOVING,), lambda to: make_moving_picture(program, folder, to[0], say), say)
+        _place(docs, FIRST_MINUTE, lambda to: make_first_minute(program, folder, to, say), say)
 
 
 def _place(docs: Path, names: tuple[str, ...], make: Callable[[list[Path]], None], say: Say) -> None:
