@@ -1,4 +1,4 @@
-"""`feelahead bench viewing`: what it costs the robot side that somebody looks, in turns of looking and not looking."""
+"""`feelahead bench viewing`: what it costs the robot side that two look and all is recorded, in turns."""
 
 import os
 import secrets
@@ -19,7 +19,7 @@ from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from common.protocol.view_messages import SceneState, VideoFrame
 from feelahead.benchmarks.viewing.companion_process import companion_of, processor_s
-from feelahead.benchmarks.viewing.viewer import Seen, Viewer
+from feelahead.benchmarks.viewing.viewer import Seen, Viewer, look
 from feelahead.both_sides.processes import SideProcess
 
 _PROGRAM: Final = "feelahead bench viewing"
@@ -30,11 +30,12 @@ _LEAST_TICKS: Final = 10
 _WARMING_S: Final = 3.0
 _STARTING_S: Final = 600.0
 _ONE_SIDED_95: Final = 1.645
+_VIEWERS: Final = 2
 
 
 @dataclass(frozen=True)
 class ViewingSettings:
-    """A real robot side at 1 kHz whose two views and scene somebody looks at for a second, and then not, in turns.
+    """A real robot side at 1 kHz: two look at both views and the scene, and all is recorded, and then neither, in turns.
 
     Each tick's processor time from reading the arm to its messages, the processor time of everything that its thread
     does, and the turns that were not taken; pictures in a second; stiffness ages, also while video has 2 Mbit/s.
@@ -46,6 +47,8 @@ class ViewingSettings:
     """Each."""
     quick: bool = False
     """20 turns of each."""
+    record: bool = True
+    """While they look."""
 
     def __post_init__(self) -> None:
         if not 2 <= self.turns <= 1000:
@@ -93,47 +96,49 @@ def bench_viewing(arguments: Sequence[str]) -> int:
     console = Console(width=100 if not sys.stdout.isatty() else None)
     with Progress(transient=True, console=console) as progress:
         bar = progress.add_task("turns", total=4 * count)
-        found = {link: _measure(link, count, settings.seconds, lambda: progress.advance(bar)) for link in ("", _SLOW)}
-    console.print(_cost_table(found[""]))
+        found = {link: _measure(link, count, settings, lambda: progress.advance(bar)) for link in ("", _SLOW)}
+    console.print(_cost_table(found[""], "two look and all is recorded" if settings.record else "two look"))
     console.print(_age_table(found))
     return 0
 
 
-def _measure(link: str, count: int, seconds: float, advance: Callable[[], None]) -> Turns:
+def _measure(link: str, count: int, settings: ViewingSettings, advance: Callable[[], None]) -> Turns:
     found = Turns()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ticks.npy"
         arguments = [f"--log={log}", "--bind=tcp://127.0.0.1:0", *([f"--link={link}"] if link else [])]
+        arguments += [f"--record={folder}/run.mcap"] if settings.record else []
         with SideProcess("feelahead.benchmarks.viewing.timed_robot", "robot", arguments) as robot:
             listening = robot.wait_for("listening", _STARTING_S)
-            viewer = Viewer(listening["control"], listening["view"], secrets.randbits(53))
+            viewers = [Viewer(listening["control"], listening["view"], secrets.randbits(53)) for _ in range(_VIEWERS)]
             everything = {"overview": True, "first_person": True, "scene": True}
-            viewer.look(_WARMING_S, **everything)
+            look(viewers, _WARMING_S, **everything)
             looked_s = busy_s = 0.0
             for _ in range(count):
-                found.away.append(viewer.look(seconds))
+                found.away.append(look(viewers, settings.seconds))
                 advance()
                 companion = companion_of(robot.process_id)
                 began_s = 0.0 if companion is None else processor_s(companion)
-                found.looking.append(viewer.look(seconds, **everything))
+                found.looking.append(look(viewers, settings.seconds, **everything))
                 if companion is not None:
                     busy_s += processor_s(companion) - began_s
-                looked_s += seconds
+                looked_s += settings.seconds
                 advance()
             found.companion_share = busy_s / looked_s
-            viewer.close()
+            for viewer in viewers:
+                viewer.close()
             robot.stop()
             robot.check()
         found.ticks = np.load(log)
     return found
 
 
-def _cost_table(found: Turns) -> Table:
+def _cost_table(found: Turns, case: str) -> Table:
     shown = Table(
-        title=f"the robot side at 1 kHz, two views and the scene looked at; {len(found.looking)} turns of each,"
+        title=f"the robot side at 1 kHz, both views and the scene; {len(found.looking)} turns of each,"
         f" {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
     )
-    for heading in ("", "nobody looks", "somebody looks", "paired difference", "its upper bound (95 %)"):
+    for heading in ("", "nobody looks", case, "paired difference", "its upper bound (95 %)"):
         shown.add_column(heading, justify="left" if not heading else "right")
     rows = (
         ("tick's processor time p50, us", "p50", 1.0, ".1f"),

@@ -1,4 +1,7 @@
-"""A robot side that writes down what each of its ticks cost: `python -m ... --log=FILE.npy` and its own flags."""
+"""A robot side that writes down what each of its ticks cost: `python -m ... --log=FILE.npy` and its own flags.
+
+With `--record` it notes what happens to it only while somebody looks: the other turns pay for neither.
+"""
 
 import time
 from collections.abc import Sequence
@@ -10,6 +13,7 @@ import robot_side.main
 from common.command.command_line import run_command
 from common.errors import ConfigurationError
 from robot_side.assembly import Assembled, assemble
+from robot_side.core import RobotSide
 from robot_side.outgoing_messages import Outgoing
 
 PROGRAM = "python -m feelahead.benchmarks.viewing.timed_robot"
@@ -38,16 +42,18 @@ def _timed(ticks: list[tuple[float, float, float]]) -> object:
 
     def build(*arguments: object, **others: object) -> Assembled:
         assembled = assemble(*arguments, **others)  # type: ignore[arg-type]
-        tick = assembled.core.tick
+        core = assembled.core
+        noted, plain = core.tick, RobotSide.tick.__get__(core)
 
         def timed(now_s: float) -> list[Outgoing]:
+            tick = noted if core.session.watchers.looked_at(now_s) else plain
             began_s = time.thread_time()
             outgoing = tick(now_s)
             ended_s = time.thread_time()
             ticks.append((now_s, ended_s - began_s, ended_s))
             return outgoing
 
-        assembled.core.tick = timed  # type: ignore[method-assign]
+        core.tick = timed  # type: ignore[method-assign]
         return assembled
 
     return build

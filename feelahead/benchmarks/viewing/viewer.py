@@ -1,5 +1,6 @@
-"""Somebody who looks: says Hello and Watch to a real robot side, and takes what comes."""
+"""Those who look: they say Hello and Watch to a real robot side, and take what comes."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,35 +28,19 @@ class Seen:
 
 
 class Viewer:
-    """One participant: the owner if it is the first, but it drives nothing."""
+    """One participant: the first is the owner, but it drives nothing."""
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
         self._end = LinkEnd("operator", epoch, clock_domain())
-        self._clock = MonotonicClock()
-        self._next_s = 0.0
 
-    def look(self, seconds: float, **what: bool) -> Seen:
-        """For so long, at `what` of overview, first_person and scene; the others are said to be looked at no more."""
-        began_s = self._clock.now()
-        seen = Seen(began_s)
-        self._next_s = began_s
-        while (now_s := self._clock.now()) < began_s + seconds:
-            if now_s >= self._next_s:
-                self._next_s = now_s + _WATCH_PERIOD_S
-                self._sockets.send(encode(self._end.hello(now_s)))
-                self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
-            self._sockets.wait(0.001)
-            self._take(seen)
-        seen.ended_s = self._clock.now()
-        return seen
+    def say(self, now_s: float, what: Mapping[str, bool]) -> None:
+        """What is looked at, of overview, first_person and scene; the others no more."""
+        self._sockets.send(encode(self._end.hello(now_s)))
+        self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
 
-    def close(self) -> None:
-        """Go away."""
-        self._sockets.close()
-
-    def _take(self, seen: Seen) -> None:
-        now_s = self._clock.now()
+    def take(self, seen: Seen, now_s: float) -> None:
+        """What has come."""
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
@@ -65,3 +50,28 @@ class Viewer:
         for _, payload in self._sockets.receive_view():
             seen.views.append((now_s, decode_view(payload)))
             seen.lengths.append(len(payload))
+
+    def wait(self, seconds: float) -> None:
+        """Until something comes."""
+        self._sockets.wait(seconds)
+
+    def close(self) -> None:
+        """Go away."""
+        self._sockets.close()
+
+
+def look(viewers: Sequence[Viewer], seconds: float, **what: bool) -> Seen:
+    """All of them, for so long; what the first one sees."""
+    clock = MonotonicClock()
+    next_s = began_s = clock.now()
+    seen, others = Seen(began_s), Seen(began_s)
+    while (now_s := clock.now()) < began_s + seconds:
+        if now_s >= next_s:
+            next_s = now_s + _WATCH_PERIOD_S
+            for viewer in viewers:
+                viewer.say(now_s, what)
+        viewers[0].wait(0.001)
+        for viewer in viewers:
+            viewer.take(seen if viewer is viewers[0] else others, clock.now())
+    seen.ended_s = clock.now()
+    return seen
