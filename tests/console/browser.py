@@ -14,10 +14,8 @@ from PIL import Image
 from tests.containers.watch import CheckFailedError
 
 _ARGUMENTS: Final = (
-    # Root has no sandbox, and a machine without a graphics processor draws by software.
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
+    "--no-sandbox",  # root has none
+    # Without a graphics processor WebGL is drawn by software. Not the whole page: that would take ten times as much.
     "--enable-unsafe-swiftshader",
     "--force-color-profile=srgb",
 )
