@@ -18,6 +18,8 @@ from common.recording.topics import FORMAT, PROFILE
 
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _RECORD: Final = struct.Struct("<BQ")
+_SPAN: Final = struct.Struct("<QQ")
+"""At the beginning of a chunk: its first and last stamp"""
 _METADATA: Final = 0x0C
 _CHUNK: Final = 0x06
 _DATA_END: Final = 0x0F
@@ -46,6 +48,11 @@ class Recording:
     def began_ns(self) -> int:
         """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
         return next((message.log_ns for message in self.messages()), 0)
+
+    def length_s(self) -> float:
+        """From the first message to the last one in a chunk that is there, seconds."""
+        ends_ns = [_SPAN.unpack_from(content)[1] for _, content in _records(self.path, (_CHUNK,))]
+        return 1e-9 * (max(ends_ns) - self.began_ns()) if ends_ns else 0.0
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
         """Every message in the file's order, which is nearly that of time; of `topics` only, if any are named."""

@@ -2,62 +2,70 @@
 
 import select
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any, Final
 
 import msgspec
 
+from common.clock import MonotonicClock
 from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
 from common.recording.reading import Recording
 from feelahead.both_sides.summary import both_statuses
 from feelahead.commands.open_browser import show_address
-from feelahead.recordings.showing import FACTS, ROBOT, VIEW, show
+from feelahead.recordings.playback import Playback
+from feelahead.recordings.showing import FACTS, ROBOT, VIEW, Seen
 from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
 from operator_side.scene_figures import SceneFigures
 from operator_side.terminal_view.status import TerminalStatus
 
-_PROGRAM = "feelahead replay"
-_GLANCE_S = 0.05
-"""How often we look whether to stop."""
+_PROGRAM: Final = "feelahead replay"
+_STEP_S: Final = 0.01
+_LONGEST_S: Final = 0.25
+"""In one step: a machine that was suspended misses nothing."""
+_STATE_PERIOD_S: Final = 0.1
 
 
 def play_on_page(recording: Recording, speed: float, port: int) -> int:
-    """From the moment when a page is open to the end, and then its last picture until Ctrl-C; 1 without a console."""
+    """From the moment when a page is open, until Ctrl-C; 1 without a console."""
     title = f"{recording.path.name}, replayed"
     with StopSignal() as stop, Status("line", _PROGRAM) as status, Console(title, port=port, live=False) as console:
         facts = msgspec.json.Decoder(OperatorFacts)
+        playback = Playback(recording, speed)
+        opened, since_s = False, 0.0
+        said: dict[str, Any] = {}
 
         def look(seconds: float) -> bool:
-            while True:
-                ready, _, _ = select.select([console], [], [], min(seconds, _GLANCE_S))
-                if ready:
-                    console.receive()
-                for text in console.take_notes():
-                    status.note(text)
-                seconds -= 0.0 if ready else _GLANCE_S
-                if stop.is_set or console.gone or seconds <= 0.0:
-                    return not (stop.is_set or console.gone)
+            if select.select([console], [], [], seconds)[0]:
+                console.receive()
+            for text in console.take_notes():
+                status.note(text)
+            return not (stop.is_set or console.gone)
 
-        def send(kind: bytes, content: bytes) -> None:
-            if kind == FACTS:
-                console.facts(facts.decode(content))
-            elif kind == VIEW:
-                console.view(content, video=False)
+        def send(one: Seen) -> None:
+            if one.kind == FACTS:
+                console.facts(facts.decode(one.content))
+            elif one.kind == VIEW:
+                console.view(one.content, video=False)
 
-        while console.address is None and look(_GLANCE_S):
+        while console.address is None and look(_STEP_S):
             pass
         if console.address is not None:
             show_address(console.address, status)
             status.note("it plays as soon as the page is open; Ctrl-C ends it")
-        while console.pages == 0 and look(_GLANCE_S):
-            pass
-        if console.pages:
-            show(recording, send, look, speed)
-            status.note("that was all; Ctrl-C ends it")
-        while look(_GLANCE_S):
-            pass
+        for passed_s in _passing(look):
+            if console.pages and not opened:
+                opened, playback.paused = True, False
+            while console.playing:
+                playback.wish(console.playing.popleft().play)
+            for one in playback.advance(passed_s):
+                send(one)
+            since_s += passed_s
+            if since_s >= _STATE_PERIOD_S and (state := playback.state()) != said:
+                since_s, said = 0.0, state
+                console.played(state)
         return 1 if console.gone else 0
 
 
@@ -68,25 +76,34 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
         robot: dict[str, Value] = {}
         figures = SceneFigures()
 
-        def send(kind: bytes, content: bytes) -> None:
-            if kind == ROBOT:
-                robot.update(msgspec.json.decode(content))
-            elif kind == VIEW:
-                figures.take(content)
+        def send(one: Seen) -> None:
+            if one.kind == ROBOT:
+                robot.update(msgspec.json.decode(one.content))
+            elif one.kind == VIEW:
+                figures.take(one.content)
             else:
-                facts = decoder.decode(content)
+                facts = decoder.decode(one.content)
                 known = both_statuses(robot, facts.status) | figures.figures()
                 status.show_facts(msgspec.structs.replace(facts, status=known))
 
-        show(recording, send, _patient(pause, stop), speed)
+        playback = Playback(recording, speed)
+        playback.paused = False
+
+        def goes_on(seconds: float) -> bool:
+            pause.wait(seconds)
+            return not (stop.is_set or playback.over)
+
+        for passed_s in _passing(goes_on):
+            for one in playback.advance(passed_s):
+                send(one)
     return 0
 
 
-def _patient(pause: threading.Event, stop: StopSignal) -> Callable[[float], bool]:
-    def wait(seconds: float) -> bool:
-        while seconds > 0.0 and not stop.is_set:
-            pause.wait(min(seconds, _GLANCE_S))
-            seconds -= _GLANCE_S
-        return not stop.is_set
-
-    return wait
+def _passing(goes_on: Callable[[float], bool]) -> Iterator[float]:
+    """What time has passed, again and again, as long as `goes_on(seconds)` says so, which lets that much pass."""
+    clock = MonotonicClock()
+    before_s = clock.now()
+    while goes_on(_STEP_S):
+        now_s = clock.now()
+        yield min(now_s - before_s, _LONGEST_S)
+        before_s = now_s

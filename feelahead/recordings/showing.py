@@ -1,13 +1,13 @@
-"""A recording shown once more: the facts and views that people saw, in order, at any speed."""
+"""A recording shown once more: the facts and views that people saw, in order."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import msgspec
 
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode_view, encode
-from common.protocol.view_messages import VideoFrame
+from common.protocol.view_messages import SceneState, VideoFrame
 from common.recording.images import read_image
 from common.recording.reading import Message, Recording
 
@@ -15,6 +15,7 @@ FACTS: Final = b"f"
 VIEW: Final = b"v"
 ROBOT: Final = b"s"
 _NANOSECONDS: Final = 1e-9
+_TOPICS: Final = ("/robot/status", "/operator/facts", "/view", "/camera/overview", "/camera/first_person")
 
 
 class Seen(NamedTuple):
@@ -24,6 +25,8 @@ class Seen(NamedTuple):
     """Since the recording began"""
     kind: bytes
     """FACTS: OperatorFacts as JSON. VIEW: a view payload. ROBOT: the robot side's status as JSON."""
+    name: str
+    """What it is: of each name the newest is as good as all"""
     content: bytes
 
 
@@ -31,48 +34,26 @@ def seen(recording: Recording) -> Iterator[Seen]:
     """All that can be shown, in order; pictures are put back into their payloads."""
     began_ns = recording.began_ns()
     pictures: dict[tuple[str, int], bytes] = {}
-    for message in recording.messages(
-        ("/robot/status", "/operator/facts", "/view", "/camera/overview", "/camera/first_person")
-    ):
+    for message in recording.messages(_TOPICS):
         time_s = _NANOSECONDS * (message.log_ns - began_ns)
         if message.topic == "/operator/facts":
-            yield Seen(time_s, FACTS, message.content)
+            yield Seen(time_s, FACTS, message.topic, message.content)
         elif message.topic == "/robot/status":
-            yield Seen(time_s, ROBOT, message.content)
+            yield Seen(time_s, ROBOT, message.topic, message.content)
         elif message.topic == "/view":
-            yield Seen(time_s, VIEW, _with_picture(message, pictures))
+            yield Seen(time_s, VIEW, *_view(message, pictures))
         else:
             image = read_image(message.content)
             pictures = {(image.view, message.log_ns): image.jpeg, **dict(list(pictures.items())[:8])}
 
 
-def show(
-    recording: Recording,
-    send: Callable[[bytes, bytes], None],
-    wait: Callable[[float], bool],
-    speed: float = 1.0,
-) -> int:
-    """Send everything to `send(kind, content)` when it is due; how much that was.
-
-    `wait(seconds)` lets that much time pass, and says whether to go on.
-    """
-    shown, at_s = 0, 0.0
-    for one in seen(recording):
-        if one.time_s > at_s:
-            if not wait((one.time_s - at_s) / speed):
-                break
-            at_s = one.time_s
-        send(one.kind, one.content)
-        shown += 1
-    return shown
-
-
-def _with_picture(message: Message, pictures: dict[tuple[str, int], bytes]) -> bytes:
+def _view(message: Message, pictures: dict[tuple[str, int], bytes]) -> tuple[str, bytes]:
+    """Its name, and the payload as it crossed the wire."""
     try:
         view = decode_view(message.content)
     except RemoteProtocolError:
-        return message.content  # telemetry, or of another version
+        return "telemetry", message.content  # or of another version
     if not isinstance(view, VideoFrame):
-        return message.content
+        return "state" if isinstance(view, SceneState) else "shapes", message.content
     jpeg = pictures.get((view.view, message.log_ns), b"")
-    return encode(msgspec.structs.replace(view, jpeg=jpeg))
+    return view.view, encode(msgspec.structs.replace(view, jpeg=jpeg))

@@ -1,7 +1,8 @@
 """The console's own process: what comes from the operator side goes to viser and to the pages, and back.
 
-operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run
-here ──▶ operator side    a the address, w how many pages are open, h hands, t tuning, e why there is no console
+operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run,
+                          p where in a recording we are
+here ──▶ operator side    a the address, w how many pages are open, h hands, t tuning, p playing, e why there is none
 """
 
 import contextlib
@@ -33,6 +34,7 @@ _FRAME: Final = struct.Struct("<Bd")
 _MOST_LISTED: Final = 6
 _SLOW_PERIOD_S: Final = 0.25
 """Between two drawings for a browser without a graphics processor."""
+_LASTING: Final = {b"r": "run", b"p": "player"}
 _ROLES: Final = ("obstacle", "target", "support", "ignored")
 
 
@@ -118,9 +120,9 @@ class _Process:
         elif kind == b"n":
             note = {"kind": "note", "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
-        elif kind == b"r":
-            run = {"kind": "run", **msgspec.msgpack.decode(content)}
-            self._pages.show("run", msgspec.json.encode(run).decode(), lasting=True)
+        elif kind in _LASTING:
+            lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
+            self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
         elif kind == b"v":
             with contextlib.suppress(RemoteProtocolError):
                 return self._view(content)

@@ -1,7 +1,7 @@
 """The console as whoever feeds it sees it: a process beside ours, which ours never waits for."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -19,13 +19,14 @@ _END_LIMIT_S: Final = 0.3
 
 
 class PageWords(msgspec.Struct, frozen=True):
-    """What one page said of its hands or of what it wants tuned."""
+    """What one page said of its hands, of what it wants tuned, or of how a recording is to be played."""
 
     page: int
     """Which of the pages of this run"""
     hands: dict[str, Any] | None = None
     """None, where hands were to be expected: this page is gone"""
     tune: dict[str, Any] | None = None
+    play: dict[str, Any] | None = None
 
 
 class Console:
@@ -39,6 +40,7 @@ class Console:
         """How many are open: with none, nothing needs to be sent or rendered."""
         self.hands: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         self.tuning: deque[PageWords] = deque(maxlen=_MOST_HEARD)
+        self.playing: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         """What the pages said, the oldest first, for whoever takes it."""
         self._handling: set[int] = set()
         """The pages that have said something of their hands, and are not gone."""
@@ -76,6 +78,10 @@ class Console:
         if self.pages and not (video and self._companion.channel.waiting > _VIDEO_WAITS_BYTES):
             self._companion.channel.send(b"v", payload)
 
+    def played(self, state: Mapping[str, Any]) -> None:
+        """Show where a recording is: `at_s`, `length_s`, `speed`, `paused`."""
+        self._companion.channel.send(b"p", msgspec.msgpack.encode(state))
+
     def note(self, text: str) -> None:
         """Show a line that stays."""
         self._companion.channel.send(b"n", text.encode())
@@ -94,24 +100,22 @@ class Console:
             elif kind == b"e":
                 self._end(f"no console: {content.decode()}")
                 return
-            elif kind in (b"h", b"t"):
-                self._hear(msgspec.msgpack.decode(content, type=PageWords), hands=kind == b"h")
+            elif kind in (b"h", b"t", b"p"):
+                self._hear(kind, msgspec.msgpack.decode(content, type=PageWords))
         if channel.ended:
             self._end("the console has ended; the run goes on without it")
 
-    def _hear(self, words: PageWords, *, hands: bool) -> None:
-        (self.hands if hands else self.tuning).append(words)
-        if hands and words.hands is None:
-            self._handling.discard(words.page)
-        elif hands:
-            self._handling.add(words.page)
+    def _hear(self, kind: bytes, words: PageWords) -> None:
+        {b"h": self.hands, b"t": self.tuning, b"p": self.playing}[kind].append(words)
+        if kind == b"h":
+            (self._handling.discard if words.hands is None else self._handling.add)(words.page)
 
     def _end(self, why: str) -> None:
         """Whoever watched sees no more; whose hands moved something through a page is gone, too."""
         self.gone, self.address = True, None
         self.pages = 0
         for page in sorted(self._handling):
-            self._hear(PageWords(page), hands=True)
+            self._hear(b"h", PageWords(page))
         self._notes.append(why)
 
     def take_notes(self) -> list[str]:

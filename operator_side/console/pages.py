@@ -17,21 +17,26 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket's own codes: try again later; policy violation."""
 
+_WORDS: Final = (("h", "hands"), ("t", "tune"), ("p", "play"))
+
 ROUND_ENDS: Final = '{"kind":"end"}'
 """A page answers it with `taken`."""
 
 Heard = Callable[[str, bytes], None]
-"""Called with `h` or `t` and MessagePack of `{"page": number, "hands" or "tune": what the page said}`. A page that is
-gone says `hands` of nil."""
+"""Called with `h`, `t` or `p` and MessagePack of `{"page": number, "hands", "tune" or "play": what the page said}`. A
+page that is gone says `hands` of nil."""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a page may say, as JSON; what is in the first two is not ours to judge."""
+    """What a page may say, as JSON; what is in the first three is not ours to judge."""
 
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
+    play: dict[str, Any] | None = None
     slow: bool | None = None
     """Whether its browser draws the scene without a graphics processor"""
+    looks: bool | None = None
+    """Whether its tab can be seen: what is hidden is shown nothing"""
     taken: bool | None = None
     """All up to the last ROUND_ENDS has been looked at: the next round may come. Browsers store what a page has no time
     for, without a bound, so that it would see everything, later and later."""
@@ -46,6 +51,7 @@ class _Page:
         self.something = asyncio.Event()
         self.taken = asyncio.Event()
         self.slow = False
+        self.looks = True
 
     async def send(self, connection: ServerConnection) -> None:
         while True:
@@ -64,7 +70,7 @@ class Pages:
     """All open pages. Everything here happens in the server's own thread."""
 
     def __init__(self, changed: Callable[[int], None], heard: Heard) -> None:
-        """`changed` is told how many are open now."""
+        """`changed` is told how many there are to look at now."""
         self._changed = changed
         self._heard = heard
         self._pages: dict[int, _Page] = {}
@@ -82,8 +88,9 @@ class Pages:
         if lasting:
             self._lasting[kind] = message
         for page in self._pages.values():
-            page.newest[kind] = message
-            page.something.set()
+            if page.looks or lasting:
+                page.newest[kind] = message
+                page.something.set()
 
     def note(self, message: str) -> None:
         """Send this to every page, and to later ones."""
@@ -104,7 +111,7 @@ class Pages:
         if page.newest or page.notes:
             page.something.set()
         self._pages[number] = page
-        self._changed(len(self._pages))
+        self._count()
         sending = asyncio.create_task(self._send(page, connection))
         try:
             await self._listen(number, page, connection)
@@ -113,8 +120,11 @@ class Pages:
         finally:
             sending.cancel()
             del self._pages[number]
-            self._changed(len(self._pages))
+            self._count()
             self._heard("h", msgspec.msgpack.encode({"page": number, "hands": None}))
+
+    def _count(self) -> None:
+        self._changed(sum(page.looks for page in self._pages.values()))
 
     async def _send(self, page: _Page, connection: ServerConnection) -> None:
         try:
@@ -141,7 +151,9 @@ class Pages:
                 page.taken.set()
             if said.slow is not None:
                 page.slow = said.slow
-            if said.hands is not None:
-                self._heard("h", msgspec.msgpack.encode({"page": number, "hands": said.hands}))
-            if said.tune is not None:
-                self._heard("t", msgspec.msgpack.encode({"page": number, "tune": said.tune}))
+            if said.looks is not None and said.looks != page.looks:
+                page.looks = said.looks
+                self._count()
+            for kind, name in _WORDS:
+                if (words := getattr(said, name)) is not None:
+                    self._heard(kind, msgspec.msgpack.encode({"page": number, name: words}))

@@ -35,7 +35,7 @@ _VIEWERS: Final = 2
 
 @dataclass(frozen=True)
 class ViewingSettings:
-    """A real robot side at 1 kHz: two look at both views and the scene, and all is recorded, and then neither, in turns.
+    """A real robot side at 1 kHz: two look at both views and the scene, and all is recorded; then neither; in turns.
 
     Each tick's processor time from reading the arm to its messages, the processor time of everything that its thread
     does, and the turns that were not taken; pictures in a second; stiffness ages, also while video has 2 Mbit/s.

@@ -1,6 +1,7 @@
 // The page: what the console sends, shown as it comes.
 import { Chart } from "./charts.js";
 import { Hands } from "./hands.js";
+import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
@@ -33,6 +34,7 @@ const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
 };
 const hands = new Hands(document, send);
+const player = new Player(byId("player"), send);
 
 function connect() {
   const address = new URL("live", location.href);
@@ -43,7 +45,7 @@ function connect() {
     if (typeof data === "string") receive(JSON.parse(data));
     else views[new DataView(data).getUint8(0)]?.receive(data);
   };
-  socket.onopen = () => send({ slow });
+  socket.onopen = () => send({ slow, looks: !document.hidden });
   socket.onclose = ({ reason }) => {
     closedBecause = reason || "its process has ended, or this page may not see it";
     setTimeout(connect, RETRY_MS);
@@ -59,7 +61,9 @@ function receive(message) {
     run = message;
     clock.live = run.live;
     document.title = `feelahead: ${run.title}`;
-  }
+    document.body.classList.toggle("replay", !run.live);
+    byId("player").hidden = run.live;
+  } else if (message.kind === "player") player.show(message);
 }
 
 function text(id, value, bad = false) {
@@ -92,10 +96,10 @@ function showFacts(message) {
   text("holding", status.holding);
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
-  charts.delay.add([facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
+  charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
-  charts.stiffness.add([facts.l2.stiffness, facts.r2.stiffness]);
+  charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
 }
 
@@ -134,8 +138,8 @@ function showScene(scene) {
   // Only now does viser know where to look at the scene from.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
-  charts.overlap.add(scene.overlap_mm3);
-  charts.tick.add(scene.tick_us);
+  charts.overlap.add(clock.nowMs, scene.overlap_mm3);
+  charts.tick.add(clock.nowMs, scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
     const row = document.createElement("tr");
     for (const [content, kind, small] of [[name, "", role], [l2, "l2"], [r2, "r2"]]) {
@@ -162,7 +166,7 @@ function showNote(note) {
 function look() {
   const silentMs = performance.now() - heardMs;
   const open = socket?.readyState === WebSocket.OPEN;
-  const lost = !open || silentMs > SILENCE_MS;
+  const lost = !open || ((run.live || !everHeard) && silentMs > SILENCE_MS);
   byId("lost").hidden = !lost;
   if (lost) {
     const [word, because] = byId("lost").children;
@@ -173,6 +177,7 @@ function look() {
   for (const view of views) view.look();
 }
 
+document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));
 connect();
 setInterval(look, 100);
-setInterval(() => Object.values(charts).forEach((chart) => chart.draw()), 100);
+setInterval(() => Object.values(charts).forEach((chart) => chart.draw(clock.nowMs)), 100);

@@ -17,8 +17,9 @@ export class Chart {
     [this.#title, this.#unit, this.#series, this.#full] = [title, unit, series, full];
   }
 
-  add(values) {
-    const nowMs = performance.now();
+  // A moment before the newest one: a recording was put back.
+  add(nowMs, values) {
+    if (this.#samples.at(-1)?.[0] > nowMs) this.#samples = [];
     this.#samples.push([nowMs, values]);
     while (this.#samples[0][0] < nowMs - SPAN_MS) this.#samples.shift();
   }
@@ -29,7 +30,7 @@ export class Chart {
     return shown === words ? words : `${shown}…`;
   }
 
-  draw() {
+  draw(nowMs) {
     const ratio = devicePixelRatio || 1;
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     if (!width || !height) return;
@@ -46,7 +47,6 @@ export class Chart {
     const top = this.#full ?? roundUp(Math.max(1, ...known));
     const [left, right, upper, lower] = [4, width - 36, 36, height - 6];
     const y = (value) => lower - ((lower - upper) * Math.min(Math.max(value, 0), top)) / top;
-    const nowMs = performance.now();
     const x = (atMs) => right - ((right - left) * (nowMs - atMs)) / SPAN_MS;
 
     context.strokeStyle = color("--line");

@@ -18,6 +18,11 @@ export class Clock {
     [this.#nowS, this.#offsetS] = [nowS, offsetS];
   }
 
+  // What pictures and charts go by: a recording has its own time.
+  get nowMs() {
+    return this.live ? performance.now() : 1000 * this.#nowS;
+  }
+
   // How long ago a moment of the robot side's clock was; null while nobody knows.
   ageS(robotS) {
     if (this.#offsetS === null || !this.#ahead.length) return null;
@@ -61,7 +66,7 @@ export class View {
         this.#context.drawImage(picture, 0, 0);
         picture.close();
         this.#capturedS = new DataView(data).getFloat64(1, true);
-        this.#shownMs = performance.now();
+        this.#shownMs = this.#clock.nowMs;
         this.frames += 1;
         this.#place.dataset.frames = this.frames;
       } catch {
@@ -76,12 +81,12 @@ export class View {
       this.#place.classList.add("old");
       return;
     }
-    const silent = performance.now() - this.#shownMs > SILENT_MS;
+    const silent = this.#clock.nowMs - this.#shownMs > SILENT_MS;
     const ageS = this.#clock.ageS(this.#capturedS);
     const old = silent || (ageS !== null && ageS > OLD_S);
     this.#age.textContent = ageS === null ? "age unknown" : `${Math.max(0, ageS * 1000).toFixed(0)} ms old`;
     this.#place.classList.toggle("old", old);
     this.#stale.hidden = !old;
-    if (old) this.#stale.textContent = `STALE ${(ageS ?? (performance.now() - this.#shownMs) / 1000).toFixed(1)} s`;
+    if (old) this.#stale.textContent = `STALE ${(ageS ?? (this.#clock.nowMs - this.#shownMs) / 1000).toFixed(1)} s`;
   }
 }

@@ -174,3 +174,28 @@ def test_one_page_too_many_is_told_so_and_the_others_stay() -> None:
                 await desk.until(lambda: desk.counts[-1] == MOST_PAGES)
 
     run(story)
+
+
+def test_a_hidden_page_counts_for_nothing_and_is_shown_nothing_but_what_lasts() -> None:
+    async def story(desk: Desk, opens: Opens) -> None:
+        async with opens() as hidden, opens() as seen:
+            await desk.until(lambda: desk.counts == [1, 2])
+            await hidden.send('{"looks":false}')
+            await desk.until(lambda: desk.counts[-1] == 1)
+            desk.pages.show("facts", "1")
+            assert await a_round(seen) == ["1"]
+            await hidden.send('{"looks":true}')
+            await desk.until(lambda: desk.counts[-1] == 2)
+            desk.pages.show("facts", "2")
+            assert await a_round(hidden) == ["2"]
+
+    assert run(story).counts == [1, 2, 1, 2, 1, 0]
+
+
+def test_wishes_for_a_recording_are_passed_on() -> None:
+    async def story(desk: Desk, opens: Opens) -> None:
+        async with opens() as page:
+            await page.send('{"play":{"paused":true}}')
+            await desk.until(lambda: bool(desk.heard))
+
+    assert run(story).heard[0] == ("p", {"page": 1, "play": {"paused": True}})

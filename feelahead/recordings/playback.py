@@ -1,0 +1,82 @@
+"""A recording that is played: at which moment it is, how fast it goes, or that it rests."""
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import Any, Final
+
+import msgspec
+
+from common.recording.reading import Recording
+from feelahead.recordings.showing import Seen, seen
+
+SLOWEST: Final = 0.01
+FASTEST: Final = 1000.0
+
+
+class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a person wants of it; None: as it is."""
+
+    paused: bool | None = None
+    speed: float | None = None
+    at_s: float | None = None
+
+
+class Playback:
+    """Begins at the first moment, paused."""
+
+    def __init__(self, recording: Recording, speed: float = 1.0) -> None:
+        self.at_s = 0.0
+        """Since the recording began"""
+        self.length_s = recording.length_s()
+        self.speed = speed
+        """How many times as fast as it was"""
+        self.paused = True
+        self._recording = recording
+        self._coming = seen(recording)
+        self._jumped: list[Seen] = []
+
+    @property
+    def over(self) -> bool:
+        """Whether all was shown."""
+        return self.at_s >= self.length_s
+
+    def wish(self, content: Any) -> None:
+        """Do what a page says; what is no Wish, or out of range, is passed over."""
+        try:
+            wish = msgspec.convert(content, Wish)
+        except msgspec.ValidationError:
+            return
+        if wish.speed is not None and SLOWEST <= wish.speed <= FASTEST:
+            self.speed = wish.speed
+        if wish.at_s is not None and 0.0 <= wish.at_s <= self.length_s:
+            self._jump(wish.at_s)
+        if wish.paused is not None:
+            if self.over and not wish.paused:
+                self._jump(0.0)
+            self.paused = wish.paused
+
+    def advance(self, passed_s: float) -> list[Seen]:
+        """What is to be shown after `passed_s` more seconds: after a jump the newest of each name, as it was then."""
+        due, self._jumped = self._jumped, []
+        if not self.paused:
+            self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
+            due += self._until(self.at_s)
+            self.paused = self.over
+        return due
+
+    def state(self) -> dict[str, Any]:
+        """For the page."""
+        return {"at_s": self.at_s, "length_s": self.length_s, "speed": self.speed, "paused": self.paused}
+
+    def _jump(self, to_s: float) -> None:
+        if to_s < self.at_s:
+            self._coming = seen(self._recording)
+        self.at_s = to_s
+        self._jumped = list({one.name: one for one in (*self._jumped, *self._until(to_s))}.values())
+
+    def _until(self, end_s: float) -> Iterator[Seen]:
+        for one in self._coming:
+            if one.time_s > end_s:
+                self._coming = chain((one,), self._coming)
+                return
+            yield one
