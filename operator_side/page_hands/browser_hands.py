@@ -37,8 +37,9 @@ class BrowserHands:
     @property
     def doing(self) -> str:
         """What they do, in a word for people."""
-        running = self._pages.readiness is Readiness.RUNNING
-        return "arming" if running and not self._was_armed else str(self._pages.readiness)
+        if self._pages.readiness is not Readiness.RUNNING or self._moves:
+            return str(self._pages.readiness)
+        return "at rest first" if self._was_armed else "arming"
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Do with the controller what the page's hands do; the screen says whether the arm is armed."""

@@ -41,11 +41,17 @@ class Browser:
 
     @contextmanager
     def page(
-        self, address: str, size: tuple[int, int] = SMALL, *, scene: bool = False, gamepad: bool = False
+        self,
+        address: str,
+        size: tuple[int, int] = SMALL,
+        *,
+        scene: bool = False,
+        gamepad: bool = False,
+        script: str = "",
     ) -> Iterator["Page"]:
         """`address` open at `size`; whatever the page complained of fails the context's end.
 
-        `scene`: with the drawn scene, which without a graphics processor takes most of a core.
+        `scene`: with the drawn scene, which without a graphics processor takes most of a core. `script`: goes first.
         """
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
@@ -53,8 +59,7 @@ class Browser:
 
         try:
             opened = context.new_page()
-            if gamepad:
-                opened.add_init_script(_FAKE_GAMEPAD)
+            opened.add_init_script(script + (_FAKE_GAMEPAD if gamepad else ""))
             page = Page(opened, self._out)
             opened.goto(address)
             if not scene and (button := opened.query_selector(_DRAWS_SCENE)) is not None:
@@ -105,14 +110,14 @@ class Page:
 
     def pixels(self, selector: str | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """(height, width, 3) of what is drawn there, or of the whole page."""
-        return np.asarray(Image.open(io.BytesIO(self._shot(selector))).convert("RGB"))
+        return np.asarray(Image.open(io.BytesIO(self.shot(selector))).convert("RGB"))
 
     def picture(self, name: str) -> None:
         """Keep a picture of the page for people."""
-        (self._out / f"{name}.png").write_bytes(self._shot())
+        (self._out / f"{name}.png").write_bytes(self.shot())
 
-    def _shot(self, selector: str | None = None) -> bytes:
-        """As Chromium itself takes it: Playwright's way waits for the fonts of a scene that is busy drawing."""
+    def shot(self, selector: str | None = None) -> bytes:
+        """A PNG, as Chromium itself takes it: Playwright's way waits for the fonts of a scene that is busy drawing."""
         clip = {}
         if selector is not None:
             box = self.raw.locator(selector).bounding_box()

@@ -38,6 +38,10 @@ def nothing_overflows(stage: Stage) -> str:
             for selector in ("#l2", "#r2", "#charts", "#scene", "#state"):
                 _inside(page, selector, size)
             check(min(widths) >= 0.3 * size[0], f"{size}: views {widths} wide")
+            page.raw.click("#drive")
+            stage.run.wait_until("the page's hands", lambda run: run.facts[-1]["hands"] == "browser", 10.0)
+            for selector in ("#hands", "#tuning"):
+                _inside(page, selector, size)
             page.picture(f"page-{size[0]}x{size[1]}")
             said.append(f"{size[0]}x{size[1]}: views {min(widths):.0f} wide")
     return ", ".join(said)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import FeelaheadError
+from tests.console.film_of_replay import make_film
 from tests.console.pictures_of_page import make_first_minute
 from tests.console.pictures_of_recording import make_pictures_of_recording
 from tests.console.provide import default_cache, provide_playwright, provided_browser
@@ -18,13 +19,14 @@ from tests.containers.watch import CheckFailedError
 from tests.helpers.repository import ROOT
 from tests.kernel.skipped import SkippedError
 
-FIRST_MINUTE: Final = tuple(f"console/first-minute-{step}.png" for step in range(1, 4))
+FIRST_MINUTE: Final = tuple(f"console/first-minute-{step}.png" for step in range(1, 6))
 TERMINAL: Final = "console/terminal.svg"
 PLOT: Final = "recording/run.png"
-FILES: Final = (*FIRST_MINUTE, TERMINAL, PLOT)
+FILM: Final = "console/demo.webp"
+FILES: Final = (*FIRST_MINUTE, TERMINAL, PLOT, FILM)
 """Within docs/, and nothing else is in these folders."""
 _TRIES: Final = 3
-_PARTS: Final = ("first-minute", "recording")
+_PARTS: Final = ("first-minute", "recording", "film")
 
 
 def main() -> int:
@@ -60,7 +62,10 @@ def _make(part: str, docs: Path, cache: Path, say: Say) -> None:
             return
         program = provided_browser(say)
         provide_playwright(cache, say)
-        _place(docs, FIRST_MINUTE, lambda to: make_first_minute(program, folder, to, say), say)
+        if part == "film":
+            _place(docs, (FILM,), lambda to: make_film(program, folder, to, say), say)
+        else:
+            _place(docs, FIRST_MINUTE, lambda to: make_first_minute(program, folder, to, say), say)
 
 
 def _place(docs: Path, names: tuple[str, ...], make: Callable[[list[Path]], None], say: Say) -> None:

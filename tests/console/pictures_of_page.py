@@ -8,6 +8,7 @@ from typing import Final
 from PIL import Image
 
 from tests.console.browser import Page, browser
+from tests.console.checks_of_hands import is_armed, pull, take_over
 from tests.console.run import Run, running
 from tests.console.stage import DRAWN
 from tests.containers.debian import Say
@@ -17,6 +18,7 @@ _COLORS: Final = 256
 _STIFF: Final = 1
 _MEETS: Final = "parseInt(document.querySelector('#r2 .meets').textContent.match(/[0-9]+/)[0])"
 _FRESH: Final = f"{DRAWN} && document.querySelector('.view.old') === null"
+_PULLED: Final = 0.2
 _CALM_S: Final = 1.0
 _SETTLES_S: Final = 60.0
 _LOOK_S: Final = 0.1
@@ -29,8 +31,8 @@ _DRAWING: Final = """async (seconds) => {
 
 
 def make_first_minute(program: str, folder: Path, paths: Sequence[Path], say: Say) -> None:
-    """Open, near the target, carrying: three PNG of 1280x720."""
-    opened, near, carrying = paths
+    """Open, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
+    opened, near, carrying, driving, stopped = paths
     with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
         _settle(page)
         _keep(page, folder, opened)
@@ -38,6 +40,18 @@ def make_first_minute(program: str, folder: Path, paths: Sequence[Path], say: Sa
         run.wait_until("carrying", lambda run: _doing(run) == "carrying", 60.0)
         _keep(page, folder, carrying)
         say(f"drawn {page.ask(_DRAWING, 3.0):.0f} times a second")
+    with browser(program, folder) as one, running(()) as run, one.page(run.address) as page:
+        run.wait_until("advancing", lambda run: _doing(run) == "advancing", 60.0)
+        take_over(page, run)
+        with page.held("Space"):
+            page.wait_for_text("#hands_state", "You drive", 15.0)
+            with page.held("KeyW"):
+                run.wait_until("pulled", lambda run: pull(run) > _PULLED, 5.0)
+                _keep(page, folder, driving)
+        page.press("Escape")
+        run.wait_until("stopped", lambda run: not is_armed(run), 5.0)
+        page.wait("document.body.dataset.state == 'stopped'", "shown as stopped", 5.0)
+        _keep(page, folder, stopped)
 
 
 def _settle(page: Page) -> None:

@@ -26,7 +26,7 @@ from tests.containers.debian import Say
 from tests.containers.watch import CheckFailedError
 from tests.helpers.repository import ROOT
 
-_DURATION_S: Final = 18
+_DURATION_S: Final = 18.0
 _LIMIT_S: Final = 300.0
 _COLUMNS, _ROWS = 80, 24
 _COLORS: Final = 256
@@ -69,14 +69,19 @@ def make_pictures_of_recording(folder: Path, paths: Sequence[Path], say: Say) ->
     """Run and record a demo in `folder`, and draw it: the terminal view as an SVG, and its plot as a PNG."""
     terminal, plot = paths
     recording, drawn = folder / "demo.mcap", folder / "demo.png"
-    recording.unlink(missing_ok=True)
-    asked = ("--no-console", "--status=facts", f"--duration={_DURATION_S}", f"--record={recording}")
-    events = [json.loads(line) for line in _feelahead("demo", *asked).splitlines()]
+    events = record_demo(recording, _DURATION_S)
     say("a demo is recorded")
     _draw_terminal(_near(events), terminal)
     _feelahead("plot", str(recording), f"--out={drawn}")
     with Image.open(drawn) as whole:
         whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(plot, optimize=True)
+
+
+def record_demo(recording: Path, duration_s: float) -> list[dict[str, Any]]:
+    """Run a demo for so long; what it said."""
+    recording.unlink(missing_ok=True)
+    asked = ("--no-console", "--status=facts", f"--duration={duration_s}", f"--record={recording}")
+    return [json.loads(line) for line in _feelahead("demo", *asked).splitlines()]
 
 
 def _feelahead(*arguments: str) -> str:

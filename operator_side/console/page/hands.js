@@ -82,6 +82,11 @@ export class Hands {
     return this.#facts?.status.state === "armed";
   }
 
+  // Armed by the operator side's own hands, which may know it later than the status line.
+  get #moves() {
+    return this.#armed && this.#hands?.doing === "running";
+  }
+
   #keyDown(event) {
     if (event.code === "Escape") {
       event.preventDefault();
@@ -189,7 +194,7 @@ export class Hands {
       if (passedMs > HELD_UP_MS) this.#release("This page was held up.");
       if (nowMs - this.#factsMs > SILENCE_MS) this.#release("Nothing is heard from the operator side.");
     }
-    const moves = this.#state === "running" && this.#armed;
+    const moves = this.#state === "running" && this.#moves;
     const keys = this.#keys.read(passedMs / 1000, moves);
     let hands = both(keys.hands, this.#grips.read());
     if (there) hands = both(hands, pads.hands);
@@ -243,7 +248,7 @@ export class Hands {
   #draw() {
     const restMs = this.#upSinceMs === null ? REST_MS : Math.max(0, REST_MS - (performance.now() - this.#upSinceMs));
     this.#panel.show({
-      state: this.#state, why: this.#why, restMs, armed: this.#armed, facts: this.#facts, hands: this.#hands,
+      state: this.#state, why: this.#why, restMs, moves: this.#moves, facts: this.#facts, hands: this.#hands,
       mine: this.#hands?.driver === this.#page, level: this.#keys.level,
       stop: this.#stopMs === null ? null : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#stops },
     });

@@ -86,7 +86,7 @@ export class Panel {
     else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (not while the page has no focus)"}` : "");
   }
 
-  show({ state, why, restMs, armed, facts, hands, mine, level, stop }) {
+  show({ state, why, restMs, moves, facts, hands, mine, level, stop }) {
     const { drive, giveBack } = this.#places;
     this.#section.dataset.state = state;
     const cannot = hands === null ? "Nothing to drive is known yet."
@@ -102,7 +102,7 @@ export class Panel {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
       ready: "Ready: hold Space to arm and run.",
-      running: armed ? "You drive." : "Arming: keep holding.",
+      running: moves ? "You drive." : hands?.doing === "at rest first" ? "Let go of all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);

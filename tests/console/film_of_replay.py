@@ -1,0 +1,78 @@
+"""A moving picture of the console's page: a recorded demo, a picture at a time, however slowly a machine draws."""
+
+import io
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from PIL import Image
+
+from common.recording.reading import open_recording
+from feelahead.recordings.playback import Playback
+from feelahead.recordings.showing import FACTS, VIEW
+from operator_side.console.console import Console
+from operator_side.facts import OperatorFacts
+from tests.console.browser import Page, browser
+from tests.console.pictures_of_recording import record_demo
+from tests.containers.debian import Say
+from tests.containers.watch import CheckFailedError
+
+_DURATION_S: Final = 20.0
+_PERIOD_S: Final = 0.1
+_DRAWN_S: Final = 0.3
+"""Until the scene, which is another site's, has drawn what the page shows."""
+_START_S: Final = 60.0
+_SIZE: Final = (960, 540)
+_QUALITY: Final = 40
+_HAS_GRAPHICS: Final = """
+const asked = WebGLRenderingContext.prototype.getParameter;
+WebGLRenderingContext.prototype.getParameter = function (name) {
+  return name === 0x9246 ? "patient" : asked.call(this, name);
+};
+"""
+"""A page that draws by software asks for four drawings a second; this one has the time for all."""
+
+
+def make_film(program: str, folder: Path, paths: Sequence[Path], say: Say) -> None:
+    """20 s of a demo at 10 pictures a second, as a WebP."""
+    (path,) = paths
+    recording = folder / "film.mcap"
+    record_demo(recording, _DURATION_S)
+    say("a demo is recorded")
+    with browser(program, folder) as one, Console("film", live=False) as console:
+        _until(console, lambda: console.address is not None)
+        with one.page(str(console.address), scene=True, script=_HAS_GRAPHICS) as page:
+            _until(console, lambda: console.pages > 0)
+            pictures = list(_pictures(console, page, Playback(open_recording(recording))))
+    say(f"{len(pictures)} pictures")
+    first, *others = pictures
+    duration_ms = round(1e3 * _PERIOD_S)
+    first.save(path, save_all=True, append_images=others, duration=duration_ms, loop=0, quality=_QUALITY, method=4)
+
+
+def _pictures(console: Console, page: Page, playback: Playback) -> Iterator[Image.Image]:
+    facts = msgspec.json.Decoder(OperatorFacts)
+    playback.paused = False
+    while not playback.over:
+        for seen in playback.advance(_PERIOD_S):
+            if seen.kind == FACTS:
+                console.facts(facts.decode(seen.content))
+            elif seen.kind == VIEW:
+                console.view(seen.content, video=False)
+        console.played(playback.state())
+        page.wait_for_text("#player", f"{playback.at_s:.1f} of")
+        time.sleep(_DRAWN_S)
+        console.receive()
+        with Image.open(io.BytesIO(page.shot())) as whole:
+            yield whole.convert("RGB").resize(_SIZE, Image.Resampling.LANCZOS)
+
+
+def _until(console: Console, holds: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + _START_S
+    while not holds():
+        console.receive()
+        if console.gone or time.monotonic() > end_s:
+            raise CheckFailedError(f"no page of the console within {_START_S:g} s: {console.take_notes()}")
+        time.sleep(0.01)
