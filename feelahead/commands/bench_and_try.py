@@ -103,6 +103,12 @@ bench = Menu(
             "bench_effects",
             "how long it takes from a change of stiffness until the controller is told",
         ),
+        "tick": Entry(
+            "feelahead.benchmarks.tick.bench",
+            "bench_tick",
+            "what a tick of the robot side costs in the real process, stage by stage and by objects",
+            _BOTH_SIDES,
+        ),
         "viewing": Entry(
             "feelahead.benchmarks.viewing.bench",
             "bench_viewing",

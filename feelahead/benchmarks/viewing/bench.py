@@ -108,7 +108,7 @@ def _measure(link: str, count: int, settings: ViewingSettings, advance: Callable
         log = Path(folder) / "ticks.npy"
         arguments = [f"--log={log}", "--bind=tcp://127.0.0.1:0", *([f"--link={link}"] if link else [])]
         arguments += [f"--record={folder}/run.mcap"] if settings.record else []
-        with SideProcess("feelahead.benchmarks.viewing.timed_robot", "robot", arguments) as robot:
+        with SideProcess("feelahead.benchmarks.tick.timed_robot", "robot", arguments) as robot:
             listening = robot.wait_for("listening", _STARTING_S)
             viewers = [Viewer(listening["control"], listening["view"], secrets.randbits(53)) for _ in range(_VIEWERS)]
             everything = {"overview": True, "first_person": True, "scene": True}

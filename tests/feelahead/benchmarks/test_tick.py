@@ -1,0 +1,69 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.errors import ConfigurationError
+from feelahead.benchmarks.tick.bench import Ticks, bench_tick
+from feelahead.benchmarks.tick.crowd import MIDDLE_M, NEAREST_M, Crowd, CrowdedCamera
+from feelahead.benchmarks.tick.timed_robot import COLUMNS, STAGES
+from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.validity import require_valid
+from tests.helpers.perceived_scenes import Scene
+
+
+class Seen:
+    """A camera whose frame is the same until it is told of another."""
+
+    def __init__(self, frame: PerceivedObjects) -> None:
+        self.frame = frame
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        del now_s
+        return self.frame
+
+    def set_role(self, name: str, role: Role) -> None:
+        del name, role
+
+
+@pytest.mark.parametrize("kind", ["mixed", "spheres", "boxes", "tetrahedra"])
+def test_a_crowd_is_valid_and_out_of_the_way(kind: str) -> None:
+    crowd = Crowd(100, 10, kind)
+    camera = Seen(Scene().objects())
+    frame = CrowdedCamera(camera, crowd).perceive(0.0)
+    require_valid(frame)
+    assert len(frame.names) == len(set(frame.names)) == 100
+    owners = np.concatenate([frame.sphere_object, frame.box_object, frame.tetrahedron_object])
+    assert sorted(owners) == list(range(100))
+    assert np.linalg.norm(crowd.centers_m - MIDDLE_M, axis=1).min() >= NEAREST_M
+
+
+def test_the_crowd_is_the_same_until_there_is_a_newer_frame() -> None:
+    camera = Seen(Scene().objects())
+    crowded = CrowdedCamera(camera, Crowd(6, 3, "spheres"))
+    first = crowded.perceive(0.0)
+    assert crowded.perceive(0.001) is first
+    camera.frame = replace(Scene().objects(), time_s=1.0)
+    second = crowded.perceive(1.0)
+    moved = np.any(second.sphere_centers_m != first.sphere_centers_m, axis=1)
+    assert moved.tolist() == [True] * 3 + [False] * 3
+
+
+def test_what_is_asked_of_the_way_from_look_to_message_leaves_out_physics_and_frames() -> None:
+    row = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 100e-6, "physics": 30e-6, "frame": 20e-6, STAGES[3]: 40e-6}
+    ticks = Ticks("one", np.array([[row[column] for column in COLUMNS]] * 3), {}, 0.5)
+    assert ticks.look_to_message_us == pytest.approx([50.0] * 3)
+    assert ticks.without_physics_us == pytest.approx([70.0] * 3)
+
+
+@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"], ["--seconds", "nan"]])
+def test_values_out_of_range_are_refused(arguments: list[str]) -> None:
+    with pytest.raises(ConfigurationError, match="valid"):
+        bench_tick(arguments)
+
+
+def test_a_crowd_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="--kind stars"):
+        Crowd(3, 0, "stars")
+    with pytest.raises(ValueError, match="--moving 4"):
+        Crowd(3, 4)
