@@ -34,6 +34,8 @@ class Playback:
         self._recording = recording
         self._coming = seen(recording)
         self._jumped: list[Seen] = []
+        self._newest: dict[str, Seen] = {}
+        """What is shown now, by name"""
 
     @property
     def over(self) -> bool:
@@ -62,7 +64,12 @@ class Playback:
             self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
             due += self._until(self.at_s)
             self.paused = self.over
+        self._newest.update((one.name, one) for one in due)
         return due
+
+    def show_again(self) -> None:
+        """Give the present moment once more with the next step: somebody came to look who has not seen it."""
+        self._jumped = list((self._newest | {one.name: one for one in self._jumped}).values())
 
     def state(self) -> dict[str, Any]:
         """For the page."""
@@ -71,6 +78,7 @@ class Playback:
     def _jump(self, to_s: float) -> None:
         if to_s < self.at_s:
             self._coming = seen(self._recording)
+            self._newest.clear()
         self.at_s = to_s
         self._jumped = list({one.name: one for one in (*self._jumped, *self._until(to_s))}.values())
 

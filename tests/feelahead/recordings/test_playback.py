@@ -76,3 +76,16 @@ def test_what_is_no_wish_changes_nothing(recording: Recording, words: Any) -> No
     before = playback.state()
     playback.wish(words)
     assert playback.state() == before
+
+
+def test_who_comes_to_look_later_sees_the_moment_at_which_it_rests(recording: Recording) -> None:
+    playback = Playback(recording)
+    playback.wish({"at_s": 3.0})
+    shown = newest(playback.advance(0.02))
+    assert playback.advance(0.02) == []
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == shown
+    assert playback.advance(0.02) == []
+    playback.wish({"at_s": 1.0})
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == newest([one for one in seen(recording) if one.time_s <= 1.0])
