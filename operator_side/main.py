@@ -268,7 +268,7 @@ class _Loop:
         """What no message should wait for."""
         if self.recording is not None:
             for text in self.recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
-                self._status.note(text)
+                self._viewing.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S

@@ -1,6 +1,7 @@
 """The file itself, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
 
 import errno
+import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,9 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 from common.recording.topics import BINARY, ENCODING, PROFILE, SCHEMAS
 
 _NANOSECONDS: Final = 1e9
+
+# What cannot be written is kept in `error`, and told once by whoever records.
+logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 
 
 class RecordingFile:
@@ -110,7 +114,10 @@ class RecordingFile:
             if self.error is None:
                 self.error = self._output.error or str(error)
             return False
-        return True
+        # A message within a chunk may fail without a word to us, and each after it once more.
+        if self.error is None:
+            self.error = self._output.error
+        return self._output.error is None
 
 
 class _Output:
@@ -120,22 +127,33 @@ class _Output:
         self.error: str | None = None
         self.end = 0
         self._given_up = False
+        self._position = 0
+        """Where the library takes itself to be: it panics where it is not"""
         self._file = path.open("xb", buffering=0)
 
     def write(self, data: bytes | bytearray) -> int:
-        if self._given_up:
-            return len(data)
+        if not self._given_up:
+            self._write(data)
+        self._position += len(data)
+        return len(data)
+
+    def _write(self, data: bytes | bytearray) -> None:
         try:
             if self._file.write(data) != len(data):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             self.error = error.strerror or str(error)
+            # All of it comes again: a part that found room is not to stand before it.
+            self._file.seek(self._position)
             raise
-        self.end = max(self.end, self._file.tell())
-        return len(data)
+        self.end = max(self.end, self._position + len(data))
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        return self._file.seek(offset, whence)
+        if self._given_up and whence != os.SEEK_END:
+            self._position = offset if whence == os.SEEK_SET else self._position + offset
+        else:
+            self._position = self._file.seek(offset, whence)
+        return self._position
 
     def flush(self) -> None:
         """Nothing waits here."""

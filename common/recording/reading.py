@@ -9,6 +9,7 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -44,6 +45,8 @@ class Recording:
     """What each recorded side's core was made from, by side"""
     whole: bool
     """Whether it was finished; else it ends at the last complete second"""
+    readable: int | None = None
+    """How many chunks come before one that is not as it was written; None where all are"""
 
     def began_ns(self) -> int:
         """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
@@ -51,7 +54,8 @@ class Recording:
 
     def length_s(self) -> float:
         """From the first message to the last one in a chunk that is there, seconds."""
-        ends_ns = [_SPAN.unpack_from(content)[1] for _, content in _records(self.path, (_CHUNK,))]
+        chunks = islice(_records(self.path, (_CHUNK,)), self.readable)
+        ends_ns = [_SPAN.unpack_from(content)[1] for _, content in chunks]
         return 1e-9 * (max(ends_ns) - self.began_ns()) if ends_ns else 0.0
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
@@ -82,7 +86,20 @@ def open_recording(path: Path) -> Recording:
         raise ConfigurationError(
             f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
         )
-    return Recording(path, headers, any(opcode == _DATA_END for opcode, _ in _records(path, (_DATA_END,))))
+    whole = any(opcode == _DATA_END for opcode, _ in _records(path, (_DATA_END,)))
+    return Recording(path, headers, whole, _readable(path))
+
+
+def _readable(path: Path) -> int | None:
+    from mcap.records import Chunk  # noqa: PLC0415
+    from mcap.stream_reader import get_chunk_data_stream  # noqa: PLC0415
+
+    for number, (_, content) in enumerate(_records(path, (_CHUNK,))):
+        try:
+            get_chunk_data_stream(Chunk.read(_stream(content)), validate_crc=True)
+        except Exception:  # as in whole_chunks
+            return number
+    return None
 
 
 def described(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
@@ -90,7 +107,13 @@ def described(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
     from mcap.records import Metadata  # noqa: PLC0415
 
     for _, content in _records(path, (_METADATA,)):
-        metadata = Metadata.read(_stream(content))
+        try:
+            metadata = Metadata.read(_stream(content))
+        # As with chunks: the library says in many ways that bytes are not what they were.
+        except Exception as error:
+            raise ConfigurationError(
+                f"{path}: what it says of itself is damaged; valid: a file as --record made it"
+            ) from error
         yield metadata.name, metadata.metadata
 
 
@@ -123,6 +146,8 @@ def _value(text: str) -> Any:
 def _records(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, bytes]]:
     """Each whole record of a wanted kind, as (opcode, content)."""
     try:
+        if path.is_fifo():
+            raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a recording's file")
         file = path.open("rb")
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error

@@ -29,6 +29,7 @@ STATUS_PERIOD_S: Final = 0.1
 _READY_LIMIT_S: Final = 20.0
 _LEAVE_LIMIT_S: Final = 0.5
 _FINISH_LIMIT_S: Final = 20.0
+KILLED: Final = "the recorder was killed"
 
 
 class Encoder(Protocol):
@@ -133,7 +134,7 @@ class SideRecording:
         elif self._channel.ended and not self._gone:
             self._gone = True
             if self._said["error"] is None:
-                self._said["error"] = "the recorder was killed"
+                self._said["error"] = KILLED
                 self._notes.append(f"the recorder is gone, and nothing more is recorded; {self._kept()}")
 
     def _kept(self) -> str:
@@ -194,12 +195,17 @@ class Recorder:
 
     def finish(self) -> dict[str, Any]:
         """Let the file be finished once every side is through; what is in it."""
-        self.channel.send(END)
         said: dict[str, Any] = {"kept_s": 0.0, "bytes": 0, "error": None}
-        while (message := _wait_for_answer(self.channel, _READY_LIMIT_S)) is not None:
+        ended = False
+        # What it said up to now comes first: to send something to one that is gone would lose it.
+        for message in self.channel.receive():
             said |= json.loads(message)
-            if said.pop("ended", False):
-                break
+        self.channel.send(END)
+        while not ended and (answer := _wait_for_answer(self.channel, _READY_LIMIT_S)) is not None:
+            said |= json.loads(answer)
+            ended = said.pop("ended", False)
+        if not ended and said["error"] is None:
+            said["error"] = KILLED
         self.close()
         return said
 

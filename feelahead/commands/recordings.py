@@ -72,7 +72,11 @@ class PlotSettings:
 def _open(path: Path | None) -> Recording:
     if path is None:
         raise ConfigurationError("no recording given; valid: the path of a file that --record made")
-    return open_recording(path)
+    recording = open_recording(path)
+    if recording.readable is not None or not recording.whole:
+        why = "is damaged" if recording.readable is not None else "was cut off"
+        sys.stderr.write(f"feelahead: {path}: {why}; what can be read of it: {recording.length_s():.1f} s\n")
+    return recording
 
 
 def replay(arguments: Sequence[str]) -> int:
@@ -93,12 +97,16 @@ def _check(recording: Recording) -> int:
         from feelahead.recordings.replay import replay_operator, replay_robot  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise ConfigurationError(f"replay: {error.name} is not installed; {_BOTH_SIDES}") from error
-    within = True
+    within, made = True, 0
     for side, make in (("robot", replay_robot), ("operator", replay_operator)):
         if side in recording.headers:
             compared = make(recording)
             within &= compared.within
+            made += compared.made
             sys.stdout.write("\n".join(compared.lines()) + "\n")
+    if not made:
+        sys.stdout.write("nothing was compared: it holds nothing to make anew\n")
+        return 1
     sys.stdout.write("the same, within what is promised\n" if within else "NOT the same\n")
     return 0 if within else 1
 

@@ -34,7 +34,7 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
     with StopSignal() as stop, Status("line", _PROGRAM) as status, Console(title, port=port, live=False) as console:
         facts = msgspec.json.Decoder(OperatorFacts)
         playback = Playback(recording, speed)
-        opened, since_s = False, 0.0
+        opened, came, since_s = False, 0, 0.0
         said: dict[str, Any] = {}
 
         def look(seconds: float) -> bool:
@@ -58,6 +58,9 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
         for passed_s in _passing(look):
             if console.pages and not opened:
                 opened, playback.paused = True, False
+            if console.came != came:
+                came = console.came
+                playback.show_again()
             while console.playing:
                 playback.wish(console.playing.popleft().play)
             for one in playback.advance(passed_s):

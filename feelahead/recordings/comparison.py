@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from common.errors import ConfigurationError, RemoteProtocolError
 from common.protocol.codec import decode
@@ -14,6 +14,7 @@ from operator_side.dualsense.reports.output_report import OutputReport, parse_ou
 
 WITHIN_EIGHTHS = 1.0
 WITHIN_M = 1e-12
+_NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 
 @dataclass
@@ -87,7 +88,9 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
             )
             return
         yield from block.unpacked()
-    if not recording.whole:
+    if recording.readable is not None:
+        notes.append("the file is damaged: compared up to there")
+    elif not recording.whole:
         notes.append("the file was cut off: compared up to its last complete second")
 
 
@@ -111,7 +114,10 @@ def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
         raise ConfigurationError(
             f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
         )
-    return dict(recording.headers[side])
+    header = dict(recording.headers[side])
+    if missing := [name for name in _NEEDED if name not in header]:
+        raise ConfigurationError(f"{recording.path}: does not say the {side} side's {missing[0]}; valid: a whole file")
+    return header
 
 
 def _is_stiffness(payload: bytes | None) -> bool:

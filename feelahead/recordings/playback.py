@@ -1,13 +1,13 @@
 """A recording that is played: at which moment it is, how fast it goes, or that it rests."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Any, Final
 
 import msgspec
 
 from common.recording.reading import Recording
-from feelahead.recordings.showing import Seen, seen
+from feelahead.recordings.showing import FACTS, Seen, seen
 
 SLOWEST: Final = 0.01
 FASTEST: Final = 1000.0
@@ -34,6 +34,8 @@ class Playback:
         self._recording = recording
         self._coming = seen(recording)
         self._jumped: list[Seen] = []
+        self._newest: dict[str, Seen] = {}
+        """What is shown now, by name"""
 
     @property
     def over(self) -> bool:
@@ -62,7 +64,12 @@ class Playback:
             self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
             due += self._until(self.at_s)
             self.paused = self.over
+        self._newest.update((one.name, one) for one in due)
         return due
+
+    def show_again(self) -> None:
+        """Give the present moment once more with the next step: somebody came to look who has not seen it."""
+        self._jumped = _newest((*self._newest.values(), *self._jumped))
 
     def state(self) -> dict[str, Any]:
         """For the page."""
@@ -71,8 +78,9 @@ class Playback:
     def _jump(self, to_s: float) -> None:
         if to_s < self.at_s:
             self._coming = seen(self._recording)
+            self._newest.clear()
         self.at_s = to_s
-        self._jumped = list({one.name: one for one in (*self._jumped, *self._until(to_s))}.values())
+        self._jumped = _newest((*self._jumped, *self._until(to_s)))
 
     def _until(self, end_s: float) -> Iterator[Seen]:
         for one in self._coming:
@@ -80,3 +88,8 @@ class Playback:
                 self._coming = chain((one,), self._coming)
                 return
             yield one
+
+
+def _newest(many: Iterable[Seen]) -> list[Seen]:
+    """Of each name; the facts first, by whose clock pictures are old or not."""
+    return sorted({one.name: one for one in many}.values(), key=lambda one: one.kind != FACTS)

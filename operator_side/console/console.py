@@ -38,6 +38,8 @@ class Console:
         """Where its page is, with the token that lets in; None until it is ready, and when it is gone."""
         self.pages = 0
         """How many are open: with none, nothing needs to be sent or rendered."""
+        self.came = 0
+        """How often one came to look."""
         self.hands: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         self.tuning: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         self.playing: deque[PageWords] = deque(maxlen=_MOST_HEARD)
@@ -96,7 +98,8 @@ class Console:
             if kind == b"a":
                 self.address = content.decode()
             elif kind == b"w":
-                self.pages = int(content)
+                before, self.pages = self.pages, int(content)
+                self.came += self.pages > before
             elif kind == b"e":
                 self._end(f"no console: {content.decode()}")
                 return

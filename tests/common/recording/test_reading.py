@@ -1,6 +1,7 @@
 """A recording opens wherever it was cut, up to the last complete second; what is none is told in one line."""
 
 import itertools
+import os
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,29 @@ def test_a_folder_and_a_missing_file(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "missing.mcap"):
         with pytest.raises(ConfigurationError, match="cannot be read"):
             open_recording(path)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
+        open_recording(tmp_path / "pipe.mcap")
+
+
+def test_a_damaged_description_is_told_in_one_line(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
+    content = short[0]
+    path = tmp_path / "damaged.mcap"
+    begin = content.index(b"feelahead.robot")
+    told: list[str] = []
+    for place in range(begin - 8, begin + 80):
+        spoilt = bytearray(content)
+        spoilt[place] ^= 0x80
+        path.write_bytes(spoilt)
+        try:
+            open_recording(path)
+        except ConfigurationError as error:
+            told.append(str(error))
+    assert any("what it says of itself is damaged; valid: " in text for text in told)
+    assert not any("\n" in text for text in told)
 
 
 def test_another_format_is_told(tmp_path: Path) -> None:

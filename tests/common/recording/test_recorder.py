@@ -146,6 +146,20 @@ def test_two_sides_share_one_file(tmp_path: Path) -> None:
     assert numbers(path) == [*range(counts[0]), *range(more)]
 
 
+def test_a_recorder_of_two_sides_that_was_killed_is_told_with_what_it_kept(tmp_path: Path) -> None:
+    path, place = tmp_path / "run.mcap", tmp_path / "recorder"
+    recorder = Recorder(path, place)
+    robot = recording_to(place)
+    note_until(robot, lambda: kept_s(robot) > FLUSH_PERIOD_S)
+    os.kill(recorder.process_id, signal.SIGKILL)
+    note_until(robot, lambda: robot._channel.ended)
+    robot.close()
+    figures = recorder.finish()
+    assert figures["error"] == "the recorder was killed"
+    assert figures["kept_s"] > 0.0
+    assert 0 < figures["bytes"] <= path.stat().st_size
+
+
 def test_what_a_recorder_has_no_room_for_is_dropped_counted_and_said(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     recording = recording_to(path)

@@ -6,7 +6,7 @@ import pytest
 
 from common.recording.reading import Recording
 from feelahead.recordings.playback import Playback
-from feelahead.recordings.showing import Seen, seen
+from feelahead.recordings.showing import FACTS, VIEW, Seen, seen
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
@@ -76,3 +76,24 @@ def test_what_is_no_wish_changes_nothing(recording: Recording, words: Any) -> No
     before = playback.state()
     playback.wish(words)
     assert playback.state() == before
+
+
+def test_who_comes_to_look_later_sees_the_moment_at_which_it_rests(recording: Recording) -> None:
+    playback = Playback(recording)
+    playback.wish({"at_s": 3.0})
+    shown = newest(playback.advance(0.02))
+    assert playback.advance(0.02) == []
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == shown
+    assert playback.advance(0.02) == []
+    playback.wish({"at_s": 1.0})
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == newest([one for one in seen(recording) if one.time_s <= 1.0])
+
+
+def test_after_a_jump_the_clock_comes_before_the_pictures(recording: Recording) -> None:
+    playback = Playback(recording)
+    playback.wish({"at_s": playback.length_s})
+    shown = playback.advance(0.02)
+    assert {one.kind for one in shown} >= {FACTS, VIEW}
+    assert shown[0].kind == FACTS

@@ -72,6 +72,28 @@ def test_a_cut_file_is_compared_up_to_its_last_complete_second(run: Recording, t
     assert compared.notes == ["the file was cut off: compared up to its last complete second"]
 
 
+def test_damage_is_said_and_what_comes_before_is_compared(
+    run: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    damaged = tmp_path / "damaged.mcap"
+    content = bytearray(run.path.read_bytes())
+    content[len(content) // 3] ^= 4
+    damaged.write_bytes(content)
+    assert replay([str(damaged), "--check"]) == 0
+    said = capsys.readouterr()
+    assert "robot: the file is damaged: compared up to there" in said.out
+    assert f"{damaged}: is damaged; what can be read of it: " in said.err
+    assert 0.0 < open_recording(damaged).length_s() < run.length_s()
+
+
+def test_nothing_to_compare_is_not_the_same(run: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    short = tmp_path / "short.mcap"
+    content = run.path.read_bytes()
+    short.write_bytes(content[: content.index(b"feelahead.robot") + 5000])
+    assert replay([str(short), "--check"]) == 1
+    assert "nothing was compared" in capsys.readouterr().out
+
+
 def some_stiffness(run: Recording) -> bytes:
     for one in recorded_entries(run, "robot", []):
         if one.kind == Kind.SENT:
