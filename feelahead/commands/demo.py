@@ -75,6 +75,8 @@ class DemoSettings(RunOptions):
     """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
     """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
+    console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
+    """Where the console's page is on this machine; 0: any port that is free."""
     tui: bool = False
     """The whole terminal instead of a line, for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -84,6 +86,8 @@ class DemoSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not 0 <= self.console_port <= 65535:
+            raise ValueError(f"--console-port {self.console_port}: valid: 0 to 65535")
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.scene is not None and self.model is not None:
@@ -181,7 +185,7 @@ def _operator_arguments(
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
-    arguments.append("--console" if settings.console else "--no-console")
+    arguments += ["--console" if settings.console else "--no-console", f"--console-port={settings.console_port}"]
     if settings.tui or settings.status == "facts":
         arguments.append("--status=facts")
     if "compensation" in given:
@@ -267,6 +271,8 @@ def _report(summary: dict[str, Any]) -> list[str]:
         for name, delay in delays.items()
         if delay.get("mean") is not None and delay.get("sd") is not None
     ]
+    kept = summary.get("recording")
+    recorded = [] if kept is None else [f"recorded: {kept['kept_s']:.1f} s, {kept['bytes'] / 1e6:.1f} MB"]
     task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
     grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
     placing = task["placing"]
@@ -276,6 +282,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
         f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
         f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
         f"contacts with obstacles: {task['obstacle_contacts']}",
+        *recorded,
     ]
 
 

@@ -1,7 +1,9 @@
 """`feelahead replay`, `export` and `plot`: what can be done with a recording."""
 
+import struct
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,7 +11,7 @@ from typing import Annotated, Literal
 import tyro
 
 from common.command.command_line import parse_settings
-from common.errors import ConfigurationError
+from common.errors import ConfigurationError, FeelaheadError
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 
@@ -79,10 +81,27 @@ def _open(path: Path | None) -> Recording:
     return recording
 
 
+@contextmanager
+def _recording(path: Path | None) -> Iterator[Recording]:
+    """A recording to work with: whatever cannot be made of its content is one line."""
+    recording = _open(path)
+    try:
+        yield recording
+    except (FeelaheadError, OSError):
+        raise
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError, struct.error) as error:
+        what = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise ConfigurationError(f"{path}: holds what no recording of ours does ({what:.200})") from error
+
+
 def replay(arguments: Sequence[str]) -> int:
     """Show or check."""
     settings = parse_settings(ReplaySettings, "feelahead replay", arguments)
-    recording = _open(settings.file)
+    with _recording(settings.file) as recording:
+        return _replay(settings, recording)
+
+
+def _replay(settings: ReplaySettings, recording: Recording) -> int:
     if settings.check:
         return _check(recording)
     from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415
@@ -114,7 +133,11 @@ def _check(recording: Recording) -> int:
 def export(arguments: Sequence[str]) -> int:
     """Write the files."""
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
-    recording = _open(settings.file)
+    with _recording(settings.file) as recording:
+        return _export(settings, recording)
+
+
+def _export(settings: ExportSettings, recording: Recording) -> int:
     if settings.format == "mcap":
         from common.recording.mending import mend  # noqa: PLC0415
 
@@ -154,7 +177,11 @@ def _empty_folder(path: Path) -> Path:
 def plot(arguments: Sequence[str]) -> int:
     """Draw the page."""
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
-    recording = _open(settings.file)
+    with _recording(settings.file) as recording:
+        return _plot(settings, recording)
+
+
+def _plot(settings: PlotSettings, recording: Recording) -> int:
     out = recording.path.with_suffix(".png") if settings.out is None else settings.out
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigurationError(f"--out {out}: valid: a file that ends in .png, .svg or .pdf")

@@ -69,12 +69,18 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
             draw(figure, axis, joined, times_s)
             axis.margins(x=0)
         axes[-1].set_xlabel("time since the recording began (s)")
-        axes[0].legend(loc="upper right", ncols=2)
+        _name_lines(axes[0], 2)
         figure.align_ylabels()
         figure.suptitle(_title(recording, tables), fontsize=8.5, x=0.01, ha="left")
         figure.legend(handles=_band_handles(), loc="upper right", title="state of the robot side", fontsize=7)
         figure.savefig(out, dpi=200)
         pyplot.close(figure)
+
+
+def _name_lines(axis: Any, columns: int) -> None:
+    """Say which line is which, where there are any: a short run may have none."""
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper right", ncols=columns)
 
 
 def _title(recording: Recording, tables: Tables) -> str:
@@ -155,7 +161,7 @@ def _speed(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     axis.axhline(0.0, color=_GREY, lw=0.5)
     axis.set_ylabel("speed (mm/s)")
     axis.set_title("Speed along the approach")
-    axis.legend(loc="upper right", ncols=2)
+    _name_lines(axis, 2)
 
 
 def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
@@ -191,7 +197,7 @@ def _distances(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     axis.set_ylabel("distance (mm)")
     axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
     axis.set_title("Perceived distances of the unenlarged gripper")
-    axis.legend(loc="upper right", ncols=2)
+    _name_lines(axis, 2)
 
 
 def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
@@ -212,4 +218,4 @@ def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel("age (ms)")
     axis.set_title("How old what is used is")
-    axis.legend(loc="upper right", ncols=4)
+    _name_lines(axis, 4)

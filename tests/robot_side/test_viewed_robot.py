@@ -10,7 +10,7 @@ import pytest
 
 from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
 from feelahead.benchmarks.viewing.companion_process import companion_of
-from feelahead.benchmarks.viewing.viewer import Seen, Viewer
+from feelahead.benchmarks.viewing.viewer import Seen, Viewer, look
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
 from robot_side.cameras.pictures import RETRY_S
@@ -34,7 +34,7 @@ def viewed(*arguments: str) -> Iterator[tuple[SideProcess, Viewer]]:
 def look_until(viewer: Viewer, enough: Callable[[Seen], bool], **what: bool) -> Seen:
     """Look in short stretches until one of them shows enough."""
     for _ in range(round(PATIENCE_S)):
-        seen = viewer.look(1.0, **what)
+        seen = look([viewer], 1.0, **what)
         if enough(seen):
             return seen
     return pytest.fail("nothing to be seen")
@@ -53,7 +53,7 @@ def said_of_cameras(robot: SideProcess) -> list[str]:
 def works_here(robot: SideProcess, viewer: Viewer) -> None:
     """Skip where nothing can be rendered, with the reason that the robot side gives."""
     for _ in range(round(PATIENCE_S)):
-        if frames(viewer.look(1.0, overview=True, first_person=True)):
+        if frames(look([viewer], 1.0, overview=True, first_person=True)):
             return
         for said in said_of_cameras(robot):
             pytest.skip(said)
@@ -80,14 +80,14 @@ def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_com
         companion = companion_of(robot.process_id)
         assert companion is not None
         os.kill(companion, signal.SIGKILL)
-        gone = viewer.look(1.0, overview=True)
+        gone = look([viewer], 1.0, overview=True)
         # Ticks go on: the owner's stiffness comes as before.
         assert len(gone.stiffness_ages_s) > 100
         again = look_until(viewer, lambda seen: bool(frames(seen)), overview=True)
         assert again.began_s - gone.began_s > RETRY_S - 2.0
         assert companion_of(robot.process_id) not in (None, companion)
-        viewer.look(0.5)
-        assert viewer.look(1.0).views == []
+        look([viewer], 0.5)
+        assert look([viewer], 1.0).views == []
     summary = read_summary(path)
     assert summary["errors"] == []
     assert summary["looked_at"]["companion"]["starts"] == 2
@@ -131,5 +131,5 @@ def test_a_machine_that_cannot_render_is_told_what_helps(monkeypatch: pytest.Mon
         assert "osmesa: " in said[0]
         assert "apt-get install libegl1" in said[0]
         assert len(seen.stiffness_ages_s) > 100
-        viewer.look(2.0, overview=True)
+        look([viewer], 2.0, overview=True)
         assert said_of_cameras(robot) == []

@@ -63,7 +63,18 @@ function receive(message) {
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
     byId("player").hidden = run.live;
-  } else if (message.kind === "player") player.show(message);
+  } else if (message.kind === "player") {
+    player.show(message);
+    if (!facts) goWithoutFacts(message.at_s);
+  }
+}
+
+// A robot side that was recorded alone: its pictures and its scene are there, and nothing is known of an operator side.
+function goWithoutFacts(atS) {
+  everHeard = true;
+  clock.set(atS, null);
+  text("state", "RECORDED");
+  text("why", "the robot side alone · replay");
 }
 
 function text(id, value, bad = false) {

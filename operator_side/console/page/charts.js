@@ -1,5 +1,6 @@
 // A line for each series over the last 20 seconds; series differ by dashes, not by colour alone.
 const SPAN_MS = 20000;
+const GAP_MS = 1000; // nothing is known of what was in between
 const FONT = "system-ui, sans-serif";
 
 function roundUp(value) {
@@ -86,9 +87,11 @@ export class Chart {
       context.fillText(words, along + 22, 27);
       along += 32 + context.measureText(words).width;
       context.beginPath();
-      let drawing = false;
+      let drawing = false, beforeMs = -Infinity;
       for (const [atMs, values] of this.#samples) {
         const value = values[index];
+        if (atMs - beforeMs > GAP_MS) drawing = false;
+        beforeMs = atMs;
         if (!Number.isFinite(value)) drawing = false;
         else if (drawing) context.lineTo(x(atMs), y(value));
         else {

@@ -10,7 +10,10 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.recording import packages
+from common.recording.content import Content
+from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
+from common.recording.wire import HEADER, as_json
 from feelahead.commands.demo import demo
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.recordings.replay import replay_operator, replay_robot
@@ -29,6 +32,18 @@ def test_what_is_no_recording(command: Callable[[Sequence[str]], int], tmp_path:
     ):
         with pytest.raises(ConfigurationError, match=told) as caught:
             command(arguments)
+        assert "\n" not in str(caught.value)
+
+
+def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "odd.mcap"
+    file = RecordingFile(path, 0.0)
+    Content(file).take(0, HEADER + as_json({"side": "robot"}))
+    file.write("/robot/inputs", 0.0, b"no block")
+    file.close()
+    for command in COMMANDS[1:]:
+        with pytest.raises(ConfigurationError, match=r"odd\.mcap: ") as caught:
+            command([str(path), "--out", str(tmp_path / f"{command.__name__}.png")])
         assert "\n" not in str(caught.value)
 
 
