@@ -159,31 +159,3 @@ def test_bad_limits_are_named() -> None:
         for value in (0.0, -1.0, math.nan, math.inf):
             with pytest.raises(ValueError, match=name):
                 MotionLimits(**{name: value})
-
-
-def test_each_kind_of_drive_gives_the_torque_that_is_wanted() -> None:
-    # A position servo, a velocity servo and a motor, all geared, in that order.
-    drives = JointDrives(
-        gear=np.array([2.0, 2.0, 5.0]),
-        gain=np.array([300.0, 40.0, 3.0]),
-        offset=np.array([1.0, -1.0, 0.0]),
-        strongest=np.full(3, np.inf),
-        stiffness=np.array([100.0, 0.0, 0.0]),
-        damping=np.array([10.0, 40.0, 0.0]),
-    )
-    np.testing.assert_array_equal(drives.is_motor, [False, False, True])
-    position, velocity, load = np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]), np.array([5.0, 6.0, 7.0])
-    control = drives.control(position, position, velocity, load)
-    length_speed = drives.gear * velocity
-    torque = drives.gear * (
-        drives.gain * control
-        + drives.offset
-        - drives.stiffness * drives.gear * position
-        - drives.damping * length_speed
-    )
-    # On its reference a joint feels the load's torque and nothing else.
-    np.testing.assert_allclose(torque, load)
-    ahead = drives.control(position, position + 0.1, velocity, load) - control
-    assert (ahead[:2] > 0.0).all()
-    assert ahead[2] == 0.0
-    np.testing.assert_allclose(drives.motor_acceleration(np.full(3, 0.1), np.zeros(3)), [0.0, 0.0, 250.0])
