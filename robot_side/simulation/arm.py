@@ -7,6 +7,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.clock import Clock
 from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
 from robot_side.compiled.kernel import (
@@ -26,6 +27,8 @@ from robot_side.simulation.joint_reference import REFERENCE, JointReference, Mot
 from robot_side.simulation.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
+LONGEST_TURN_S: Final = 0.02
+"""Physics that takes longer than real time gives way to messages, stops and leases this often."""
 _LIMIT_MARGIN_RAD = 0.005
 _UNSTABLE = [mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC]
 
@@ -56,6 +59,9 @@ class MujocoArm:
         self._step_s = float(model.opt.timestep)
         self._origin_s: float | None = None
         self._steps = 0
+        self._skipped = 0
+        self._taken = 0, 0
+        self._clock: Clock | None = None
         self._state: ArmState | None = None
 
         travel = measure_gripper(scene)
@@ -120,30 +126,60 @@ class MujocoArm:
         if self._gripper is not None:
             self._gripper.command(closing, valid_until_s)
 
+    def give_way(self, clock: Clock) -> None:
+        """From now on let no `state` last more than LONGEST_TURN_S, and a step, by `clock`, however much is due.
+
+        What there was no time for is skipped: the simulation falls behind real time.
+        """
+        self._clock = clock
+
     def state(self, now_s: float) -> ArmState:
         """The measured state after the physics that `now_s` has made due; the first call sets the clocks together.
 
         At most 2 s are simulated at once: after a longer gap the rest is skipped, as if the world had paused.
-        FeelaheadError when the simulation has become unstable.
+        FeelaheadError when the simulation has become unstable, or MuJoCo gives up.
         """
         if self._origin_s is None:
             self._origin_s = now_s
         # A little grace, so that a tick of the timestep's own period never misses its step by rounding.
         due = math.floor((now_s - self._time_s) / self._step_s + 1e-6)
-        run = min(due, round(_LONGEST_ADVANCE_S / self._step_s))
-        for _ in range(run):
-            self._advance_one_step()
+        run = self._advance(min(due, round(_LONGEST_ADVANCE_S / self._step_s)))
         if run > 0:
             self._origin_s += (due - run) * self._step_s
+            self._skipped += due - run
             self._require_stable()
         if run > 0 or self._state is None:
             self._state = self._measure()
         return self._state
 
     @property
+    def share_of_real_time(self) -> float:
+        """How much of the time since the first `state` has been simulated: 1 unless the physics is too slow."""
+        return _share(self._steps, self._skipped)
+
+    def take_share_of_real_time(self) -> float:
+        """The same since this was last asked for."""
+        (steps, skipped), self._taken = self._taken, (self._steps, self._skipped)
+        return _share(self._steps - steps, self._skipped - skipped)
+
+    @property
     def _time_s(self) -> float:
         """The physics' present time on the caller's clock."""
         return (self._origin_s or 0.0) + self._steps * self._step_s
+
+    def _advance(self, due: int) -> int:
+        """Simulate up to `due` steps, and at least one if any is due; how many there was time for."""
+        clock, ends_s = self._clock, 0.0
+        if clock is not None and due > 1:
+            ends_s = clock.now() + LONGEST_TURN_S
+        try:
+            for step in range(1, due + 1):
+                self._advance_one_step()
+                if clock is not None and step < due and clock.now() >= ends_s:
+                    return step
+        except mujoco.FatalError as error:
+            raise FeelaheadError(f"MuJoCo gave up: {' '.join(str(error).split())}") from error
+        return max(due, 0)
 
     def _advance_one_step(self) -> None:
         time_s, limits = self._time_s, self._reference.limits
@@ -177,6 +213,10 @@ class MujocoArm:
             raise FeelaheadError(
                 f"the simulation became unstable at {self._data.time:.3f} s; a smaller timestep in the model may help"
             )
+
+
+def _share(steps: int, skipped: int) -> float:
+    return steps / (steps + skipped) if steps + skipped else 1.0
 
 
 def _inertia(model: Any, velocities: IntArray) -> np.ndarray:
