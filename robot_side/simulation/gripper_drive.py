@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, input_array, record_array
+from robot_side.compiled.kernel import building_block, inlined
 from robot_side.simulation.gripper_travel import GripperTravel
 
 # Beyond this share of the stroke between where the drive would stand freely and where it stands, and below this
@@ -90,10 +90,6 @@ class GripperDrive:
         self._command = closing
         self._valid_until_s = valid_until_s
 
-    def advance(self, time_s: float, step_s: float, length: float, length_speed: float) -> None:
-        """Move the reference on by `step_s` from `time_s`; the drive measures its own length and its change per s."""
-        _advance(self.drive, self.samples, self.moving(time_s), step_s, length, length_speed)
-
     def moving(self, time_s: float) -> float:
         """What it is told at `time_s`: close (+1), hold (0) or open (-1)."""
         return self._command if time_s < self._valid_until_s else 0.0
@@ -134,7 +130,10 @@ def _at_closure(samples: Any, closure: float, column: int) -> Any:
 def advance_gripper(
     gripper: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
 ) -> None:
-    """Move one gripper's reference on by `step_s`, and note what its drive feels; see `GripperDrive.advance`."""
+    """Move one gripper's reference on by `step_s`; the drive measures its own length and its change per second.
+
+    moving: see `GripperDrive.moving`.
+    """
     gripper.closure = (length - gripper.open_length) / gripper.stroke
     gripper.opening_m = _at_closure(samples, gripper.closure, 2)
     gripper.speed += (length_speed / gripper.stroke - gripper.speed) * min(step_s / _SPEED_TIME_CONSTANT_S, 1.0)
@@ -153,10 +152,3 @@ def advance_gripper(
     standing = abs(gripper.speed) < _STANDING_SPEED_1_S
     stopped = blocked and standing and gripper.told_to_close == 1
     gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0
-
-
-@compiled(record_array(GRIPPER), input_array(2), NUMBER, NUMBER, NUMBER, NUMBER)
-def _advance(
-    grippers: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
-) -> None:
-    advance_gripper(grippers[0], samples, moving, step_s, length, length_speed)

@@ -120,24 +120,6 @@ class JointReference:
         before, self._following = self._following, time_s < self._valid_until_s
         return self._following, before and not self._following
 
-    def advance(
-        self, time_s: float, step_s: float, measured_position_rad: FloatArray, measured_velocity_rad_s: FloatArray
-    ) -> None:
-        """Move the references on by `step_s` from `time_s`, near the measured positions and velocities (n,)."""
-        self.joints["measured_position"], self.joints["measured_velocity"] = (
-            measured_position_rad,
-            measured_velocity_rad_s,
-        )
-        limits = self.limits
-        _advance(
-            self.joints,
-            *self.follows(time_s),
-            step_s,
-            limits.velocity_rad_s,
-            limits.acceleration_rad_s2,
-            limits.deceleration_rad_s2,
-        )
-
 
 @compiled(record_array(REFERENCE), input_array(1), NUMBER, returns=TRUTH)
 def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
@@ -190,16 +172,3 @@ def advance_references(
         most_behind = min(joint.position, joint.measured_position - lead)
         most_ahead = max(joint.position, joint.measured_position + lead)
         joint.position = min(max(moved, most_behind), most_ahead)
-
-
-@compiled(record_array(REFERENCE), TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, NUMBER)
-def _advance(
-    joints: Any,
-    following: bool,
-    ended: bool,
-    step_s: float,
-    fastest: float,
-    acceleration: float,
-    deceleration: float,
-) -> None:
-    advance_references(joints, following, ended, step_s, fastest, acceleration, deceleration)
