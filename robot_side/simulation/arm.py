@@ -30,7 +30,8 @@ _LONGEST_ADVANCE_S = 2.0
 LONGEST_TURN_S: Final = 0.02
 """Physics that takes longer than real time gives way to messages, stops and leases this often."""
 _LIMIT_MARGIN_RAD = 0.005
-_UNSTABLE = [mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC]
+# Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
+_UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 _INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
 """One element of the arm's inertia matrix on or below its diagonal, by joints: its place in what MuJoCo keeps of it."""
@@ -80,7 +81,7 @@ class MujocoArm:
         mujoco.mj_forward(model, data)
         # MuJoCo's arrays stay where they are as long as the state lives: asking for one costs more than a step's use.
         self._positions, self._velocities = data.qpos, data.qvel
-        self._warnings = data.warning.number
+        self._unstable = data.warning.number[_UNSTABLE]
         self._sensed = np.concatenate([robot.arm_positions, robot.finger_positions])
         gripper = self._gripper
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
@@ -209,7 +210,7 @@ class MujocoArm:
 
     def _require_stable(self) -> None:
         # MuJoCo resets an unstable simulation to its start, which must not pass for a motion of the arm.
-        if self._warnings.take(_UNSTABLE).any():
+        if self._unstable.any():
             raise FeelaheadError(
                 f"the simulation became unstable at {self._data.time:.3f} s; a smaller timestep in the model may help"
             )

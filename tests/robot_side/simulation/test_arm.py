@@ -255,6 +255,19 @@ def test_an_unstable_simulation_is_no_motion_of_the_arm() -> None:
         arm.state(0.01)
 
 
+@pytest.mark.parametrize("kind", ["BADQPOS", "BADQVEL", "BADQACC", "CONTACTFULL", "BADCTRL"])
+def test_of_mujocos_warnings_three_say_that_it_is_unstable(kind: str) -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    scene.data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{kind}")].number = 1
+    if kind.startswith("BADQ"):
+        with pytest.raises(FeelaheadError, match="unstable"):
+            arm.state(0.01)
+    else:
+        arm.state(0.01)
+
+
 def test_it_grasps_and_lifts_the_target() -> None:
     driver = ToolDriver.load()
     target = driver.scene.data.body("table_scene/target")
