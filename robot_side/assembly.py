@@ -65,6 +65,7 @@ class Assembled:
     kinematics: MujocoKinematics
     law: SweptLaw | PaperLaw
     """The settings' own"""
+    arm: MujocoArm
 
 
 def build_robot_side(
@@ -147,7 +148,7 @@ def assemble(
         notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
         held_covers=held_covers,
     )
-    return Assembled(core, scene, kinematics, law)
+    return Assembled(core, scene, kinematics, law, arm)
 
 
 def _notes(scene: Scene) -> tuple[str, ...]:

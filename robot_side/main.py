@@ -8,6 +8,7 @@ from typing import Any
 
 from common.clock import MonotonicClock, ThreadClock, clock_domain
 from common.command.command_line import parse_settings, run_command
+from common.command.live_view import SLOW
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
 from common.emulation.delay_line import BitFlip, DelayLine, link_summary
@@ -135,6 +136,9 @@ class _Loop:
         self._status = status
         self._clock = MonotonicClock()
         self._computed = ThreadClock()
+        self._arm = assembled.arm
+        self._arm.give_way(self._clock)
+        self._told_slow = False
         self._admission = Admission()
         self._tick_time = RunningStatistics(settings.seed)
         self._tick_cpu_time = RunningStatistics(settings.seed)
@@ -189,6 +193,7 @@ class _Loop:
             "link": link_summary(
                 "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}
             ),
+            "simulation": {"share_of_real_time": self._arm.share_of_real_time},
             "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
             "strangers": {
@@ -225,6 +230,13 @@ class _Loop:
 
     def _paced(self) -> dict[str, float | int]:
         """The ticks since this was last asked for."""
+        share = self._arm.take_share_of_real_time()
+        if max(share, self._arm.share_of_real_time) < SLOW and not self._told_slow:
+            self._told_slow = True
+            self._status.note(
+                f"the simulation runs at {100.0 * share:.0f} % of real time: fewer free bodies, a longer timestep or"
+                ' <flag sleep="enable"/> in the model would help'
+            )
         latest_s = sorted(self._latest_tick_times_s) or [0.0]
         self._latest_tick_times_s.clear()
         return {
@@ -232,6 +244,7 @@ class _Loop:
             "tick_p99_us": 1e6 * latest_s[len(latest_s) * 99 // 100],
             "overruns": self._pacer.overruns,
             "late_us": 1e6 * self._pacer.take_latest_s(),
+            "real_time": share,
         }
 
     def close(self) -> None:

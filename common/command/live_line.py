@@ -2,7 +2,7 @@
 
 from rich.cells import cell_len
 
-from common.command.live_view import LiveView, TriggerView
+from common.command.live_view import SLOW, LiveView, TriggerView
 
 _BETWEEN = "  "
 _UNKNOWN = "–"
@@ -73,7 +73,12 @@ def _in_short_words(view: LiveView) -> list[_Fact]:
 
 
 def _what(view: LiveView) -> list[_Fact]:
-    return [(0, view.phase), *([(1, view.reason)] if view.reason is not None else [])]
+    facts = [(0, view.phase)]
+    if view.reason is not None:
+        facts.append((1, view.reason))
+    if view.real_time is not None and view.real_time < SLOW:
+        facts.append((1, f"{percent(view.real_time)} % of real time"))
+    return facts
 
 
 def _long_trigger(trigger: TriggerView, view: LiveView) -> str:

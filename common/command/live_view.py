@@ -14,6 +14,8 @@ LINK_UP = "up"
 LINK_LOST = "lost: "
 """How the link's word begins when there was one; the reason follows."""
 LINK_REFUSED = "refused: "
+SLOW = 0.9
+"""A simulation below this share of real time is said to be slow."""
 _BEFORE_ARMED = ("resting", "arming")
 """What the simulated person does before they have seen that it is armed."""
 
@@ -40,6 +42,8 @@ class LiveView:
     """Whether that has stopped the arm against somebody's will."""
     armed: bool = False
     linked: bool | None = None
+    real_time: float | None = None
+    """The simulation's share of it."""
     delay_ms: float | None = None
     l2: TriggerView = TriggerView()
     r2: TriggerView = TriggerView()
@@ -74,6 +78,7 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
         alarm=alarm,
         armed=armed,
         linked=None if link is None else link == LINK_UP,
+        real_time=_number(values, "real_time"),
         delay_ms=_number(values, "delay_ms"),
         l2=l2,
         r2=r2,

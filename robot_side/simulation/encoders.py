@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
 from robot_side.enlargement.kinematic_error import encoder_sigma
 
 
@@ -27,14 +28,18 @@ class Encoder:
     def read(self, true_positions: FloatArray) -> FloatArray:
         """Readings (n,) of joints that stand at `true_positions` (n,), radians; metres for a prismatic joint."""
         readings: FloatArray = self._noise.standard_normal(true_positions.shape)
-        readings *= self._sigma_rad
-        readings += true_positions
-        if self._resolution_rad > 0.0:
-            readings /= self._resolution_rad
-            np.rint(readings, out=readings)
-            readings *= self._resolution_rad
+        _read(readings, true_positions, self._sigma_rad, self._resolution_rad)
         return readings
 
     def standard_deviation_rad(self) -> float:
         """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
         return float(encoder_sigma(np.array(self._sigma_rad), np.array(self._resolution_rad)))
+
+
+@compiled(output_array(1), input_array(1), NUMBER, NUMBER)
+def _read(readings: FloatArray, true_positions: FloatArray, sigma: float, resolution: float) -> None:
+    """Make readings of standard normal noise."""
+    for i in range(readings.size):
+        readings[i] = readings[i] * sigma + true_positions[i]
+        if resolution > 0.0:
+            readings[i] = np.rint(readings[i] / resolution) * resolution

@@ -1,10 +1,27 @@
 """From a joint reference to what each joint's actuator is told: position servo, velocity servo or motor."""
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import inlined
+
+DRIVE: Final = np.dtype(
+    [
+        ("gear", np.float64),
+        ("gain", np.float64),
+        ("offset", np.float64),
+        ("stiffness", np.float64),
+        ("damping", np.float64),
+        ("friction", np.float64),
+        ("acceleration", np.float64),
+        ("load", np.float64),
+    ]
+)
+"""One joint's drive, see `JointDrives`. friction: the joint's own damping, N m s/rad. acceleration, rad/s²: what it is
+to have; load: the torque, N m, that this takes."""
 
 # The stiffness of what this controller closes itself; servos of the model bring their own.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
@@ -38,48 +55,36 @@ class JointDrives:
         pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
         return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
 
-    @property
-    def is_motor(self) -> BoolArray:
-        """(n,) whether an actuator gives the torque that it is told, with no servo of its own."""
-        motor: BoolArray = (self.stiffness == 0.0) & (self.damping == 0.0)
-        return motor
+    def table(self, friction: FloatArray) -> np.ndarray:
+        """(n,) of DRIVE. friction (n,): each joint's own damping, N m s/rad."""
+        drives = np.zeros(self.gear.shape, DRIVE)
+        for name in ("gear", "gain", "offset", "stiffness", "damping"):
+            drives[name] = getattr(self, name)
+        drives["friction"] = friction
+        return drives
 
-    @property
-    def _is_velocity_servo(self) -> BoolArray:
-        servo: BoolArray = (self.stiffness == 0.0) & (self.damping != 0.0)
-        return servo
 
-    def motor_acceleration(self, position_error: FloatArray, velocity_error: FloatArray) -> FloatArray:
-        """The joint acceleration (n,) that a motor's critically damped loop adds to its reference's; 0 for servos.
+@inlined
+def motor_acceleration(drive: Any, position_error: float, velocity_error: float) -> float:
+    """The joint acceleration that a motor's critically damped loop adds to its reference's; 0 for servos.
 
-        The errors (n,) are reference less measured. The caller multiplies by the arm's inertia.
-        """
-        wanted = _MOTOR_BANDWIDTH_RAD_S**2 * position_error + 2.0 * _MOTOR_BANDWIDTH_RAD_S * velocity_error
-        return np.where(self.is_motor, wanted, 0.0)
+    The errors are reference less measured. The caller multiplies by the arm's inertia.
+    """
+    if drive.stiffness != 0.0 or drive.damping != 0.0:
+        return 0.0
+    return _MOTOR_BANDWIDTH_RAD_S**2 * position_error + 2.0 * _MOTOR_BANDWIDTH_RAD_S * velocity_error
 
-    def control(
-        self,
-        measured_position_rad: FloatArray,
-        reference_position_rad: FloatArray,
-        reference_velocity_rad_s: FloatArray,
-        load: FloatArray,
-    ) -> FloatArray:
-        """The actuators' inputs u (n,) under which the joints follow their references.
 
-        load (n,): the torque, N m, that holds the joints against gravity, friction and their own inertia; force in N
-        for a prismatic joint. A servo is told its reference ahead by what its damping holds back, so that it
-        does not lag while it moves.
-        """
-        correction = np.where(
-            self._is_velocity_servo,
-            _VELOCITY_SERVO_BANDWIDTH_RAD_S * (reference_position_rad - measured_position_rad),
-            0.0,
-        )
-        geared = (
-            load / self.gear
-            - self.offset
-            + self.gear * self.stiffness * reference_position_rad
-            + self.gear * self.damping * (reference_velocity_rad_s + correction)
-        )
-        result: FloatArray = geared / self.gain
-        return result
+@inlined
+def control(drive: Any, position_error: float, position: float, velocity: float, load: float) -> float:
+    """The actuator's input u under which the joint follows its reference `position` and `velocity`.
+
+    position_error: reference less measured. load: the torque, N m, that holds the joint against gravity, friction and
+    its own inertia; force in N for a prismatic joint. A servo is told its reference ahead by what its damping holds
+    back, so that it does not lag while it moves.
+    """
+    if drive.stiffness == 0.0 and drive.damping != 0.0:
+        velocity += _VELOCITY_SERVO_BANDWIDTH_RAD_S * position_error
+    servo = drive.gear * (drive.stiffness * position + drive.damping * velocity)
+    told: float = (load / drive.gear - drive.offset + servo) / drive.gain
+    return told

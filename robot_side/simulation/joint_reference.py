@@ -2,11 +2,32 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.ability import JointLimits
+from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, record_array
+
+REFERENCE: Final = np.dtype(
+    [
+        ("position", np.float64),
+        ("velocity", np.float64),
+        ("acceleration", np.float64),
+        ("measured_position", np.float64),
+        ("measured_velocity", np.float64),
+        ("command", np.float64),
+        ("lower", np.float64),
+        ("upper", np.float64),
+        ("windup", np.float64),
+        ("to_lower", np.float64),
+        ("to_upper", np.float64),
+        ("change", np.float64),
+    ]
+)
+"""One joint's reference, in rad and s. lower, upper: where it ends. to_lower, to_upper: the velocities from which it
+can still stop there. change: what its velocity is short of."""
 
 
 @dataclass(frozen=True)
@@ -52,17 +73,33 @@ class JointReference:
 
         windup_rad (n,): that of each joint, in place of the limits'.
         """
-        self.position_rad: FloatArray = np.clip(position_rad, lower_rad, upper_rad)
-        self.velocity_rad_s: FloatArray = np.zeros_like(self.position_rad)
-        self.acceleration_rad_s2: FloatArray = np.zeros_like(self.position_rad)
-        self._lower_rad = lower_rad
-        self._upper_rad = upper_rad
-        self._limits = limits
-        self._windup_rad = np.full(self.position_rad.shape, limits.windup_rad) if windup_rad is None else windup_rad
-        self._stopped: FloatArray = np.zeros_like(self.position_rad)
-        self._command = self._stopped
+        self.joints: np.ndarray = np.zeros(position_rad.shape, REFERENCE)
+        """(n,) of REFERENCE"""
+        for name, values in (
+            ("position", np.clip(position_rad, lower_rad, upper_rad)),
+            ("lower", lower_rad),
+            ("upper", upper_rad),
+            ("windup", limits.windup_rad if windup_rad is None else windup_rad),
+        ):
+            self.joints[name] = values
+        self.limits = limits
         self._valid_until_s = -math.inf
         self._following = False
+
+    @property
+    def position_rad(self) -> FloatArray:
+        """(n,) where the joints should be"""
+        return self.joints["position"].copy()
+
+    @property
+    def velocity_rad_s(self) -> FloatArray:
+        """(n,)"""
+        return self.joints["velocity"].copy()
+
+    @property
+    def acceleration_rad_s2(self) -> FloatArray:
+        """(n,)"""
+        return self.joints["acceleration"].copy()
 
     def command(self, velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `velocity_rad_s` (n,), scaled as a whole to the limit, until `valid_until_s`.
@@ -70,47 +107,68 @@ class JointReference:
         ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
         """
         velocity = np.asarray(velocity_rad_s, dtype=np.float64)
-        if velocity.shape != self.position_rad.shape:
-            raise ValueError(f"joint_velocity_rad_s has the shape {velocity.shape}; valid: {self.position_rad.shape}")
-        if not np.isfinite(velocity).all():
-            raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
+        if velocity.shape != self.joints.shape:
+            raise ValueError(f"joint_velocity_rad_s has the shape {velocity.shape}; valid: {self.joints.shape}")
         if not math.isfinite(valid_until_s):
             raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
-        excess = float(np.max(np.abs(velocity))) / self._limits.velocity_rad_s
-        self._command = velocity / max(excess, 1.0)
+        if not _command(self.joints, np.ascontiguousarray(velocity), self.limits.velocity_rad_s):
+            raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
         self._valid_until_s = valid_until_s
 
-    def advance(
-        self, time_s: float, step_s: float, measured_position_rad: FloatArray, measured_velocity_rad_s: FloatArray
-    ) -> None:
-        """Move the references on by `step_s` from `time_s`, near the measured positions and velocities (n,)."""
-        limits = self._limits
-        following = time_s < self._valid_until_s
-        if self._following and not following:
+    def follows(self, time_s: float) -> tuple[bool, bool]:
+        """Whether there is a command to follow at `time_s`, and whether it has run out since the last call."""
+        before, self._following = self._following, time_s < self._valid_until_s
+        return self._following, before and not self._following
+
+
+@compiled(record_array(REFERENCE), input_array(1), NUMBER, returns=TRUTH)
+def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
+    """Take over a velocity, scaled as a whole to at most `fastest`; False, and nothing done, if it is not finite."""
+    largest = 0.0
+    for j in range(joints.size):
+        if not math.isfinite(velocity[j]):
+            return False
+        largest = max(largest, abs(velocity[j]))
+    for j in range(joints.size):
+        joints[j].command = velocity[j] / max(largest / fastest, 1.0)
+    return True
+
+
+@building_block
+def advance_references(
+    joints: Any,
+    following: bool,
+    ended: bool,
+    step_s: float,
+    fastest: float,
+    acceleration: float,
+    deceleration: float,
+) -> None:
+    """Move the references of all `joints` on by `step_s`, near what is measured; the largest change limits them all."""
+    largest = 0.0
+    for j in range(joints.size):
+        joint = joints[j]
+        if ended:
             # Halting from a reference that ran ahead would first make the arm catch up with it.
-            self.position_rad = measured_position_rad.copy()
-            speed = limits.velocity_rad_s
-            self.velocity_rad_s = np.clip(measured_velocity_rad_s, -speed, speed)
-        self._following = following
+            joint.position = joint.measured_position
+            joint.velocity = min(max(joint.measured_velocity, -fastest), fastest)
         # Near a limit only the speed from which the joint can still stop before it.
-        position = self.position_rad
-        to_lower = -np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(position - self._lower_rad, 0.0))
-        to_upper = np.sqrt(2.0 * limits.deceleration_rad_s2 * np.maximum(self._upper_rad - position, 0.0))
-        target = np.clip(self._command, to_lower, to_upper) if following else self._stopped
-        change = target - self.velocity_rad_s
-        most = (limits.acceleration_rad_s2 if following else limits.deceleration_rad_s2) * step_s
-        largest = float(np.abs(change).max())
-        if largest > most:
-            change *= most / largest
-        velocity = np.clip(self.velocity_rad_s + change, to_lower, to_upper)
-        self.acceleration_rad_s2 = (velocity - self.velocity_rad_s) / step_s
-        self.velocity_rad_s = velocity
+        joint.to_lower = -math.sqrt(2.0 * deceleration * max(joint.position - joint.lower, 0.0))
+        joint.to_upper = math.sqrt(2.0 * deceleration * max(joint.upper - joint.position, 0.0))
+        target = min(max(joint.command, joint.to_lower), joint.to_upper) if following else 0.0
+        joint.change = target - joint.velocity
+        largest = max(largest, abs(joint.change))
+    most = (acceleration if following else deceleration) * step_s
+    share = most / largest if largest > most else 1.0
+    for j in range(joints.size):
+        joint = joints[j]
+        velocity = min(max(joint.velocity + joint.change * share, joint.to_lower), joint.to_upper)
+        joint.acceleration = (velocity - joint.velocity) / step_s
+        joint.velocity = velocity
         way = velocity * step_s
-        moved = np.clip(position + way, self._lower_rad, self._upper_rad)
+        moved = min(max(joint.position + way, joint.lower), joint.upper)
         # What a load has made of the lead stays: a reference that followed the joint back would let it sink.
-        lead = self._windup_rad + np.abs(way)
-        self.position_rad = np.clip(
-            moved,
-            np.minimum(position, measured_position_rad - lead),
-            np.maximum(position, measured_position_rad + lead),
-        )
+        lead = joint.windup + abs(way)
+        most_behind = min(joint.position, joint.measured_position - lead)
+        most_ahead = max(joint.position, joint.measured_position + lead)
+        joint.position = min(max(moved, most_behind), most_ahead)

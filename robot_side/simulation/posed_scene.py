@@ -25,6 +25,8 @@ class PosedScene:
         self._data.qpos[:] = scene.data.qpos
         self._gripper = scene.robot.gripper_geoms.astype(np.int64)
         self._objects = np.array([geom for thing in scene.objects for geom in thing.geoms], dtype=np.int64)
+        bodies = scene.model.geom_bodyid[self._objects]
+        self._fixed = self._objects[scene.model.body_weldid[bodies] == 0]
         self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
 
     def put(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
@@ -33,6 +35,8 @@ class PosedScene:
         data.qpos[robot.arm_positions] = arm_positions_rad
         data.qpos[robot.finger_positions] = finger_positions
         mujoco.mj_kinematics(self.scene.model, data)
+        # Where things may sleep MuJoCo does not put what is fixed back to its place.
+        data.geom_xpos[self._fixed] = self.scene.data.geom_xpos[self._fixed]
         data.geom_xpos[self._objects] += shift_m
         self._at_rest_m = data.geom_xpos[self._gripper].copy()
 
@@ -107,4 +111,6 @@ def move_objects(scene: Scene, shift_m: FloatArray) -> None:
     model.geom_sameframe[geoms[model.geom_bodyid[geoms] == 0]] = 0
     # MuJoCo's tree of a body's geoms was built where they stood, and would miss contacts with those that moved.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    # And where things may sleep it looks but once where those are that stand fixed.
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     mujoco.mj_forward(model, scene.data)

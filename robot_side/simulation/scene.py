@@ -26,6 +26,8 @@ _ASSETS = Path(__file__).parent / "assets"
 # MuJoCo wants a prefix for what is attached; objects are named without it.
 _TABLE_PREFIX = "table_scene/"
 _START_KEY = "feelahead_start"
+# With longer ones the arm's own servos swing; with shorter ones no machine keeps up with real time.
+_SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
 
 
 @dataclass(frozen=True)
@@ -107,12 +109,20 @@ def load_scene(
             model = _compile(spec)
             robot = find_robot(model, site)
             start = model.key(start_key).qpos
-    if not (math.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):
-        raise ConfigurationError(f"model: timestep = {model.opt.timestep}; valid: above 0 s, such as 0.002")
+    if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
+        raise ConfigurationError(
+            f"model: timestep = {model.opt.timestep}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as"
+            " 0.002"
+        )
     data = mujoco.MjData(model)
     data.qpos[:] = start
     data.qvel[:] = _start_velocities(model, robot)
-    mujoco.mj_forward(model, data)
+    try:
+        mujoco.mj_forward(model, data)
+    except mujoco.FatalError as error:
+        raise ConfigurationError(
+            f"model: MuJoCo cannot simulate it: {' '.join(str(error).split())}; valid: a model that fits its memory"
+        ) from error
     for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
         stray = model.geom(int(geom)).name or f"geom{geom}"
         raise ConfigurationError(f"model: {stray!r} stands at {data.geom_xpos[geom]}; valid: finite positions")

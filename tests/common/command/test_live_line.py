@@ -28,6 +28,7 @@ views = st.builds(
     reason=names,
     alarm=st.booleans(),
     linked=st.one_of(st.none(), st.booleans()),
+    real_time=shares,
     delay_ms=distances_mm,
     l2=triggers,
     r2=triggers,
@@ -44,6 +45,13 @@ views = st.builds(
 def test_eighty_columns_tell_everything() -> None:
     assert live_line(live_view(APPROACH), 79) == (
         "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
+    )
+
+
+def test_a_simulation_that_falls_behind_is_told() -> None:
+    assert live_line(live_view(APPROACH | {"real_time": 0.97}), 79) == live_line(live_view(APPROACH), 79)
+    assert live_line(live_view(APPROACH | {"real_time": 0.2}), 99) == (
+        "advancing  20 % of real time  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
     )
 
 

@@ -1,10 +1,11 @@
 from pathlib import Path
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
 from common.errors import ConfigurationError, FeelaheadError
-from robot_side.simulation.arm import MujocoArm
+from robot_side.simulation.arm import LONGEST_TURN_S, MujocoArm
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.gripper_measurement import measure_gripper
 from robot_side.simulation.ground_truth import GroundTruth
@@ -117,6 +118,62 @@ def test_a_suspended_process_skips_all_but_two_seconds() -> None:
     assert scene.data.time == pytest.approx(2.5)
 
 
+class SlowMachine:
+    """A clock on which every look at it takes as long as a step does on a machine that is too slow for the model."""
+
+    def __init__(self, step_s: float) -> None:
+        self.now_s = 50.0
+        self._step_s = step_s
+
+    def now(self) -> float:
+        self.now_s += self._step_s
+        return self.now_s
+
+
+def test_physics_that_cannot_keep_up_gives_way_and_falls_behind() -> None:
+    scene = load_scene()
+    arm, machine = perfect_arm(scene), SlowMachine(3e-3)
+    arm.give_way(machine)
+    arm.state(0.0)
+    assert arm.share_of_real_time == 1.0
+    arm.command(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.25)
+    for turn in range(1, 11):
+        began_s = machine.now_s
+        # It says when it was measured on the caller's clock, and a command runs out by that, too.
+        assert arm.state(0.1 * turn).time_s == pytest.approx(0.1 * turn)
+        assert LONGEST_TURN_S < machine.now_s - began_s < LONGEST_TURN_S + 6e-3
+    # 7 steps of 100 in each turn.
+    assert scene.data.time == pytest.approx(0.07)
+    assert arm.share_of_real_time == pytest.approx(0.07)
+    assert arm.take_share_of_real_time() == pytest.approx(0.07)
+    moving = arm.state(1.001)
+    assert np.abs(moving.joint_velocities_rad_s).max() < 0.05
+    assert arm.take_share_of_real_time() == 1.0
+    assert arm.take_share_of_real_time() == 1.0
+    assert arm.share_of_real_time == pytest.approx(71 / 1001)
+
+
+def test_a_step_that_is_due_is_done_however_slow_the_machine() -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.give_way(SlowMachine(1.0))
+    arm.state(0.0)
+    arm.state(0.01)
+    assert scene.data.time == pytest.approx(1e-3)
+
+
+def test_mujocos_own_last_words_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = perfect_arm(load_scene())
+    arm.state(0.0)
+
+    def gives_up(*_: object) -> None:
+        raise mujoco.FatalError("mj_stackAlloc: out of memory\nincrease <size memory>")
+
+    monkeypatch.setattr(mujoco, "mj_step", gives_up)
+    with pytest.raises(FeelaheadError, match="MuJoCo gave up: mj_stackAlloc: out of memory increase <size memory>"):
+        arm.state(0.01)
+
+
 def test_the_arm_does_not_leave_its_joints_ranges(tmp_path: Path) -> None:
     scene = load_scene(planar_arm(tmp_path), "tcp")
     arm = perfect_arm(scene)
@@ -195,6 +252,19 @@ def test_an_unstable_simulation_is_no_motion_of_the_arm() -> None:
     arm.state(0.0)
     scene.data.qvel[:] = np.nan
     with pytest.raises(FeelaheadError, match="unstable"):
+        arm.state(0.01)
+
+
+@pytest.mark.parametrize("kind", ["BADQPOS", "BADQVEL", "BADQACC", "CONTACTFULL", "BADCTRL"])
+def test_of_mujocos_warnings_three_say_that_it_is_unstable(kind: str) -> None:
+    scene = load_scene()
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    scene.data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{kind}")].number = 1
+    if kind.startswith("BADQ"):
+        with pytest.raises(FeelaheadError, match="unstable"):
+            arm.state(0.01)
+    else:
         arm.state(0.01)
 
 

@@ -1,10 +1,12 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.simulation.gripper_drive import GripperDrive
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, record_array
+from robot_side.simulation.gripper_drive import GRIPPER, GripperDrive, advance_gripper
 from robot_side.simulation.gripper_travel import (
     GripperSample,
     GripperServo,
@@ -43,6 +45,18 @@ def travel(force_lead: float = 0.1) -> GripperTravel:
     )
 
 
+@compiled(record_array(GRIPPER), input_array(2), NUMBER, NUMBER, NUMBER, NUMBER)
+def _advance(
+    grippers: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
+) -> None:
+    advance_gripper(grippers[0], samples, moving, step_s, length, length_speed)
+
+
+def advance(drive: GripperDrive, time_s: float, step_s: float, length: float, length_speed: float) -> None:
+    """Move the reference on by `step_s` from `time_s`."""
+    _advance(drive.drive, drive.samples, drive.moving(time_s), step_s, length, length_speed)
+
+
 class Rig:
     """A drive whose fingers follow it at once, unless something `thickness_m` wide is between them."""
 
@@ -54,7 +68,7 @@ class Rig:
 
     def run(self, steps: int) -> "Rig":
         for _ in range(steps):
-            self.drive.advance(self.step * STEP_S, STEP_S, self.length, self._speed())
+            advance(self.drive, self.step * STEP_S, STEP_S, self.length, self._speed())
             self.length = self._next()
             self.step += 1
         return self
@@ -122,7 +136,7 @@ def test_the_lag_of_a_moving_drive_is_no_force() -> None:
         # First-order: the servo's damping over its stiffness is 0.1 s.
         reference = 1.0 - float(drive.control[0]) / 255.0
         speed = (reference - closure) / 0.1
-        drive.advance(step * STEP_S, STEP_S, 0.04 * (1.0 - closure), -0.04 * speed)
+        advance(drive, step * STEP_S, STEP_S, 0.04 * (1.0 - closure), -0.04 * speed)
         closure += speed * STEP_S
         assert not drive.holding
     assert closure > 0.1

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, record_array
 from robot_side.simulation.joint_drives import JointDrives
-from robot_side.simulation.joint_reference import JointReference, MotionLimits
+from robot_side.simulation.joint_reference import REFERENCE, JointReference, MotionLimits, advance_references
 from robot_side.simulation.scene import load_scene
 
 STEP_S = 0.001
@@ -19,11 +21,28 @@ def standing(position: FloatArray | None = None) -> JointReference:
     return JointReference(np.zeros(2) if position is None else position, -UNLIMITED, UNLIMITED, LIMITS)
 
 
+@compiled(record_array(REFERENCE), TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, NUMBER)
+def _advance(
+    joints: Any, following: bool, ended: bool, step_s: float, fastest: float, acceleration: float, deceleration: float
+) -> None:
+    advance_references(joints, following, ended, step_s, fastest, acceleration, deceleration)
+
+
+def advance(
+    reference: JointReference, time_s: float, step_s: float, position_rad: FloatArray, velocity_rad_s: FloatArray
+) -> None:
+    """Move the references on by `step_s` from `time_s`, near these measured positions and velocities (n,)."""
+    joints, limits = reference.joints, reference.limits
+    joints["measured_position"], joints["measured_velocity"] = position_rad, velocity_rad_s
+    most = limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2
+    _advance(joints, *reference.follows(time_s), step_s, *most)
+
+
 def follow(reference: JointReference, start_s: float, steps: int) -> FloatArray:
     """Advance with a drive that follows without error; the velocities (steps, n)."""
     velocities = []
     for step in range(steps):
-        reference.advance(start_s + step * STEP_S, STEP_S, reference.position_rad, reference.velocity_rad_s)
+        advance(reference, start_s + step * STEP_S, STEP_S, reference.position_rad, reference.velocity_rad_s)
         velocities.append(reference.velocity_rad_s)
     return np.array(velocities)
 
@@ -39,7 +58,7 @@ def test_no_command_breaks_a_limit(seed: int) -> None:
         if random.uniform() < 0.02:
             reference.command(random.uniform(-5.0, 5.0, 2), step * STEP_S + random.uniform(-0.05, 0.2))
         held = random.uniform() < 0.5
-        reference.advance(step * STEP_S, STEP_S, measured, np.zeros(2) if held else reference.velocity_rad_s)
+        advance(reference, step * STEP_S, STEP_S, measured, np.zeros(2) if held else reference.velocity_rad_s)
         assert (np.abs(reference.velocity_rad_s) <= 2.0 + 1e-12).all()
         assert (reference.position_rad >= lower).all()
         assert (reference.position_rad <= upper).all()
@@ -56,7 +75,7 @@ def test_no_sequence_of_commands_makes_it_jump(seed: int) -> None:
         if random.uniform() < 0.02:
             reference.command(random.uniform(-5.0, 5.0, 2), step * STEP_S + random.uniform(-0.05, 0.2))
         before = reference.velocity_rad_s
-        reference.advance(step * STEP_S, STEP_S, reference.position_rad, before)
+        advance(reference, step * STEP_S, STEP_S, reference.position_rad, before)
         assert np.abs(reference.velocity_rad_s - before).max() <= 12.0 * STEP_S + 1e-12
 
 
@@ -84,7 +103,7 @@ def test_it_stops_from_what_is_measured() -> None:
     reference.command(np.array([1.0, 0.0]), 0.2)
     follow(reference, 0.0, 200)
     position = reference.position_rad - 0.01
-    reference.advance(0.2, STEP_S, position, np.array([0.3, 0.1]))
+    advance(reference, 0.2, STEP_S, position, np.array([0.3, 0.1]))
     # One step of the deceleration away from the measured velocity, along a straight line to zero.
     np.testing.assert_allclose(reference.velocity_rad_s, np.array([0.3, 0.1]) * (1.0 - 12.0 * STEP_S / 0.3))
     np.testing.assert_allclose(reference.position_rad, position + reference.velocity_rad_s * STEP_S)
@@ -94,7 +113,7 @@ def test_a_blocked_joint_winds_nothing_up() -> None:
     reference = standing()
     reference.command(np.array([1.0, 0.0]), 10.0)
     for step in range(1000):
-        reference.advance(step * STEP_S, STEP_S, np.zeros(2), np.zeros(2))
+        advance(reference, step * STEP_S, STEP_S, np.zeros(2), np.zeros(2))
     # And one step's way, without which it could not move at all.
     np.testing.assert_allclose(reference.position_rad, [LIMITS.windup_rad + 1.0 * STEP_S, 0.0])
 
@@ -105,7 +124,7 @@ def test_a_load_does_not_draw_the_reference_along() -> None:
         reference.command(command, 10.0)
         before = reference.position_rad.copy()
         for step in range(100):
-            reference.advance(step * STEP_S, STEP_S, before - [0.05, 0.0], np.zeros(2))
+            advance(reference, step * STEP_S, STEP_S, before - [0.05, 0.0], np.zeros(2))
         # It stays where it is under a load that it was not told of, and goes with it where it is told to.
         assert reference.position_rad[0] == (
             before[0] if command[0] == 0.0 else pytest.approx(before[0] - 0.01, abs=2e-3)
@@ -159,31 +178,3 @@ def test_bad_limits_are_named() -> None:
         for value in (0.0, -1.0, math.nan, math.inf):
             with pytest.raises(ValueError, match=name):
                 MotionLimits(**{name: value})
-
-
-def test_each_kind_of_drive_gives_the_torque_that_is_wanted() -> None:
-    # A position servo, a velocity servo and a motor, all geared, in that order.
-    drives = JointDrives(
-        gear=np.array([2.0, 2.0, 5.0]),
-        gain=np.array([300.0, 40.0, 3.0]),
-        offset=np.array([1.0, -1.0, 0.0]),
-        strongest=np.full(3, np.inf),
-        stiffness=np.array([100.0, 0.0, 0.0]),
-        damping=np.array([10.0, 40.0, 0.0]),
-    )
-    np.testing.assert_array_equal(drives.is_motor, [False, False, True])
-    position, velocity, load = np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]), np.array([5.0, 6.0, 7.0])
-    control = drives.control(position, position, velocity, load)
-    length_speed = drives.gear * velocity
-    torque = drives.gear * (
-        drives.gain * control
-        + drives.offset
-        - drives.stiffness * drives.gear * position
-        - drives.damping * length_speed
-    )
-    # On its reference a joint feels the load's torque and nothing else.
-    np.testing.assert_allclose(torque, load)
-    ahead = drives.control(position, position + 0.1, velocity, load) - control
-    assert (ahead[:2] > 0.0).all()
-    assert ahead[2] == 0.0
-    np.testing.assert_allclose(drives.motor_acceleration(np.full(3, 0.1), np.zeros(3)), [0.0, 0.0, 250.0])

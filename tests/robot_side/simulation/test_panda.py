@@ -34,7 +34,9 @@ def turn_back(driver: ToolDriver, path: FloatArray) -> None:
 
 def test_the_bare_robot_stands_at_the_built_in_table(alone: ToolDriver) -> None:
     assert alone.arm.joint_count == 7
-    assert alone.scene.robot.drives.is_motor.all()
+    drives = alone.scene.robot.drives
+    assert not drives.stiffness.any()
+    assert not drives.damping.any()
     assert alone.scene.roles["target"] is Role.TARGET
     assert alone.scene.warnings == ()
     tool, target = alone.tool_m(), alone.scene.data.body("table_scene/target").xpos

@@ -252,6 +252,22 @@ def test_every_object_is_moved_and_the_arm_is_not(name: str) -> None:
     np.testing.assert_allclose(scene.data.geom_xpos[objects], expected[objects], atol=1e-12)
 
 
+def test_where_things_may_sleep_they_are_moved_as_well() -> None:
+    """MuJoCo then looks but once where those are that stand fixed."""
+    scene = load_scene(DATA / "wall.xml", "tool")
+    scene.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    mujoco.mj_step(scene.model, scene.data)
+    posed = PosedScene(scene)
+    arm_rad, fingers = (scene.data.qpos[place] for place in (scene.robot.arm_positions, scene.robot.finger_positions))
+    for shift_m in (0.0, 0.05, 0.05, -0.02):
+        posed.put(arm_rad, fingers, np.array([shift_m, 0.0, 0.0]))
+        assert posed.gap_m() == pytest.approx(WALL_M + shift_m, abs=1e-4)
+    move_objects(scene, np.array([0.05, 0.0, 0.0]))
+    assert TrueContact(scene).gap_m(None) == pytest.approx(WALL_M + 0.05, abs=1e-4)
+    posed.put(arm_rad, fingers, NOWHERE)
+    assert posed.gap_m() == pytest.approx(WALL_M + 0.05, abs=1e-4)
+
+
 def test_a_moved_wall_is_as_far_as_it_was_moved() -> None:
     scene = load_scene(DATA / "wall.xml", "tool")
     move_objects(scene, np.array([0.05, 0.0, 0.0]))

@@ -154,6 +154,8 @@ def test_contacts_name_the_gripper_geom_and_the_object_supports_included(built_i
     data.qpos[address : address + 3] = data.geom("left_fingertip").xpos
     table = model.body("table_scene/table").id
     model.body_pos[table, 2] = data.geom("palm").xpos[2]
+    # Where things may sleep MuJoCo looks but once where those are that stand fixed.
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     mujoco.mj_forward(model, data)
     contacts = GroundTruth(built_in).observe().contacts
     assert ("left_fingertip", "target") in contacts
@@ -272,11 +274,21 @@ def test_the_gripper_is_found_beyond_the_last_arm_link(tmp_path: Path) -> None:
     assert [scene.model.actuator(int(index)).name for index in scene.robot.gripper_actuators] == ["hand"]
 
 
-def test_a_timestep_that_cannot_advance_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("step_s", ["0", "1e-6", "0.2"])
+def test_a_timestep_of_no_use_is_named(tmp_path: Path, step_s: str) -> None:
     path = planar_arm(tmp_path)
-    path.write_text(path.read_text().replace("<worldbody>", '<option timestep="0"/><worldbody>', 1))
-    with pytest.raises(ConfigurationError, match="timestep"):
+    path.write_text(path.read_text().replace("<worldbody>", f'<option timestep="{step_s}"/><worldbody>', 1))
+    with pytest.raises(ConfigurationError, match=r"timestep = .*; valid: 1e-05 to 0.02 s"):
         load_scene(path, "tcp")
+
+
+def test_a_model_that_mujoco_has_no_memory_for_is_one_line(tmp_path: Path) -> None:
+    # Enough to compile it, too little for its contacts.
+    balls = "".join(f'<body pos="1 {0.01 * ball} 2"><freejoint/><geom size="0.05"/></body>' for ball in range(40))
+    path = planar_arm(tmp_path, world=balls, extra_top='<size memory="50K"/>')
+    with pytest.raises(ConfigurationError, match=r"model: MuJoCo cannot simulate it: .*out of memory") as raised:
+        load_scene(path, "tcp")
+    assert "\n" not in str(raised.value)
 
 
 def test_a_keyframe_that_is_no_number_is_named(tmp_path: Path) -> None:

@@ -1,0 +1,117 @@
+"""What rests in a built-in scene sleeps, and wakes as soon as anything happens to it."""
+
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.simulation.built_in_scenes import SceneName
+from robot_side.simulation.ground_truth import GroundTruth
+from robot_side.simulation.scene import Scene, load_scene
+from robot_side.simulation.true_contact import TrueContact
+from tests.helpers.arm_models import planar_arm
+from tests.helpers.tool_driver import ToolDriver
+
+FREE = ("target", "carton", "tin", "block", "book", "ball", "orange", "tetrahedron")
+SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+
+
+def asleep(scene: Scene) -> set[str]:
+    """The free bodies that sleep."""
+    model, data = scene.model, scene.data
+    bodies = {name: model.body(f"table_scene/{name}").id for name in FREE}
+    return {name for name, body in bodies.items() if not data.tree_awake[model.body_treeid[body]]}
+
+
+def position_m(scene: Scene, name: str) -> FloatArray:
+    position: FloatArray = scene.data.body(f"table_scene/{name}").xpos.copy()
+    return position
+
+
+def put(scene: Scene, name: str, place_m: FloatArray) -> None:
+    """Put a free body's origin at `place_m` (3,), turned as the world is."""
+    joint = scene.model.body(f"table_scene/{name}").jntadr[0]
+    start = scene.model.jnt_qposadr[joint]
+    scene.data.qpos[start : start + 7] = [*place_m, 1.0, 0.0, 0.0, 0.0]
+
+
+def test_what_rests_sleeps_where_it_would_stand_awake() -> None:
+    sleeping, waking = ToolDriver.load(), ToolDriver.load()
+    waking.scene.model.opt.enableflags &= ~SLEEP
+    for driver in (sleeping, waking):
+        driver.wait(2.0)
+    assert asleep(sleeping.scene) == set(FREE)
+    assert asleep(waking.scene) == set()
+    for name in FREE:
+        np.testing.assert_allclose(position_m(sleeping.scene, name), position_m(waking.scene, name), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["table", "wall", "slot", "shelf"])
+def test_nothing_but_the_built_in_arm_says_who_sleeps(name: SceneName, tmp_path: Path) -> None:
+    assert load_scene(name=name).model.opt.enableflags & SLEEP
+    # A bare arm of somebody else's stands before the same things, and its model's options hold.
+    path = planar_arm(tmp_path)
+    assert not load_scene(path, "tcp", name=name).model.opt.enableflags & SLEEP
+    path.write_text(path.read_text().replace('integrator="implicitfast"/>', '><flag sleep="enable"/></option>'))
+    assert load_scene(path, "tcp", name=name).model.opt.enableflags & SLEEP
+
+
+def test_what_the_gripper_pushes_wakes_and_the_rest_sleeps_on() -> None:
+    driver = ToolDriver.load()
+    contact, onsets = TrueContact(driver.scene), []
+    driver.wait(0.5)
+    assert "target" in asleep(driver.scene)
+    before_m = position_m(driver.scene, "target")
+    driver.grip(1.0, 1.0)
+    driver.go_to(np.array([0.62, 0.0, 0.07]), 1.0)
+    assert driver.contacts == set()
+    for _ in range(12):
+        driver.go_to(np.array([0.76, 0.0, 0.07]), 0.1)
+        onsets.append(contact.update(None))
+    assert {name for _, name in driver.contacts} == {"target"}
+    assert [onset.thing for onset in onsets if onset is not None][:1] == ["target"]
+    assert position_m(driver.scene, "target")[0] > before_m[0] + 0.01
+    assert "target" not in asleep(driver.scene)
+    assert {"book", "tetrahedron", "ball"} <= asleep(driver.scene)
+    driver.go_to(np.array([0.62, 0.0, 0.07]), 1.5)
+    driver.wait(1.0)
+    assert "target" in asleep(driver.scene)
+    assert GroundTruth(driver.scene).observe().contacts == frozenset()
+
+
+def test_what_loses_its_support_wakes_and_falls() -> None:
+    driver = ToolDriver.load()
+    scene = driver.scene
+    put(scene, "block", position_m(scene, "book") + np.array([0.0, 0.0, 0.015 + 0.03]))
+    driver.wait(1.0)
+    assert {"book", "block"} <= asleep(scene)
+    stood_m = position_m(scene, "block")
+    # 30 N on half a kilogram: too fast for the block to come along.
+    scene.data.xfrc_applied[scene.model.body("table_scene/book").id, 1] = -30.0
+    driver.wait(0.2)
+    assert not {"book", "block"} & asleep(scene)
+    scene.data.xfrc_applied[:] = 0.0
+    driver.wait(2.0)
+    assert position_m(scene, "block")[2] == pytest.approx(stood_m[2] - 0.03, abs=2e-3)
+    assert "block" in asleep(scene)
+
+
+def test_what_is_gripped_stays_awake_and_what_is_put_down_falls_asleep() -> None:
+    driver = ToolDriver.load()
+    target_m = position_m(driver.scene, "target")
+    driver.go_to(np.array([0.6, 0.0, 0.07]), 1.5)
+    driver.go_to(np.array([0.785, 0.0, 0.07]), 2.0)
+    assert "target" in asleep(driver.scene)
+    assert driver.grip(1.0, 0.8).gripper_holding
+    driver.go_to(np.array([0.7, 0.0, 0.2]), 3.0)
+    driver.wait(2.0)
+    assert "target" not in asleep(driver.scene)
+    assert position_m(driver.scene, "target")[2] == pytest.approx(target_m[2] + 0.13, abs=0.01)
+    driver.go_to(np.array([0.7, 0.0, 0.0705]), 3.0)
+    driver.grip(-1.0, 0.8)
+    driver.go_to(np.array([0.6, 0.0, 0.07]), 1.5)
+    driver.wait(1.0)
+    assert position_m(driver.scene, "target")[2] == pytest.approx(target_m[2], abs=1e-3)
+    assert "target" in asleep(driver.scene)
