@@ -43,6 +43,7 @@ class MujocoKinematics:
         bodies = self.cover.bodies[order]
         self._radii_m = self.cover.radii_m[order]
         self._on_finger = np.isin(bodies, model.geom_bodyid[geoms[robot.geom_on_finger]])
+        self.has_fingers = bool(self._on_finger.any())
         # Every pose shares these two.
         self._radii_m.setflags(write=False)
         self._on_finger.setflags(write=False)
@@ -89,7 +90,8 @@ def _link_tree(model: Any, data: Any, robot: RobotModel, link_of: IntArray, poin
                     )
                 )
         link["end_joint"] = len(joints)
-        if link["end_joint"] > link["first_joint"]:
+        moved = link["end_joint"] - link["first_joint"] == model.body_jntnum[body]
+        if moved and model.body_mocapid[body] < 0:
             link["position"], link["quaternion"] = model.body_pos[body], model.body_quat[body]
         else:
             link["position"] = data.xmat[parent].reshape(3, 3).T @ (data.xpos[body] - data.xpos[parent])
