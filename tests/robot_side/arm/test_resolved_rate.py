@@ -85,6 +85,11 @@ def test_values_that_are_not_finite_are_refused(bad: float) -> None:
         joint_velocities(jacobian, np.full(6, bad), FREE)
 
 
+def test_what_cannot_be_multiplied_is_refused() -> None:
+    with pytest.raises(ValueError, match="too large"):
+        joint_velocities(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), np.ones(6), FREE)
+
+
 def test_wrong_arguments_are_named() -> None:
     with pytest.raises(ValueError, match=r"jacobian has the shape \(3, 6\)"):
         joint_velocities(np.ones((3, 6)), np.zeros(6), FREE)

@@ -109,6 +109,13 @@ def test_a_pose_that_was_handed_out_stays_as_it_is() -> None:
         np.testing.assert_array_equal(array, was)
 
 
+@pytest.mark.parametrize(("joints", "fingers"), [(5, 2), (7, 2), (6, 1), (6, 0)])
+def test_readings_of_other_joints_are_refused(joints: int, fingers: int) -> None:
+    state = ArmState(0.0, np.zeros(joints), np.zeros(joints), np.zeros(fingers), 0.0, gripper_holding=False)
+    with pytest.raises(ValueError, match=f"{joints} readings of the arm and {fingers} .* of 6 and 2 joints"):
+        MujocoKinematics(load_scene()).pose(state)
+
+
 def test_encoder_noise_moves_the_tool_as_the_propagated_error_says() -> None:
     driver = ToolDriver.load()
     encoder = Encoder(2e-3, 1e-3, seed=2)
