@@ -15,11 +15,11 @@ from common.statistics import RunningStatistics
 from common.timing.ages import LoopAge
 from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.arm.ability import JointLimits
+from robot_side.arm.commanded import commanded
 from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
-from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.speed_assist import assisted
-from robot_side.arm.tool_motion import ToolMotionSettings, tool_twist
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_speed_m_s
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
@@ -86,6 +86,7 @@ class RobotSide:
         self._observer = observer
         self._assists = assists
         self._joints = JointEstimate()
+        self._still: FloatArray = np.zeros(arm.joint_count)
         self._told_m_s = 0.0
         self._held_covers = held_covers
         self._start_s: float | None = None
@@ -93,6 +94,7 @@ class RobotSide:
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
         self._centers_m: FloatArray = np.empty((0, 3))
+        self._target: int | None = None
         self.newest: tuple[Sensed, Situation] | None = None
         """What the last tick found out, and where."""
         self._loop_age_s = RunningStatistics(seed)
@@ -140,14 +142,14 @@ class RobotSide:
             loop_age_s=self._loop_age.value(now_s),
             loop_age_known=self._loop_age.known,
             compensation="operator" if command is None else command.compensation,
-            gap_m=state.gripper_opening_m if pose.sphere_on_finger.any() else None,
+            gap_m=state.gripper_opening_m if self._kinematics.has_fingers else None,
             held=None if self._held is None else self._held.index,
             lateral=(0.0, 0.0) if command is None else command.lateral,
         )
         sensed = self._law.sense(situation, now_s)
         self.newest = sensed, situation
-        speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
-        self._record(sensed, objects, speed_m_s, permission.state == "armed", now_s)
+        speed_m_s = tool_speed_m_s(pose.tool_jacobian, state.joint_velocities_rad_s)
+        self._record(sensed, speed_m_s, permission.state == "armed", now_s)
         return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
 
     def _perceive(self, now_s: float) -> PerceivedObjects:
@@ -155,6 +157,7 @@ class RobotSide:
         if objects is not self._frame:
             self._frame = objects
             self._centers_m = object_centers(objects)
+            self._target = target_index(objects)
         return objects
 
     def _follow_target(self, objects: PerceivedObjects, pose: GripperPose) -> None:
@@ -162,11 +165,10 @@ class RobotSide:
         if not self.session.take_next_target():
             return
         chosen = next_target(objects, self._centers_m, pose.tool_position_m, pose.tool_rotation[:, 2])
-        present = target_index(objects)
         if chosen is None or self._held is not None:
             return
-        if present is not None:
-            self._camera.set_role(objects.names[present], Role.OBSTACLE)
+        if self._target is not None:
+            self._camera.set_role(objects.names[self._target], Role.OBSTACLE)
         self._camera.set_role(chosen, Role.TARGET)
 
     def _follow_grip(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState) -> None:
@@ -185,23 +187,19 @@ class RobotSide:
         command = permission.command
         if command is None:
             self._told_m_s = 0.0
-            still = np.zeros(self._arm.joint_count)
             # No longer valid: a command that runs out between two physics steps would let a load sink, each time anew.
-            self._arm.command(still, state.time_s)
+            self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
         if self._assists and self.newest is not None:
             command = assisted(command, self.newest[0].l2, self.newest[0].r2)
-        twist = tool_twist(command, pose.tool_rotation, self._motion)
-        velocity = joint_velocities(pose.tool_jacobian, twist, self._limits.velocity_rad_s)
-        given = self._limits.given(velocity, state.joint_positions_rad)
-        self._told_m_s = float(pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ given))
+        velocity, self._told_m_s = commanded(command, pose, state.joint_positions_rad, self._limits, self._motion)
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
-    def _record(self, sensed: Sensed, objects: PerceivedObjects, speed_m_s: float, armed: bool, now_s: float) -> None:
+    def _record(self, sensed: Sensed, speed_m_s: float, armed: bool, now_s: float) -> None:
         self.figures.tick(sensed, speed_m_s, armed=armed)
-        target = target_index(objects)
+        target = self._target
         held = self._held is not None and self._held.index == target
         self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)
         if self._observer is None:
@@ -231,6 +229,7 @@ class RobotSide:
             outgoing += [stiffness_message(one, sensed, self._told_m_s, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
+            target = self._target
             outgoing.append(
                 telemetry_message(
                     self.session.view_header(now_s),
@@ -239,16 +238,11 @@ class RobotSide:
                     sensed,
                     speed_m_s=speed_m_s,
                     gripper_opening_m=state.gripper_opening_m,
-                    target=self._target(objects),
+                    target=None if target is None else (objects.names[target], self._centers_m[target]),
                     holding=self._held is not None,
                 )
             )
         return outgoing
-
-    def _target(self, objects: PerceivedObjects) -> tuple[str, FloatArray] | None:
-        """The target's name and where its centre is; None without one."""
-        target = target_index(objects)
-        return None if target is None else (objects.names[target], self._centers_m[target])
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
         """What a person is shown, and a few figures for whoever reads JSON lines."""
@@ -269,7 +263,7 @@ class RobotSide:
         }
         if self.newest is not None:
             sensed, (pose, objects) = self.newest[0], (self.newest[1].pose, self.newest[1].objects)
-            target, held = target_index(objects), None if self._held is None else self._held.index
+            target, held = self._target, None if self._held is None else self._held.index
             apart = perceived_distances(pose, objects, target, held)
             values |= {
                 "L2": sensed.l2.stiffness,

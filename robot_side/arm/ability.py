@@ -1,19 +1,19 @@
 """What the arm can do along a direction in one pose: how fast, and how fast its speed changes there."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import joint_velocities
+from robot_side.arm.resolved_rate import LARGEST_DAMPING, SINGULAR_VALUE_THRESHOLD, refuse, resolve
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 
 _MET = 1e-6
 """A tool that moves as asked but for this share is held back by nothing."""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
-_AT_END_RAD = 0.002
-"""A joint that holds at its end is this near to it: encoders are noisy."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,14 @@ class JointLimits:
     """Where each joint ends; None for one that nobody knows, or for none."""
     upper_rad: FloatArray | None = None
 
-    def given(self, velocities_rad_s: FloatArray, positions_rad: FloatArray) -> FloatArray:
-        """What commanded velocities (n,) become at these positions (n,): a joint at its end goes no farther."""
-        given = velocities_rad_s.copy()
-        if self.lower_rad is not None:
-            given[(positions_rad <= self.lower_rad + _AT_END_RAD) & (given < 0.0)] = 0.0
-        if self.upper_rad is not None:
-            given[(positions_rad >= self.upper_rad - _AT_END_RAD) & (given > 0.0)] = 0.0
-        return given
+    @cached_property
+    def ends_rad(self) -> tuple[FloatArray, FloatArray]:
+        """`lower_rad` and `upper_rad`; infinite where there are none."""
+        infinite = np.full(self.velocity_rad_s.size, np.inf)
+        return (
+            -infinite if self.lower_rad is None else np.ascontiguousarray(self.lower_rad),
+            infinite if self.upper_rad is None else np.ascontiguousarray(self.upper_rad),
+        )
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,47 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
     full_speed_m_s: v_max as it is set.
     """
-    twist = np.concatenate([full_speed_m_s * direction, np.zeros(3)])
-    rates = joint_velocities(pose.tool_jacobian, twist, limits.velocity_rad_s)
-    given = pose.tool_jacobian @ rates
-    speed_m_s = max(float(given[:3] @ direction), _LEAST_SPEED_M_S)
-    changing_s = max(float((np.abs(rates) / limits.acceleration_rad_s2).max()), _LEAST_RATE_RAD_S)
-    return Ability(
-        full_speed_m_s=speed_m_s,
-        acceleration_m_s2=speed_m_s / changing_s,
-        within_reach=bool(np.abs(given - twist).max() <= _MET * full_speed_m_s),
+    found = np.empty(3)
+    direction = np.ascontiguousarray(direction)
+    usable = _ability_loop(
+        *(pose.tool_jacobian, direction, full_speed_m_s, limits.velocity_rad_s, limits.acceleration_rad_s2, found)
     )
+    if not usable:
+        refuse(pose.tool_jacobian, full_speed_m_s * direction, limits.velocity_rad_s)
+    speed_m_s, acceleration_m_s2, off_m_s = found.tolist()
+    return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
+
+
+@compiled(
+    *(input_array(2), input_array(1), NUMBER, input_array(1), input_array(1), output_array(1)),
+    returns=TRUTH,
+)
+def _ability_loop(
+    jacobian: FloatArray,
+    direction: FloatArray,
+    full_speed: float,
+    limits: FloatArray,
+    accelerations: FloatArray,
+    found: FloatArray,
+) -> bool:
+    """Fill `found` (3,): the speed, the least acceleration, and by how much the tool's motion differs at most."""
+    twist, rates = np.zeros(6), np.empty(limits.size)
+    for i in range(3):
+        twist[i] = full_speed * direction[i]
+    if not resolve(jacobian, twist, limits, SINGULAR_VALUE_THRESHOLD, LARGEST_DAMPING, rates):
+        return False
+    speed, off, changing = 0.0, 0.0, _LEAST_RATE_RAD_S
+    for row in range(6):
+        given = 0.0
+        for joint in range(rates.size):
+            given += jacobian[row, joint] * rates[joint]
+        speed += given * direction[row] if row < 3 else 0.0
+        off = max(off, abs(given - twist[row]))
+    for joint in range(rates.size):
+        changing = max(changing, abs(rates[joint]) / accelerations[joint])
+    speed = max(speed, _LEAST_SPEED_M_S)
+    found[0], found[1], found[2] = speed, speed / changing, off
+    return True
 
 
 def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float) -> Ability:

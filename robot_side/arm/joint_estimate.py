@@ -6,12 +6,12 @@ and about a sixth of the noise at 1 kHz. The fingers' velocity is not measured: 
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import ArmState
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 
 TIME_CONSTANT_S = 0.02
 _LOST_S = 0.1
@@ -39,21 +39,63 @@ class JointEstimate:
             return self._begin(measured)
         if since_s == 0.0:
             return last
-        joints = last.joint_positions_rad + 0.5 * since_s * (
-            last.joint_velocities_rad_s + measured.joint_velocities_rad_s
-        )
-        fingers = last.finger_positions + since_s * self._finger_velocities
-        off, fingers_off = measured.joint_positions_rad - joints, measured.finger_positions - fingers
-        if not max(np.abs(off).max(initial=0.0), np.abs(fingers_off).max(initial=0.0)) < _LOST:
+        joints, fingers = np.empty(measured.joint_positions_rad.size), np.empty(measured.finger_positions.size)
+        if not _estimate_loop(
+            *(since_s, 1.0 - math.exp(-since_s / self._time_constant_s)),
+            *(last.joint_positions_rad, last.joint_velocities_rad_s, last.finger_positions),
+            *(measured.joint_positions_rad, measured.joint_velocities_rad_s, measured.finger_positions),
+            *(joints, fingers, self._finger_velocities),
+        ):
             return self._begin(measured)
-        share = 1.0 - math.exp(-since_s / self._time_constant_s)
-        # Of an α-β filter that neither overshoots nor lags behind a steady motion.
-        self._finger_velocities = self._finger_velocities + share * share / (2.0 - share) / since_s * fingers_off
-        self._last = replace(
-            measured, joint_positions_rad=joints + share * off, finger_positions=fingers + share * fingers_off
+        self._last = ArmState(
+            measured.time_s,
+            joints,
+            measured.joint_velocities_rad_s,
+            fingers,
+            measured.gripper_opening_m,
+            measured.gripper_holding,
         )
         return self._last
 
     def _begin(self, measured: ArmState) -> ArmState:
         self._last, self._finger_velocities = measured, np.zeros_like(measured.finger_positions)
         return measured
+
+
+@compiled(
+    *(NUMBER, NUMBER, input_array(1), input_array(1), input_array(1), input_array(1), input_array(1), input_array(1)),
+    *(output_array(1), output_array(1), output_array(1)),
+    returns=TRUTH,
+)
+def _estimate_loop(
+    since: float,
+    share: float,
+    last_joints: FloatArray,
+    last_velocities: FloatArray,
+    last_fingers: FloatArray,
+    read_joints: FloatArray,
+    velocities: FloatArray,
+    read_fingers: FloatArray,
+    joints: FloatArray,
+    fingers: FloatArray,
+    finger_velocities: FloatArray,
+) -> bool:
+    """Fill `joints` (n,) and `fingers` (f,), and draw `finger_velocities` (f,) on; False for what is far off."""
+    near = last_joints.size == last_velocities.size == velocities.size == joints.size
+    near &= last_fingers.size == finger_velocities.size == fingers.size
+    if not near:
+        return False
+    for joint in range(joints.size):
+        expected = last_joints[joint] + 0.5 * since * (last_velocities[joint] + velocities[joint])
+        off = read_joints[joint] - expected
+        near &= abs(off) < _LOST
+        joints[joint] = expected + share * off
+    # Of an α-β filter that neither overshoots nor lags behind a steady motion.
+    drawn = share * share / (2.0 - share) / since
+    for finger in range(fingers.size):
+        expected = last_fingers[finger] + since * finger_velocities[finger]
+        off = read_fingers[finger] - expected
+        near &= abs(off) < _LOST
+        fingers[finger] = expected + share * off
+        finger_velocities[finger] += drawn * off
+    return near

@@ -11,7 +11,7 @@ from common.arrays import BoolArray, FloatArray
 
 @dataclass(frozen=True)
 class ArmState:
-    """What the arm measures of itself: never the truth, always what its sensors say."""
+    """What the arm measures of itself: never the truth, always what its sensors say. Its arrays are contiguous."""
 
     time_s: float
     """When it was measured, on the clock of the `now` that `state` was given."""
@@ -53,7 +53,10 @@ class Arm(Protocol):
 
 @dataclass(frozen=True)
 class GripperPose:
-    """Where forward kinematics puts the tool and the gripper's spheres, in the world frame (eq. 4)."""
+    """Where forward kinematics puts the tool and the gripper's spheres, in the world frame (eq. 4).
+
+    Its arrays are contiguous, and stay as they are: a pose is kept for as long as a field that was looked at from it.
+    """
 
     tool_position_m: FloatArray
     """(3,)"""
@@ -79,6 +82,11 @@ class GripperPose:
 
 class GripperKinematics(Protocol):
     """Forward kinematics of the estimated configuration: it sees encoder readings, not the simulation."""
+
+    @property
+    def has_fingers(self) -> bool:
+        """Whether any sphere is on a finger."""
+        ...
 
     def pose(self, state: ArmState) -> GripperPose:
         """The gripper at `state`."""

@@ -4,19 +4,25 @@ Nakamura and Hanafusa, 1986; Chiaverini, Siciliano and Egeland, 1994.
 """
 
 import math
+from typing import Final, NoReturn
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, require_finite
 from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, output_array
+
+SINGULAR_VALUE_THRESHOLD: Final = 0.06
+LARGEST_DAMPING: Final = 0.06
+_HALVINGS: Final = 60
+"""After so many the smallest eigenvalue is known to the last digit."""
 
 
 def joint_velocities(
     jacobian: FloatArray,
     twist: FloatArray,
     velocity_limits_rad_s: FloatArray,
-    singular_value_threshold: float = 0.06,
-    largest_damping: float = 0.06,
+    singular_value_threshold: float = SINGULAR_VALUE_THRESHOLD,
+    largest_damping: float = LARGEST_DAMPING,
 ) -> FloatArray:
     """Joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
 
@@ -42,44 +48,22 @@ def joint_velocities(
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} = {value}; valid: finite and above 0")
 
-    velocity = _undamped(jacobian, twist, float(singular_value_threshold))
-    if velocity is None:
-        _require_finite(jacobian, twist)
-        velocity = _damped(jacobian, twist, singular_value_threshold, largest_damping)
-    if not _limit(velocity, np.ascontiguousarray(velocity_limits_rad_s)):
-        _require_finite(jacobian, twist)
-        raise ValueError("velocity_limits_rad_s holds a value that is not above 0; valid: above 0, rad/s")
+    velocity = np.empty(jacobian.shape[1])
+    if not _resolve_loop(
+        *map(np.ascontiguousarray, (jacobian, twist, velocity_limits_rad_s)),
+        *(singular_value_threshold, largest_damping, velocity),
+    ):
+        refuse(jacobian, twist, velocity_limits_rad_s)
     return velocity
 
 
-def _undamped(jacobian: FloatArray, twist: FloatArray, threshold: float) -> FloatArray | None:
-    """The exact or least-squares velocities (n,); None unless every singular value is above `threshold`.
-
-    By the normal equations of the shorter side: J Jᵀ y = v and q = Jᵀ y, or JᵀJ q = Jᵀ v with fewer than six joints.
-    Singular values from 0.06 to 3 make a condition of 2500, so that squaring them takes few of the digits.
-    """
-    wide = jacobian.shape[1] >= jacobian.shape[0]
-    rows = np.ascontiguousarray(jacobian if wide else jacobian.T)
-    solution = np.array(twist if wide else rows @ twist, dtype=np.float64)
-    if not _solve_gram(rows, threshold, solution):
-        return None
-    return solution @ rows if wide else solution
-
-
-def _damped(jacobian: FloatArray, twist: FloatArray, threshold: float, largest_damping: float) -> FloatArray:
-    """The damped velocities (n,), by the singular values."""
-    left, singular_values, right = np.linalg.svd(jacobian, full_matrices=False)
-    nearness = min(singular_values[-1] / threshold, 1.0)
-    damping_squared = largest_damping**2 * (1.0 - nearness**2)
-    gains = singular_values / (singular_values**2 + damping_squared)
-    velocity: FloatArray = right.T @ (gains * (left.T @ twist))
-    return velocity
-
-
-def _require_finite(jacobian: FloatArray, twist: FloatArray) -> None:
+def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
+    """ValueError that says what of these `resolve` could not use."""
     for name, values in (("jacobian", jacobian), ("twist", twist)):
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")
+        require_finite(name, values)
+    if not (velocity_limits_rad_s > 0.0).all():
+        raise ValueError("velocity_limits_rad_s holds a value that is not above 0; valid: above 0, rad/s")
+    raise ValueError("jacobian and twist are too large to be multiplied; valid: SI units")
 
 
 @building_block
@@ -99,20 +83,36 @@ def _factorise(matrix: FloatArray, shift: float, factor: FloatArray) -> bool:
     return True
 
 
-@compiled(input_array(2), NUMBER, output_array(1), returns=TRUTH)
-def _solve_gram(rows: FloatArray, threshold: float, solution: FloatArray) -> bool:
-    """Solve G x = `solution` in place, G = A Aᵀ for the matrix A of these rows; False unless A is well conditioned.
+@building_block
+def _factorise_damped(gram: FloatArray, threshold: float, largest_damping: float, factor: FloatArray) -> bool:
+    """Cholesky's factor of G + λ²; False for what is no Gram matrix of finite numbers.
 
-    The eigenvalues of G are the squares of A's singular values: all of these are above `threshold` where
-    G - threshold² has a Cholesky factor. That costs a fraction of a singular value decomposition.
+    The eigenvalues of G = A Aᵀ are the squares of A's singular values: all of these are above `threshold` where
+    G - threshold² has a factor. That costs a fraction of a singular value decomposition. Elsewhere the largest s for
+    which G - s has one, by bisection, is σ_min².
     """
+    below, above = 0.0, threshold * threshold
+    if _factorise(gram, above, factor):
+        return _factorise(gram, 0.0, factor)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (below + above)
+        if _factorise(gram, middle, factor):
+            below = middle
+        else:
+            above = middle
+    return _factorise(gram, -largest_damping * largest_damping * (1.0 - below / (threshold * threshold)), factor)
+
+
+@building_block
+def _solve_damped(rows: FloatArray, threshold: float, largest_damping: float, solution: FloatArray) -> bool:
+    """Solve (G + λ²) x = `solution` in place, G = A Aᵀ for the matrix A of these rows."""
     size = rows.shape[0]
     gram, factor = np.zeros((size, size)), np.zeros((size, size))
     for row in range(size):
         for column in range(size):
             for k in range(rows.shape[1]):
                 gram[row, column] += rows[row, k] * rows[column, k]
-    if not (_factorise(gram, threshold * threshold, factor) and _factorise(gram, 0.0, factor)):
+    if not _factorise_damped(gram, threshold, largest_damping, factor):
         return False
     for row in range(size):
         for k in range(row):
@@ -125,7 +125,39 @@ def _solve_gram(rows: FloatArray, threshold: float, solution: FloatArray) -> boo
     return True
 
 
-@compiled(output_array(1), input_array(1), returns=TRUTH)
+@building_block
+def resolve(
+    jacobian: FloatArray,
+    twist: FloatArray,
+    limits: FloatArray,
+    threshold: float,
+    largest_damping: float,
+    velocity: FloatArray,
+) -> bool:
+    """Fill `velocity` (n,) as `joint_velocities` says; False for what is not finite, or for a limit that is none.
+
+    By the normal equations of the shorter side: (J Jᵀ + λ²) y = v and q = Jᵀ y, or (JᵀJ + λ²) q = Jᵀ v with fewer
+    than six joints. Singular values from 0.06 to 3 make a condition of 2500, so that squaring them takes few of the
+    digits.
+    """
+    wide = velocity.size >= 6
+    size, length = (6, velocity.size) if wide else (velocity.size, 6)
+    rows, solution = np.empty((size, length)), np.zeros(size)
+    for row in range(size):
+        for k in range(length):
+            rows[row, k] = jacobian[row, k] if wide else jacobian[k, row]
+            solution[row] += 0.0 if wide else rows[row, k] * twist[k]
+        solution[row] += twist[row] if wide else 0.0
+    if not _solve_damped(rows, threshold, largest_damping, solution):
+        return False
+    for joint in range(velocity.size):
+        velocity[joint] = 0.0 if wide else solution[joint]
+        for row in range(6 if wide else 0):
+            velocity[joint] += rows[row, joint] * solution[row]
+    return _limit(velocity, limits)
+
+
+@building_block
 def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
     """Slow all joints alike so that none is over its limit; False for what is no velocity or no limit."""
     excess = 1.0
@@ -137,3 +169,15 @@ def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
     for joint in range(velocity.size):
         velocity[joint] /= excess
     return True
+
+
+@compiled(input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, output_array(1), returns=TRUTH)
+def _resolve_loop(
+    jacobian: FloatArray,
+    twist: FloatArray,
+    limits: FloatArray,
+    threshold: float,
+    largest_damping: float,
+    velocity: FloatArray,
+) -> bool:
+    return resolve(jacobian, twist, limits, threshold, largest_damping, velocity)

@@ -12,6 +12,8 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.messages import MotionCommand, Vector2
 
+Vector3 = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class ToolMotionSettings:
@@ -29,25 +31,22 @@ class ToolMotionSettings:
                 raise ValueError(f"{name} = {value}; valid: above 0 up to 5")
 
 
-def tool_twist(command: MotionCommand, tool_rotation: FloatArray, settings: ToolMotionSettings) -> FloatArray:
-    """The commanded velocity of the tool, (6,) in m/s and rad/s, linear first, in the world frame.
-
-    `tool_rotation` (3, 3) takes the tool frame to the world. ValueError when it is not finite.
-    """
-    if not np.isfinite(tool_rotation).all():
-        raise ValueError("tool_rotation holds a value that is not finite; valid: a rotation matrix")
+def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[Vector3, Vector3]:
+    """The commanded velocity of the tool and its angular velocity, each (3,) in the tool frame, in m/s and rad/s."""
     right, up = command.lateral
-    linear = np.array(
-        [
-            settings.stick_speed_m_s * right,
-            -settings.stick_speed_m_s * up,
-            settings.trigger_speed_m_s * (command.r2 - command.l2),
-        ]
-    )
     turn_right, turn_up = command.turning
+    across, turn = settings.stick_speed_m_s, settings.turn_speed_rad_s
     # To look right is a turn about y, which points down; to look up, one about x.
-    angular = settings.turn_speed_rad_s * np.array([turn_up, turn_right, 0.0])
-    return np.concatenate([tool_rotation @ linear, tool_rotation @ angular])
+    return (
+        (across * right, -across * up, settings.trigger_speed_m_s * (command.r2 - command.l2)),
+        (turn * turn_up, turn * turn_right, 0.0),
+    )
+
+
+def tool_speed_m_s(tool_jacobian: FloatArray, joint_velocities_rad_s: FloatArray) -> float:
+    """How fast the tool's point moves when joints (n,) move so; tool_jacobian (6, n), linear rows first."""
+    velocity = tool_jacobian[:3] @ joint_velocities_rad_s
+    return math.sqrt(velocity @ velocity)
 
 
 def deflected(lateral: Vector2, tool_rotation: FloatArray) -> tuple[FloatArray, float]:

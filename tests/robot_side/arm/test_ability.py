@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from robot_side.arm.ability import JointLimits, ability
 from robot_side.arm.port import GripperPose
+from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.simulation.joint_reference import MotionLimits
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import random_rotation
@@ -56,19 +57,23 @@ def test_a_joint_at_its_speed_limit_slows_the_tool_and_says_so() -> None:
     assert not able.within_reach
 
 
-def test_a_joint_at_its_end_goes_no_farther_and_may_go_back() -> None:
-    lower, upper = np.array([-1.0, -1.0, -np.inf]), np.array([1.0, 1.0, np.inf])
-    limits = JointLimits(np.ones(3), np.ones(3), lower, upper)
-    at_ends = np.array([-1.0, 1.0, 100.0])
-    for asked, expected in (([-0.3, 0.3, 0.3], [0.0, 0.0, 0.3]), ([0.3, -0.3, -0.3], [0.3, -0.3, -0.3])):
-        velocities = np.array(asked)
-        np.testing.assert_array_equal(limits.given(velocities, at_ends), expected)
-        np.testing.assert_array_equal(velocities, asked)  # not changed itself
-    outwards = np.array([-0.3, 0.3, 0.3])
-    # By readings that are noisy it is at its end 2 mrad before.
-    np.testing.assert_array_equal(limits.given(outwards, np.array([-0.9981, 0.9981, 0.0])), [0.0, 0.0, 0.3])
-    np.testing.assert_array_equal(limits.given(outwards, np.array([-0.9979, 0.9979, 0.0])), outwards)
-    np.testing.assert_array_equal(JointLimits(np.ones(3), np.ones(3)).given(outwards, at_ends), outwards)
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(seed=seeds, joints=st.integers(1, 9), least=st.sampled_from([0.0, 0.02, 0.2]))
+def test_it_is_what_the_resolved_rates_come_to(seed: int, joints: int, least: float) -> None:
+    random = np.random.default_rng(seed)
+    jacobian = random.normal(size=(6, joints))
+    jacobian[:, 0] *= least
+    limits = JointLimits(random.uniform(0.1, 2.0, joints), random.uniform(1.0, 10.0, joints))
+    direction = random_rotation(random)[0]
+    twist = np.concatenate([0.25 * direction, np.zeros(3)])
+    rates = joint_velocities(jacobian, twist, limits.velocity_rad_s)
+    speed_m_s = max(float((jacobian @ rates)[:3] @ direction), 1e-6)
+    able = ability(pose_with(jacobian), limits, direction, 0.25)
+    assert able.full_speed_m_s == pytest.approx(speed_m_s, abs=1e-12)
+    assert able.acceleration_m_s2 == pytest.approx(
+        speed_m_s / max(float((np.abs(rates) / limits.acceleration_rad_s2).max()), 1e-9), rel=1e-12
+    )
+    assert able.within_reach == (np.abs(jacobian @ rates - twist).max() <= 1e-6 * 0.25)
 
 
 def test_where_the_arm_cannot_go_nothing_is_0_or_divided_by_it() -> None:

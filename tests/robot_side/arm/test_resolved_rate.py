@@ -85,6 +85,11 @@ def test_values_that_are_not_finite_are_refused(bad: float) -> None:
         joint_velocities(jacobian, np.full(6, bad), FREE)
 
 
+def test_what_cannot_be_multiplied_is_refused() -> None:
+    with pytest.raises(ValueError, match="too large"):
+        joint_velocities(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), np.ones(6), FREE)
+
+
 def test_wrong_arguments_are_named() -> None:
     with pytest.raises(ValueError, match=r"jacobian has the shape \(3, 6\)"):
         joint_velocities(np.ones((3, 6)), np.zeros(6), FREE)
@@ -100,7 +105,7 @@ def test_wrong_arguments_are_named() -> None:
 
 
 @pytest.mark.parametrize("joints", [5, 6, 7])
-@pytest.mark.parametrize("smallest", [0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
+@pytest.mark.parametrize("smallest", [0.0, 1e-9, 1e-3, 0.02, 0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
 def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest: float, joints: int) -> None:
     """Above the threshold it is found without the singular values."""
     twist = np.random.default_rng(7).uniform(-0.2, 0.2, 6)

@@ -8,12 +8,11 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
-from robot_side.arm.tool_motion import ToolMotionSettings, deflected, tool_twist
+from robot_side.arm.tool_motion import ToolMotionSettings, deflected, tool_motion, tool_speed_m_s
 from tests.helpers.perceived_scenes import random_rotation
 
 SETTINGS = ToolMotionSettings(trigger_speed_m_s=0.25, stick_speed_m_s=0.1, turn_speed_rad_s=0.5)
 RIGHT, DOWN, FORWARD = np.eye(3)
-IN_PLACE = np.eye(3)
 STILL = np.zeros(3)
 
 
@@ -21,10 +20,9 @@ def command(**hands: Any) -> MotionCommand:
     return MotionCommand(Header(epoch=1, sequence=1, sent_s=0.0), **({"l2": 0.0, "r2": 0.0} | hands))
 
 
-def motion(rotation: FloatArray = IN_PLACE, **hands: Any) -> tuple[FloatArray, FloatArray]:
-    twist = tool_twist(command(**hands), rotation, SETTINGS)
-    assert twist.shape == (6,)
-    return twist[:3], twist[3:]
+def motion(**hands: Any) -> tuple[FloatArray, FloatArray]:
+    linear, angular = tool_motion(command(**hands), SETTINGS)
+    return np.array(linear), np.array(angular)
 
 
 @pytest.mark.parametrize(
@@ -70,25 +68,10 @@ def test_gripper_and_buttons_move_nothing() -> None:
     assert not angular.any()
 
 
-def test_the_twist_is_in_the_world_frame() -> None:
-    rotation = random_rotation(np.random.default_rng(1))
-    hands: dict[str, Any] = {"r2": 0.7, "lateral": (0.3, -0.2), "turning": (0.5, 0.1)}
-    in_tool, in_world = motion(**hands), motion(rotation, **hands)
-    for of_tool, of_world in zip(in_tool, in_world, strict=True):
-        np.testing.assert_allclose(of_world, rotation @ of_tool)
-    # A tool that points along the world's x, its camera upright: down is -z, right is -y.
-    upright = np.stack([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], axis=1)
-    np.testing.assert_allclose(motion(upright, r2=1.0)[0], [0.25, 0.0, 0.0], atol=1e-15)
-    np.testing.assert_allclose(motion(upright, lateral=(0.0, 1.0))[0], [0.0, 0.0, 0.1], atol=1e-15)
-    np.testing.assert_allclose(motion(upright, lateral=(1.0, 0.0))[0], [0.0, -0.1, 0.0], atol=1e-15)
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_rotation_that_is_not_finite_moves_nothing(bad: float) -> None:
-    rotation = np.eye(3)
-    rotation[1, 2] = bad
-    with pytest.raises(ValueError, match="tool_rotation"):
-        tool_twist(command(), rotation, SETTINGS)
+def test_the_speed_is_that_of_the_tools_point() -> None:
+    random = np.random.default_rng(3)
+    jacobian, rates = random.normal(size=(6, 7)), random.normal(size=7)
+    assert tool_speed_m_s(jacobian, rates) == pytest.approx(np.linalg.norm((jacobian @ rates)[:3]), rel=1e-14)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -98,7 +81,7 @@ def test_the_stick_leads_where_it_moves_the_gripper(right: float, up: float, see
     direction, deflection = deflected((right, up), rotation)
     assert np.linalg.norm(direction) == pytest.approx(1.0)
     assert direction.flags.c_contiguous
-    linear, _ = motion(rotation, lateral=(right, up))
+    linear = rotation @ motion(lateral=(right, up))[0]
     if math.hypot(right, up) > 1e-6:
         np.testing.assert_allclose(direction, linear / np.linalg.norm(linear), atol=1e-9)
     assert deflection == min(1.0, math.hypot(right, up))

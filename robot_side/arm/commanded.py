@@ -1,0 +1,86 @@
+"""From a command to the joints' velocities, in one compiled call a tick."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray, require_finite
+from common.protocol.messages import MotionCommand
+from robot_side.arm.ability import JointLimits
+from robot_side.arm.port import GripperPose
+from robot_side.arm.resolved_rate import LARGEST_DAMPING, SINGULAR_VALUE_THRESHOLD, refuse, resolve
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+
+_AT_END_RAD = 0.002
+"""A joint that holds at its end is this near to it: encoders are noisy."""
+
+
+def commanded(
+    command: MotionCommand,
+    pose: GripperPose,
+    joint_positions_rad: FloatArray,
+    limits: JointLimits,
+    settings: ToolMotionSettings,
+) -> tuple[FloatArray, float]:
+    """The velocities (n,) in rad/s to command the joints at these positions (n,), by `joint_velocities`.
+
+    And the speed along the approach axis (m/s) that the arm is thereby told: of joints at their ends, which go no
+    farther, nothing comes. ValueError for a pose that is not finite: nothing must move by it.
+    """
+    linear, angular = tool_motion(command, settings)
+    velocity = np.empty(joint_positions_rad.size)
+    lower, upper = limits.ends_rad
+    told_m_s = _command_loop(
+        *(pose.tool_rotation, pose.tool_jacobian, joint_positions_rad, limits.velocity_rad_s, lower, upper),
+        *linear,
+        *angular,
+        velocity,
+    )
+    if math.isnan(told_m_s):
+        if velocity.size != pose.tool_jacobian.shape[1]:
+            raise ValueError(f"joint_positions_rad has the shape {velocity.shape}; valid: as tool_jacobian has columns")
+        require_finite("tool_rotation", pose.tool_rotation)
+        refuse(pose.tool_jacobian, np.array([*linear, *angular]), limits.velocity_rad_s)
+    return velocity, told_m_s
+
+
+@compiled(
+    *(input_array(2), input_array(2), input_array(1), input_array(1), input_array(1), input_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, output_array(1)),
+    returns=NUMBER,
+)
+def _command_loop(
+    rotation: FloatArray,
+    jacobian: FloatArray,
+    positions: FloatArray,
+    limits: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    right: float,
+    down: float,
+    ahead: float,
+    about_right: float,
+    about_down: float,
+    about_ahead: float,
+    velocity: FloatArray,
+) -> float:
+    """Fill `velocity`; the speed along the approach axis, NaN where an argument is none."""
+    if not jacobian.shape[1] == positions.size == limits.size == lower.size == upper.size:
+        return math.nan
+    twist = np.empty(6)
+    for row in range(3):
+        x, y, z = rotation[row, 0], rotation[row, 1], rotation[row, 2]
+        twist[row] = x * right + y * down + z * ahead
+        twist[3 + row] = x * about_right + y * about_down + z * about_ahead
+    if not resolve(jacobian, twist, limits, SINGULAR_VALUE_THRESHOLD, LARGEST_DAMPING, velocity):
+        return math.nan
+    told = 0.0
+    for joint in range(velocity.size):
+        rate, position = velocity[joint], positions[joint]
+        stays = (rate < 0.0 and position <= lower[joint] + _AT_END_RAD) or (
+            rate > 0.0 and position >= upper[joint] - _AT_END_RAD
+        )
+        for row in range(0 if stays else 3):
+            told += rotation[row, 2] * jacobian[row, joint] * rate
+    return told

@@ -1,0 +1,249 @@
+"""Forward kinematics (eq. 4) of a robot's tree of links: from readings to tool, Jacobian and spheres in one pass."""
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, output_array, record_array
+from robot_side.compiled.vectors import Vector, add, cross, load, scale, subtract
+
+Quaternion = tuple[float, float, float, float]
+"""w first"""
+Records = np.ndarray[Any, Any]
+
+LINK: Final = np.dtype(
+    [
+        ("parent", np.int64),
+        ("first_joint", np.int64),
+        ("end_joint", np.int64),
+        ("position", np.float64, (3,)),
+        ("quaternion", np.float64, (4,)),
+    ]
+)
+"""One link: its row's parent stands before it; its joints; and how it stands to its parent while these are at their
+references. The first row is the world, whose parent is itself."""
+JOINT: Final = np.dtype(
+    [
+        ("reading", np.int64),
+        ("of_arm", np.int64),
+        ("slides", np.int64),
+        ("reference", np.float64),
+        ("anchor", np.float64, (3,)),
+        ("axis", np.float64, (3,)),
+    ]
+)
+"""One joint, in the frame of its link: a hinge about its unit axis through its anchor, or a slide along it. reading:
+its place among the arm's readings, or the fingers'; only the arm's move the tool, and are columns of its Jacobian."""
+POINT: Final = np.dtype([("link", np.int64), ("position", np.float64, (3,))])
+"""A point that is fixed to a link, in that link's frame."""
+
+_UNIT: Final = 1e-15
+"""A quaternion is no nearer to the length 1 than this, for want of digits."""
+
+
+class LinkTree(NamedTuple):
+    """A robot, and what of it is to be known."""
+
+    links: Records
+    """(l,) of LINK"""
+    joints: Records
+    """(j,) of JOINT, in the order of their links"""
+    tool: Records
+    """(1,) of POINT"""
+    tool_quaternion: FloatArray
+    """(4,) of the tool's frame in its link's, w first"""
+    points: Records
+    """(m,) of POINT"""
+
+
+class Placed(NamedTuple):
+    """Where readings put it, in the world frame; every array is new."""
+
+    tool_position_m: FloatArray
+    """(3,)"""
+    tool_rotation: FloatArray
+    """(3, 3) tool to world"""
+    tool_jacobian: FloatArray
+    """(6, n) linear rows first"""
+    points_m: FloatArray
+    """(m, 3)"""
+
+
+def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray, link_poses: FloatArray) -> Placed:
+    """Put the tree where the readings of the arm's joints (n,) and of the fingers' (f,) say (eq. 4).
+
+    link_poses (l, 7): filled with each link's position and quaternion, w first. ValueError for other numbers of
+    readings than joints.
+    """
+    placed = Placed(np.empty(3), np.empty((3, 3)), np.empty((6, arm_readings.size)), np.empty((tree.points.size, 3)))
+    if not _place(*tree, arm_readings, finger_readings, link_poses, *placed):
+        raise ValueError(
+            f"{arm_readings.size} readings of the arm and {finger_readings.size} of the fingers; valid: one for each of"
+            f" {np.count_nonzero(tree.joints['of_arm'])} and {np.count_nonzero(1 - tree.joints['of_arm'])} joints"
+        )
+    return placed
+
+
+@inlined
+def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+@inlined
+def _turned(q: Quaternion, v: Vector) -> Vector:
+    """V turned by a unit quaternion: v + 2 u × (w v + u × v) with its vector part u."""
+    x = q[0] * v[0] + q[2] * v[2] - q[3] * v[1]
+    y = q[0] * v[1] + q[3] * v[0] - q[1] * v[2]
+    z = q[0] * v[2] + q[1] * v[1] - q[2] * v[0]
+    return (
+        v[0] + 2.0 * (q[2] * z - q[3] * y),
+        v[1] + 2.0 * (q[3] * x - q[1] * z),
+        v[2] + 2.0 * (q[1] * y - q[2] * x),
+    )
+
+
+@inlined
+def _fill_rotation(q: Quaternion, rotation: FloatArray) -> None:
+    """The rotation matrix of a unit quaternion, to `rotation` (3, 3)."""
+    ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
+    wx, wy, wz, xy, xz, yz = q[0] * q[1], q[0] * q[2], q[0] * q[3], q[1] * q[2], q[1] * q[3], q[2] * q[3]
+    rotation[0, 0], rotation[0, 1], rotation[0, 2] = ww + xx - yy - zz, 2.0 * (xy - wz), 2.0 * (xz + wy)
+    rotation[1, 0], rotation[1, 1], rotation[1, 2] = 2.0 * (xy + wz), ww - xx + yy - zz, 2.0 * (yz - wx)
+    rotation[2, 0], rotation[2, 1], rotation[2, 2] = 2.0 * (xz - wy), 2.0 * (yz + wx), ww - xx - yy + zz
+
+
+@inlined
+def _on_link(pose: FloatArray, rotation: FloatArray, v: Vector) -> Vector:
+    """Where in the world the point v of a link is that stands so."""
+    return (
+        rotation[0, 0] * v[0] + rotation[0, 1] * v[1] + rotation[0, 2] * v[2] + pose[0],
+        rotation[1, 0] * v[0] + rotation[1, 1] * v[1] + rotation[1, 2] * v[2] + pose[1],
+        rotation[2, 0] * v[0] + rotation[2, 1] * v[1] + rotation[2, 2] * v[2] + pose[2],
+    )
+
+
+@inlined
+def _about(axis: Vector, angle: float) -> Quaternion:
+    sine = math.sin(0.5 * angle)
+    return math.cos(0.5 * angle), sine * axis[0], sine * axis[1], sine * axis[2]
+
+
+@inlined
+def _normalised(q: Quaternion) -> Quaternion:
+    length = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if abs(length - 1.0) <= _UNIT:
+        return q
+    share = 1.0 / length
+    return share * q[0], share * q[1], share * q[2], share * q[3]
+
+
+@inlined
+def _vector(values: FloatArray) -> Vector:
+    return values[0], values[1], values[2]
+
+
+@inlined
+def _quaternion(values: FloatArray, first: int) -> Quaternion:
+    return values[first], values[first + 1], values[first + 2], values[first + 3]
+
+
+@building_block
+def _place_links(
+    links: Records,
+    joints: Records,
+    arm: FloatArray,
+    fingers: FloatArray,
+    poses: FloatArray,
+    rotations: FloatArray,
+    axes: FloatArray,
+) -> None:
+    """Fill the links' poses (l, 7) and rotations (l, 3, 3), and each joint's axis and anchor (j, 6), in the world.
+
+    In MuJoCo's order of operations, so that nearly all digits are the same.
+    """
+    for row in range(links.size):
+        link = links[row]
+        position, turn = _vector(link.position), _quaternion(link.quaternion, 0)
+        if row > 0:
+            position = _on_link(poses[link.parent], rotations[link.parent], position)
+            turn = _product(_quaternion(poses[link.parent], 3), turn)
+        for number in range(link.first_joint, link.end_joint):
+            joint = joints[number]
+            anchor, axis = _vector(joint.anchor), _turned(turn, _vector(joint.axis))
+            held = add(_turned(turn, anchor), position)
+            way = (arm[joint.reading] if joint.of_arm else fingers[joint.reading]) - joint.reference
+            if joint.slides:
+                position = add(position, scale(way, axis))
+            else:
+                turn = _product(turn, _about(_vector(joint.axis), way))
+                # The anchor stays where it was.
+                position = subtract(held, _turned(turn, anchor))
+            for i in range(3):
+                axes[number, i], axes[number, 3 + i] = axis[i], held[i]
+        turn = _normalised(turn)
+        _fill_rotation(turn, rotations[row])
+        for i in range(3):
+            poses[row, i] = position[i]
+        for i in range(4):
+            poses[row, 3 + i] = turn[i]
+
+
+@compiled(
+    *(record_array(LINK), record_array(JOINT), record_array(POINT), input_array(1), record_array(POINT)),
+    *(input_array(1), input_array(1), output_array(2)),
+    *(output_array(1), output_array(2), output_array(2), output_array(2)),
+    returns=TRUTH,
+)
+def _place(
+    links: Records,
+    joints: Records,
+    tool: Records,
+    tool_quaternion: FloatArray,
+    points: Records,
+    arm: FloatArray,
+    fingers: FloatArray,
+    poses: FloatArray,
+    tool_position: FloatArray,
+    tool_rotation: FloatArray,
+    jacobian: FloatArray,
+    centers: FloatArray,
+) -> bool:
+    of_arm = 0
+    for number in range(joints.size):
+        of_arm += joints[number].of_arm
+    if arm.size != of_arm or fingers.size != joints.size - of_arm or poses.shape[0] != links.size:
+        return False
+    rotations, axes = np.empty((links.size, 3, 3)), np.empty((joints.size, 6))
+    _place_links(links, joints, arm, fingers, poses, rotations, axes)
+
+    carrier = tool[0].link
+    position = _on_link(poses[carrier], rotations[carrier], _vector(tool[0].position))
+    _fill_rotation(_product(_quaternion(poses[carrier], 3), _quaternion(tool_quaternion, 0)), tool_rotation)
+    for i in range(3):
+        tool_position[i] = position[i]
+
+    for number in range(joints.size):
+        joint = joints[number]
+        if not joint.of_arm:
+            continue
+        axis, turned = load(axes, number), (0.0, 0.0, 0.0)
+        linear = axis
+        if not joint.slides:
+            lever = subtract(position, (axes[number, 3], axes[number, 4], axes[number, 5]))
+            linear, turned = cross(axis, lever), axis
+        for i in range(3):
+            jacobian[i, joint.reading], jacobian[3 + i, joint.reading] = linear[i], turned[i]
+
+    for number in range(points.size):
+        point = points[number]
+        center = _on_link(poses[point.link], rotations[point.link], _vector(point.position))
+        for i in range(3):
+            centers[number, i] = center[i]
+    return True
