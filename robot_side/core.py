@@ -93,6 +93,7 @@ class RobotSide:
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
         self._centers_m: FloatArray = np.empty((0, 3))
+        self._target: int | None = None
         self.newest: tuple[Sensed, Situation] | None = None
         """What the last tick found out, and where."""
         self._loop_age_s = RunningStatistics(seed)
@@ -123,7 +124,9 @@ class RobotSide:
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             self._loop_age.update(age_s, now_s)
-            self._loop_age_s.add(self._loop_age.value(now_s))
+        delay_s = self._loop_age.value(now_s)
+        if age_s is not None:
+            self._loop_age_s.add(delay_s)
         state = self._joints.update(self._arm.state(now_s))
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
@@ -137,7 +140,7 @@ class RobotSide:
             pose=whole,
             joint_velocities_rad_s=state.joint_velocities_rad_s,
             objects=objects,
-            loop_age_s=self._loop_age.value(now_s),
+            loop_age_s=delay_s,
             loop_age_known=self._loop_age.known,
             compensation="operator" if command is None else command.compensation,
             gap_m=state.gripper_opening_m if pose.sphere_on_finger.any() else None,
@@ -147,14 +150,14 @@ class RobotSide:
         sensed = self._law.sense(situation, now_s)
         self.newest = sensed, situation
         speed_m_s = float(np.linalg.norm(pose.tool_jacobian[:3] @ state.joint_velocities_rad_s))
-        self._record(sensed, objects, speed_m_s, permission.state == "armed", now_s)
+        self._record(sensed, speed_m_s, permission.state == "armed", now_s)
         return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
 
     def _perceive(self, now_s: float) -> PerceivedObjects:
         objects = self._camera.perceive(now_s)
         if objects is not self._frame:
             self._frame = objects
-            self._centers_m = object_centers(objects)
+            self._centers_m, self._target = object_centers(objects), target_index(objects)
         return objects
 
     def _follow_target(self, objects: PerceivedObjects, pose: GripperPose) -> None:
@@ -162,11 +165,10 @@ class RobotSide:
         if not self.session.take_next_target():
             return
         chosen = next_target(objects, self._centers_m, pose.tool_position_m, pose.tool_rotation[:, 2])
-        present = target_index(objects)
         if chosen is None or self._held is not None:
             return
-        if present is not None:
-            self._camera.set_role(objects.names[present], Role.OBSTACLE)
+        if self._target is not None:
+            self._camera.set_role(objects.names[self._target], Role.OBSTACLE)
         self._camera.set_role(chosen, Role.TARGET)
 
     def _follow_grip(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState) -> None:
@@ -199,15 +201,17 @@ class RobotSide:
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
-    def _record(self, sensed: Sensed, objects: PerceivedObjects, speed_m_s: float, armed: bool, now_s: float) -> None:
+    def _record(self, sensed: Sensed, speed_m_s: float, armed: bool, now_s: float) -> None:
         self.figures.tick(sensed, speed_m_s, armed=armed)
-        target = target_index(objects)
+        target = self._target
         held = self._held is not None and self._held.index == target
         self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)
-        if self._observer is None:
-            return
-        self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
-        if now_s >= self._next_truth_s:
+
+    def observe(self, now_s: float) -> None:
+        """After the messages of the tick at `now_s` have left: note what was true, where somebody sees it."""
+        if self._observer is not None:
+            self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
+        if self._observer is not None and now_s >= self._next_truth_s:
             self._next_truth_s = now_s + TRUTH_PERIOD_S
             self._observer.observe(self.figures, now_s)
 
@@ -231,6 +235,7 @@ class RobotSide:
             outgoing += [stiffness_message(one, sensed, self._told_m_s, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
+            target = self._target
             outgoing.append(
                 telemetry_message(
                     self.session.view_header(now_s),
@@ -239,16 +244,11 @@ class RobotSide:
                     sensed,
                     speed_m_s=speed_m_s,
                     gripper_opening_m=state.gripper_opening_m,
-                    target=self._target(objects),
+                    target=None if target is None else (objects.names[target], self._centers_m[target]),
                     holding=self._held is not None,
                 )
             )
         return outgoing
-
-    def _target(self, objects: PerceivedObjects) -> tuple[str, FloatArray] | None:
-        """The target's name and where its centre is; None without one."""
-        target = target_index(objects)
-        return None if target is None else (objects.names[target], self._centers_m[target])
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
         """What a person is shown, and a few figures for whoever reads JSON lines."""

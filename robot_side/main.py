@@ -173,6 +173,7 @@ class _Loop:
                     self._tick(now_s)
                 self._send()
                 if ticked:
+                    self._core.observe(now_s)
                     self._use_idle_time(self._clock.now(), now_s)
                 dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
                 wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))
