@@ -4,12 +4,14 @@ import math
 from array import array
 from bisect import bisect_left, insort
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 RESERVOIR_SIZE = 100_000
 """Samples kept for quantiles: 100 s at 1 kHz are exact, a longer run is a uniform random sample of it."""
-_BLOCK = 512
+BLOCK = 512
+"""So many samples are reckoned with together."""
 
 
 class RunningStatistics:
@@ -37,7 +39,15 @@ class RunningStatistics:
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
         self._waiting.append(value)
-        if len(self._waiting) == _BLOCK:
+        if len(self._waiting) == BLOCK:
+            self._take_in()
+
+    def extend(self, values: Sequence[float]) -> None:
+        """Take in many samples; ValueError, and none of them is, when one is not finite."""
+        if not all(map(math.isfinite, values)):
+            raise ValueError("values; valid: finite numbers")
+        self._waiting.extend(values)
+        if len(self._waiting) >= BLOCK:
             self._take_in()
 
     def _take_in(self) -> None:
@@ -141,27 +151,28 @@ class SlidingQuantile:
         self._probability = probability
         self._arrivals: deque[float] = deque()
         self._sorted: list[float] = []
+        self.value: float | None = None
+        """The quantile of the window; None while it is empty."""
 
-    def update(self, value: float) -> None:
-        """Take in the newest sample and forget the oldest of a full window; ValueError when not finite."""
+    def update(self, value: float) -> float:
+        """Take in the newest sample and forget the oldest of a full window; the quantile now.
+
+        ValueError for a value that is not finite.
+        """
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
         if len(self._arrivals) == self._window:
             del self._sorted[bisect_left(self._sorted, self._arrivals.popleft())]
         self._arrivals.append(value)
         insort(self._sorted, value)
+        self.value = newest = self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+        return newest
 
     def clear(self) -> None:
         """Forget every sample."""
         self._arrivals.clear()
         self._sorted.clear()
-
-    @property
-    def value(self) -> float | None:
-        """The quantile of the window; None while it is empty."""
-        if not self._sorted:
-            return None
-        return self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+        self.value = None
 
 
 class SlidingMinimum:

@@ -209,6 +209,7 @@ class RobotSide:
 
     def observe(self, now_s: float) -> None:
         """After the messages of the tick at `now_s` have left: note what was true, where somebody sees it."""
+        self.figures.reckon()
         if self._observer is not None:
             self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
         if self._observer is not None and now_s >= self._next_truth_s:

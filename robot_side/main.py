@@ -1,6 +1,5 @@
 """The process `feelahead-robot`: sockets, clock, core; nothing else."""
 
-import dataclasses
 import secrets
 from collections import deque
 from collections.abc import Sequence
@@ -112,7 +111,7 @@ def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[st
 
 
 def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
-    return dataclasses.replace(message, payload=flip(message.payload))
+    return message._replace(payload=flip(message.payload))
 
 
 class _Loop:

@@ -71,7 +71,7 @@ class Announcements:
 
     def take(self, now_s: float) -> list[Answer]:
         """What to send now: answers, and a notice for everyone when anything changed or the last ones are old."""
-        standing = [(one.epoch, one.state) for one in self._lease.present()]
+        standing = [(one.epoch, one.session.state) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:
             self._noticed_s, self._noticed, self._noticed_token = now_s, standing, self._lease.token

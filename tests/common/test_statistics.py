@@ -57,6 +57,22 @@ def test_asking_in_between_changes_nothing(values: list[float], asked_at: set[in
     assert asked.quantile(0.37) == quiet.quantile(0.37) == np.quantile(values, 0.37)
 
 
+@repeatable
+@given(st.lists(st.lists(st.floats(-1e6, 1e6), max_size=700), max_size=4))
+def test_many_at_once_are_as_good_as_one_by_one(blocks: list[list[float]]) -> None:
+    together, single = RunningStatistics(0), RunningStatistics(0)
+    for block in blocks:
+        together.extend(block)
+        for value in block:
+            single.add(value)
+    assert (together.count, together.minimum, together.quantile(0.5)) == (
+        single.count,
+        single.minimum,
+        single.quantile(0.5),
+    )
+    assert together.mean == (None if single.mean is None else pytest.approx(single.mean, rel=1e-12, abs=1e-9))
+
+
 def test_the_reservoir_is_the_same_whenever_it_is_asked() -> None:
     quiet, asked = RunningStatistics(3), RunningStatistics(3)
     for value in range(RESERVOIR_SIZE + 20_000):
@@ -112,6 +128,8 @@ def test_refuses_what_is_not_finite(value: float) -> None:
     running, sliding = RunningStatistics(0), SlidingQuantile()
     with pytest.raises(ValueError, match="value = "):
         running.add(value)
+    with pytest.raises(ValueError, match="values"):
+        running.extend([1.0, value])
     with pytest.raises(ValueError, match="value = "):
         sliding.update(value)
     assert running.count == 0
