@@ -40,10 +40,14 @@ def _all_in_range(name: str, low: float, high: float, values: Iterable[float]) -
         _in_range(name, low, high, value)
 
 
-def _finite(name: str, *values: float) -> None:
+def _finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise ValueError(f"{name} = {value}; valid: a finite number")
+
+
+def _all_finite(name: str, values: Iterable[float]) -> None:
     for value in values:
-        if not math.isfinite(value):
-            raise ValueError(f"{name} = {value}; valid: a finite number")
+        _finite(name, value)
 
 
 def _rising(name: str, ways: Ways) -> None:
@@ -87,7 +91,8 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
         _in_range("sequence", 0, _LARGEST, self.sequence)
         _finite("sent_s", self.sent_s)
         _both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
-        _both_or_neither("last", self.last_sent_s, self.last_held_s)
+        if self.last_sent_s is not None or self.last_held_s is not None:  # which is rare
+            _both_or_neither("last", self.last_sent_s, self.last_held_s)
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
@@ -270,10 +275,10 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
     r2: float
 
     def __post_init__(self) -> None:
-        _finite("tool_position_m", *self.tool_position_m)
+        _all_finite("tool_position_m", self.tool_position_m)
         _all_in_range("up_in_tool", -1.001, 1.001, self.up_in_tool)
         if self.target_in_tool_m is not None:
-            _finite("target_in_tool_m", *self.target_in_tool_m)
+            _all_finite("target_in_tool_m", self.target_in_tool_m)
         _in_range("tool_speed_m_s", 0.0, 100.0, self.tool_speed_m_s)
         _in_range("gripper_opening_m", 0.0, 10.0, self.gripper_opening_m)
         _in_range("enlargement_m", 0.0, 100.0, self.enlargement_m)
