@@ -22,8 +22,8 @@ from common.protocol.messages import (
     Watch,
 )
 from common.protocol.session import SessionState
+from tests.common.protocol.packed import packed_by_msgpack
 from tests.helpers.felt import felt, field, ways
-from tests.helpers.packed import packed_by_msgpack
 
 unit = st.floats(0.0, 1.0)
 signed_unit = st.floats(-1.0, 1.0)

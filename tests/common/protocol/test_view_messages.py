@@ -7,7 +7,7 @@ from common.errors import RemoteProtocolError
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared, decode, decode_view, encode
 from common.protocol.messages import Header, Hello
 from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneShapes, SceneState, Shape, VideoFrame
-from tests.helpers.packed import packed_by_msgpack
+from tests.common.protocol.packed import packed_by_msgpack
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
