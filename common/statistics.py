@@ -4,22 +4,27 @@ import math
 from array import array
 from bisect import bisect_left, insort
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 RESERVOIR_SIZE = 100_000
 """Samples kept for quantiles: 100 s at 1 kHz are exact, a longer run is a uniform random sample of it."""
+BLOCK = 512
+"""So many samples are reckoned with together."""
 
 
 class RunningStatistics:
     """Mean, standard deviation, extremes and quantiles of every sample added; None where there is none yet.
 
     All but the quantiles are exact. Quantiles come from all samples up to `RESERVOIR_SIZE`, and from a
-    uniform random choice of as many beyond that.
+    uniform random choice of as many beyond that. A sample waits until there is a block of them, or until
+    somebody asks: a tick that adds one should not have to reckon.
     """
 
     def __init__(self, seed: int = 0) -> None:
         self._generator = np.random.default_rng(seed)
+        self._waiting: list[float] = []
         self._count = 0
         self._mean = 0.0
         self._squares = 0.0
@@ -27,25 +32,43 @@ class RunningStatistics:
         self._maximum = -math.inf
         self._reservoir = array("d")
         self._log_threshold = 0.0
-        self._next_kept = 0
+        self._next_kept = RESERVOIR_SIZE
 
     def add(self, value: float) -> None:
         """Take in one sample; ValueError when it is not finite."""
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
-        self._count += 1
-        # Welford's update, because the difference of two large sums would lose the variance.
-        before = value - self._mean
-        self._mean += before / self._count
-        self._squares += before * (value - self._mean)
-        self._minimum = min(self._minimum, value)
-        self._maximum = max(self._maximum, value)
-        if self._count <= RESERVOIR_SIZE:
-            self._reservoir.append(value)
-            if self._count == RESERVOIR_SIZE:
-                self._choose_next_kept()
-        elif self._count == self._next_kept:
-            self._reservoir[int(self._generator.integers(RESERVOIR_SIZE))] = value
+        self._waiting.append(value)
+        if len(self._waiting) == BLOCK:
+            self._take_in()
+
+    def extend(self, values: Sequence[float]) -> None:
+        """Take in many samples; ValueError, and none of them is, when one is not finite."""
+        if not all(map(math.isfinite, values)):
+            raise ValueError("values; valid: finite numbers")
+        self._waiting.extend(values)
+        if len(self._waiting) >= BLOCK:
+            self._take_in()
+
+    def _take_in(self) -> None:
+        """Reckon with what waits. Combining moments: Chan, Golub and LeVeque 1979."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        before, added = self._count, len(waiting)
+        mean = _mean(waiting)
+        apart, share = mean - self._mean, added / (before + added)
+        spread = math.dist(waiting, [mean] * added)
+        self._squares += spread * spread + apart * apart * before * share
+        self._mean += apart * share
+        self._count += added
+        self._minimum = min(self._minimum, *waiting)
+        self._maximum = max(self._maximum, *waiting)
+        self._reservoir.extend(waiting[: max(0, RESERVOIR_SIZE - before)])
+        while self._next_kept <= self._count:
+            if self._next_kept > RESERVOIR_SIZE:
+                place = int(self._generator.integers(RESERVOIR_SIZE))
+                self._reservoir[place] = waiting[self._next_kept - before - 1]
             self._choose_next_kept()
 
     def _choose_next_kept(self) -> None:
@@ -55,38 +78,42 @@ class RunningStatistics:
         """
         first, second = 1.0 - self._generator.random(2)
         self._log_threshold += math.log(first) / RESERVOIR_SIZE
-        skipped = math.floor(math.log(second) / math.log1p(-math.exp(self._log_threshold)))
-        self._next_kept = self._count + skipped + 1
+        self._next_kept += math.floor(math.log(second) / math.log1p(-math.exp(self._log_threshold))) + 1
 
     @property
     def count(self) -> int:
         """How many samples were added."""
-        return self._count
+        return self._count + len(self._waiting)
 
     @property
     def mean(self) -> float | None:
         """The arithmetic mean."""
+        self._take_in()
         return self._mean if self._count else None
 
     @property
     def sd(self) -> float | None:
         """The standard deviation of a sample (n − 1); None below two samples."""
+        self._take_in()
         return math.sqrt(self._squares / (self._count - 1)) if self._count > 1 else None
 
     @property
     def minimum(self) -> float | None:
         """The least sample."""
+        self._take_in()
         return self._minimum if self._count else None
 
     @property
     def maximum(self) -> float | None:
         """The greatest sample."""
+        self._take_in()
         return self._maximum if self._count else None
 
     def quantile(self, probability: float) -> float | None:
         """The `probability` quantile, interpolated linearly; ValueError outside [0, 1]."""
         if not 0.0 <= probability <= 1.0:
             raise ValueError(f"probability = {probability}; valid: 0 to 1")
+        self._take_in()
         return float(np.quantile(np.array(self._reservoir), probability)) if self._count else None
 
     def summary_ms(self) -> dict[str, float | None]:
@@ -99,6 +126,13 @@ class RunningStatistics:
             "p99": self.quantile(0.99),
         }
         return {name: None if value is None else 1e3 * value for name, value in values_s.items()}
+
+
+def _mean(values: list[float]) -> float:
+    try:
+        return math.fsum(values) / len(values)
+    except OverflowError:  # stamps that a peer invented
+        return math.fsum(value / len(values) for value in values)
 
 
 class SlidingQuantile:
@@ -117,27 +151,28 @@ class SlidingQuantile:
         self._probability = probability
         self._arrivals: deque[float] = deque()
         self._sorted: list[float] = []
+        self.value: float | None = None
+        """The quantile of the window; None while it is empty."""
 
-    def update(self, value: float) -> None:
-        """Take in the newest sample and forget the oldest of a full window; ValueError when not finite."""
+    def update(self, value: float) -> float:
+        """Take in the newest sample and forget the oldest of a full window; the quantile now.
+
+        ValueError for a value that is not finite.
+        """
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
         if len(self._arrivals) == self._window:
             del self._sorted[bisect_left(self._sorted, self._arrivals.popleft())]
         self._arrivals.append(value)
         insort(self._sorted, value)
+        self.value = newest = self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+        return newest
 
     def clear(self) -> None:
         """Forget every sample."""
         self._arrivals.clear()
         self._sorted.clear()
-
-    @property
-    def value(self) -> float | None:
-        """The quantile of the window; None while it is empty."""
-        if not self._sorted:
-            return None
-        return self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+        self.value = None
 
 
 class SlidingMinimum:

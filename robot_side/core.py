@@ -125,7 +125,9 @@ class RobotSide:
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             self._loop_age.update(age_s, now_s)
-            self._loop_age_s.add(self._loop_age.value(now_s))
+        delay_s = self._loop_age.value(now_s)
+        if age_s is not None:
+            self._loop_age_s.add(delay_s)
         state = self._joints.update(self._arm.state(now_s))
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
@@ -139,7 +141,7 @@ class RobotSide:
             pose=whole,
             joint_velocities_rad_s=state.joint_velocities_rad_s,
             objects=objects,
-            loop_age_s=self._loop_age.value(now_s),
+            loop_age_s=delay_s,
             loop_age_known=self._loop_age.known,
             compensation="operator" if command is None else command.compensation,
             gap_m=state.gripper_opening_m if self._kinematics.has_fingers else None,
@@ -156,8 +158,7 @@ class RobotSide:
         objects = self._camera.perceive(now_s)
         if objects is not self._frame:
             self._frame = objects
-            self._centers_m = object_centers(objects)
-            self._target = target_index(objects)
+            self._centers_m, self._target = object_centers(objects), target_index(objects)
         return objects
 
     def _follow_target(self, objects: PerceivedObjects, pose: GripperPose) -> None:
@@ -202,10 +203,13 @@ class RobotSide:
         target = self._target
         held = self._held is not None and self._held.index == target
         self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)
-        if self._observer is None:
-            return
-        self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
-        if now_s >= self._next_truth_s:
+
+    def observe(self, now_s: float) -> None:
+        """After the messages of the tick at `now_s` have left: note what was true, where somebody sees it."""
+        self.figures.reckon()
+        if self._observer is not None:
+            self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
+        if self._observer is not None and now_s >= self._next_truth_s:
             self._next_truth_s = now_s + TRUTH_PERIOD_S
             self._observer.observe(self.figures, now_s)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from common.arrays import FloatArray
-from common.statistics import RunningStatistics
+from common.statistics import BLOCK, RunningStatistics
 from robot_side.ahead.law import Sensed
 from robot_side.objects.perceived import Role
 from robot_side.placing import Placing
@@ -22,11 +23,17 @@ _CONTACT_REST_S = 0.1
 touch chatters, and two fingers do not close at the same instant."""
 
 
+_MOST_ROWS = 8 * BLOCK
+"""That many ticks wait at most to be reckoned with, if nobody asks for it between ticks."""
+
+
 class RunFigures:
     """Statistics over the ticks; nothing here is read back by the control."""
 
     def __init__(self, seed: int = 0) -> None:
         self.ticks = 0
+        self._rows: list[tuple[float, float, float, float, bool]] = []
+        """Of the newest ticks: enlargement_m, overlap_m3, stiffness of L2 and of R2, and whether the tool moved."""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -47,15 +54,33 @@ class RunFigures:
         self._warned = False
 
     def tick(self, sensed: Sensed, tool_speed_m_s: float, *, armed: bool = True) -> None:
-        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
+        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed.
+
+        ValueError, and nothing is noted, unless all of them are finite.
+        """
+        enlargement_m, l2, r2 = sensed.enlargement_m, sensed.l2.stiffness, sensed.r2.stiffness
+        felt = (l2, r2) if armed else (0.0, 0.0)
+        row = (enlargement_m, sensed.overlap_m3, *felt, tool_speed_m_s > MOVING_M_S)
+        if not math.isfinite(sum(row)):
+            raise ValueError(f"enlargement, overlap and stiffness are {row}; valid: finite numbers")
+        self._rows.append(row)
         self.ticks += 1
-        self._enlargement.add(sensed.enlargement_m)
-        if tool_speed_m_s > MOVING_M_S:
-            self._enlargement_moving.add(sensed.enlargement_m)
-        self._overlap.add(sensed.overlap_m3)
-        self._l2.add(sensed.l2.stiffness if armed else 0.0)
-        self._r2.add(sensed.r2.stiffness if armed else 0.0)
-        self._warned = max(sensed.rumble, sensed.l2.stiffness, sensed.r2.stiffness) > 0.0
+        if len(self._rows) == _MOST_ROWS:
+            self._take_in()
+        self._warned = max(sensed.rumble, l2, r2) > 0.0
+
+    def reckon(self) -> None:
+        """Between ticks: reckon with those of a block at once, which costs each of them less."""
+        if len(self._rows) >= BLOCK:
+            self._take_in()
+
+    def _take_in(self) -> None:
+        columns = list(zip(*self._rows, strict=True)) or [()] * 5
+        moving = [enlargement_m for enlargement_m, *_, moves in self._rows if moves]
+        self._rows.clear()
+        statistics = (self._enlargement, self._overlap, self._l2, self._r2, self._enlargement_moving)
+        for statistic, values in zip(statistics, (*columns[:4], moving), strict=True):
+            statistic.extend(values)
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""
@@ -95,6 +120,7 @@ class RunFigures:
 
     def summary(self) -> dict[str, Any]:
         """The summary's keys that come from here, in the units of their names."""
+        self._take_in()
         grasp_s = None
         if self._grasped_s is not None and self._armed_s is not None:
             grasp_s = self._grasped_s - self._armed_s

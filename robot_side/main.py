@@ -1,6 +1,5 @@
 """The process `feelahead-robot`: sockets, clock, core; nothing else."""
 
-import dataclasses
 import secrets
 from collections import deque
 from collections.abc import Sequence
@@ -113,7 +112,7 @@ def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[st
 
 
 def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
-    return dataclasses.replace(message, payload=flip(message.payload))
+    return message._replace(payload=flip(message.payload))
 
 
 class _Loop:
@@ -177,6 +176,7 @@ class _Loop:
                     self._tick(now_s)
                 self._send()
                 if ticked:
+                    self._core.observe(now_s)
                     self._use_idle_time(self._clock.now(), now_s)
                 dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
                 wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))

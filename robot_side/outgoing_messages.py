@@ -1,7 +1,6 @@
 """What leaves the robot side: stiffness for those who feel, telemetry for those who look."""
 
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,8 +22,7 @@ _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 """A simulation about to become unstable shows wild figures, and must get as far as saying so."""
 
 
-@dataclass(frozen=True)
-class Outgoing:
+class Outgoing(NamedTuple):
     """One payload to send: haptics to `peer` over the control port, all else to whoever looks."""
 
     stream: OutgoingStream

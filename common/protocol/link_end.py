@@ -80,24 +80,31 @@ class LinkEnd:
         """Another epoch of ours, after the peer took this one for ended; only who knows this one can guess it."""
         self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 
-    def hello(self, now_s: float) -> Hello:
-        """The message that opens our epoch."""
-        return Hello(self.stamp(now_s), side=self._side, clock_domain=self._clock_domain)
+    def hello(self, now_s: float, sequence: int | None = None) -> Hello:
+        """The message that opens our epoch; `sequence` as for `stamp`."""
+        return Hello(self.stamp(now_s, sequence), side=self._side, clock_domain=self._clock_domain)
 
-    def stamp(self, now_s: float) -> Header:
-        """The header of the next message, to be made when it enters its delay line."""
-        self._sequence += 1
-        if self._newest is None:
-            return Header(epoch=self._epoch, sequence=self._sequence, sent_s=now_s)
-        overtaken = self._last_sent_s != self._newest.sent_s
+    def stamp(self, now_s: float, sequence: int | None = None) -> Header:
+        """The header of the next message, to be made when it enters its delay line.
+
+        `sequence`: its number, of whoever counts over several ends of one epoch; None for the next of our own.
+        """
+        if sequence is None:
+            self._sequence = sequence = self._sequence + 1
+        newest = self._newest
+        if newest is None:
+            return Header(self._epoch, sequence, now_s)
+        held_s = now_s - self._newest_received_s
+        if self._last_sent_s == newest.sent_s:
+            return Header(self._epoch, sequence, now_s, newest.sent_s, held_s)
         return Header(
-            epoch=self._epoch,
-            sequence=self._sequence,
-            sent_s=now_s,
-            echo_sent_s=self._newest.sent_s,
-            echo_held_s=now_s - self._newest_received_s,
-            last_sent_s=self._last_sent_s if overtaken else None,
-            last_held_s=now_s - self._last_received_s if overtaken else None,
+            self._epoch,
+            sequence,
+            now_s,
+            newest.sent_s,
+            held_s,
+            last_sent_s=self._last_sent_s,
+            last_held_s=now_s - self._last_received_s,
         )
 
     def expect_other_delay(self) -> None:

@@ -8,7 +8,7 @@ A field out of range or not finite makes the whole message invalid: nothing of i
 """
 
 import math
-from itertools import pairwise
+from collections.abc import Iterable
 from typing import Literal
 
 import msgspec
@@ -30,24 +30,41 @@ _LONGEST_REASON = 200
 _LONGEST_LINK = 200
 
 
-def _in_range(name: str, low: float, high: float, *values: float) -> None:
-    for value in values:
-        if not low <= value <= high:  # false for NaN, too
-            raise ValueError(f"{name} = {value}; valid: {low} to {high}")
+def _in_range(name: str, low: float, high: float, value: float) -> None:
+    if not low <= value <= high:  # false for NaN, too
+        raise ValueError(f"{name} = {value}; valid: {low} to {high}")
 
 
-def _finite(name: str, *values: float) -> None:
+def _all_in_range(name: str, low: float, high: float, values: Iterable[float]) -> None:
     for value in values:
-        if not math.isfinite(value):
-            raise ValueError(f"{name} = {value}; valid: a finite number")
+        _in_range(name, low, high, value)
+
+
+def _finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise ValueError(f"{name} = {value}; valid: a finite number")
+
+
+def _all_finite(name: str, values: Iterable[float]) -> None:
+    for value in values:
+        _finite(name, value)
+
+
+def _rising(name: str, ways: Ways) -> None:
+    a, b, c, d, e, f, g, h = ways
+    if -_FARTHEST_M <= a <= b <= c <= d <= e <= f <= g <= h <= _FARTHEST_M:  # two of these are made in each tick
+        return
+    _all_in_range(name, -_FARTHEST_M, _FARTHEST_M, ways)
+    raise ValueError(f"{name} = {ways}; valid: eight ways, none shorter than the one before")
 
 
 def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> None:
-    if (sent_s is None) != (held_s is None):
-        raise ValueError(f"{name}_sent_s and {name}_held_s; valid: both or neither")
-    if sent_s is not None and held_s is not None:
-        _finite(f"{name}_sent_s", sent_s)
-        _in_range(f"{name}_held_s", 0.0, 1e9, held_s)
+    if sent_s is None or held_s is None:
+        if sent_s is not held_s:
+            raise ValueError(f"{name}_sent_s and {name}_held_s; valid: both or neither")
+        return
+    _finite(f"{name}_sent_s", sent_s)
+    _in_range(f"{name}_held_s", 0.0, 1e9, held_s)
 
 
 class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -74,7 +91,8 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
         _in_range("sequence", 0, _LARGEST, self.sequence)
         _finite("sent_s", self.sent_s)
         _both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
-        _both_or_neither("last", self.last_sent_s, self.last_held_s)
+        if self.last_sent_s is not None or self.last_held_s is not None:  # which is rare
+            _both_or_neither("last", self.last_sent_s, self.last_held_s)
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
@@ -123,8 +141,8 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     def __post_init__(self) -> None:
         _in_range("l2", 0.0, 1.0, self.l2)
         _in_range("r2", 0.0, 1.0, self.r2)
-        _in_range("lateral", -1.0, 1.0, *self.lateral)
-        _in_range("turning", -1.0, 1.0, *self.turning)
+        _all_in_range("lateral", -1.0, 1.0, self.lateral)
+        _all_in_range("turning", -1.0, 1.0, self.turning)
         _in_range("gripper", -1.0, 1.0, self.gripper)
         _in_range("token", 0, _LARGEST, self.token)
 
@@ -204,10 +222,8 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """s(δ) of the fast list, 0 to 1."""
 
     def __post_init__(self) -> None:
-        for name, ways in (("fast_m", self.fast_m), ("slow_m", self.slow_m)):
-            _in_range(name, -_FARTHEST_M, _FARTHEST_M, *ways)
-            if any(after < before for before, after in pairwise(ways)):
-                raise ValueError(f"{name} = {ways}; valid: eight ways, none shorter than the one before")
+        _rising("fast_m", self.fast_m)
+        _rising("slow_m", self.slow_m)
         _in_range("full_speed_m_s", _SLOWEST, _FARTHEST_M, self.full_speed_m_s)
         _in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
         _in_range("displacement_m", -_FARTHEST_M, _FARTHEST_M, self.displacement_m)
@@ -259,10 +275,10 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
     r2: float
 
     def __post_init__(self) -> None:
-        _finite("tool_position_m", *self.tool_position_m)
-        _in_range("up_in_tool", -1.001, 1.001, *self.up_in_tool)
+        _all_finite("tool_position_m", self.tool_position_m)
+        _all_in_range("up_in_tool", -1.001, 1.001, self.up_in_tool)
         if self.target_in_tool_m is not None:
-            _finite("target_in_tool_m", *self.target_in_tool_m)
+            _all_finite("target_in_tool_m", self.target_in_tool_m)
         _in_range("tool_speed_m_s", 0.0, 100.0, self.tool_speed_m_s)
         _in_range("gripper_opening_m", 0.0, 10.0, self.gripper_opening_m)
         _in_range("enlargement_m", 0.0, 100.0, self.enlargement_m)

@@ -14,6 +14,7 @@ from zmq.utils.monitor import parse_monitor_message
 from common.errors import ConfigurationError
 from common.sockets.allow_list import AllowList
 from common.sockets.keys import KeyFolder, read_public_key
+from common.sockets.readable import readable
 
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"
@@ -104,10 +105,9 @@ class Authenticator:
     def serve(self) -> bool:
         """Answer what was asked since the last call, a few at most; whether more may wait. Never blocks."""
         for _ in range(_ANSWERS_PER_CALL):
-            try:
-                question = self._questions.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
+            if not readable(self._questions):
                 return False
+            question = self._questions.recv_multipart(zmq.NOBLOCK)
             self._questions.send_multipart(self._answer(question))
         return True
 

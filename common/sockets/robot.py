@@ -1,18 +1,18 @@
 """The robot side's end: it binds, tells its peers apart, and sends floods and revoked keys away."""
 
 import contextlib
-import resource
+import select
 import socket
 from dataclasses import dataclass
 
 import zmq
-from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
-from common.sockets.crowd import Crowd
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
-from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket, readable
+from common.sockets.gate import Gate
+from common.sockets.readable import EVENTS
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket
 
 PEER_LIMIT_PER_S = 5000
 """A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
@@ -36,34 +36,6 @@ class _Peer:
     """That which its last message came by; -1 where it is not known."""
     received: int = 0
     """Messages in the present second."""
-
-
-class _Gate:
-    """Watches the connections to one bound socket, and hangs up on those that are too many; before it is bound."""
-
-    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", part: "zmq.Socket[bytes]") -> None:
-        limit = min(MOST_CONNECTIONS, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4)
-        self.crowd = Crowd(limit, HANDSHAKE_LIMIT_S)
-        address = f"inproc://gate-{id(part)}"
-        part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
-        self._events = context.socket(zmq.PAIR)
-        self._events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's own thread would wait for us
-        self._events.connect(address)
-
-    def look(self, now_s: float) -> bool:
-        """Take note of the next that has come or gone; False when there is none; never blocks."""
-        if not readable(self._events):
-            return False
-        event = parse_monitor_message(self._events.recv_multipart())
-        if event["event"] == zmq.EVENT_ACCEPTED:
-            self.crowd.came(event["value"], now_s)
-        else:
-            self.crowd.went(event["value"])
-        return True
-
-    def close(self) -> None:
-        """Look no more."""
-        self._events.close(linger=0)
 
 
 class RobotSockets(SocketShell):
@@ -108,7 +80,8 @@ class RobotSockets(SocketShell):
         self._view_outdated = False
         super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
         try:
-            self._gates = [_Gate(self._context, part) for part in (self._control, self._view)]
+            self._gates = [self._watch(part) for part in (self._control, self._view)]
+            self._listen()
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
             for part, endpoint, flag in ((self._control, control, "--bind"), (self._view, view, "--view-bind")):
@@ -166,14 +139,12 @@ class RobotSockets(SocketShell):
         """(peer, payload) of every control message that has arrived, oldest first."""
         if self._authenticator is not None:
             self._authenticator.serve()
-        # Connections that come and go at the view pile up until its socket is asked anything.
-        self._view.getsockopt(zmq.EVENTS)
         if (second := int(self._clock.now())) != self._second:
             self._second = second
             for peer in self._peers.values():
                 peer.received = 0
         self._watch_connections()
-        received = []
+        received: list[tuple[bytes, bytes]] = []
         for name, *frames in self._reader.read(self._control):
             if not self._admits(name.bytes, frames[-1] if frames else name):
                 continue
@@ -205,12 +176,26 @@ class RobotSockets(SocketShell):
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
         return self.wait_for(timeout_s, [self._control], self._authenticator)
 
+    def _watch(self, part: "zmq.Socket[bytes]") -> Gate:
+        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S)
+
+    def _listen(self) -> None:
+        """Be told when there is something at the gates or the view; whatever is there already is looked at anyway."""
+        self._comings = select.poll()
+        for part in (self._view, *(gate.events for gate in self._gates)):
+            self._comings.register(part.fileno(), select.POLLIN)
+        self._all_seen = False
+
     def _watch_connections(self) -> None:
-        """Take note of who has come and gone at both ports, and hang up on who is too many.
+        """Take note of who has come and gone at both ports since it was last looked, and hang up on who is too many.
 
         A descriptor may stand for another connection by now, at the other port, too: only when a last look has found
         nothing new at either is each known to be whose it is. With more than one call takes in, nobody is hung up on.
         """
+        if self._all_seen and not self._comings.poll(0):
+            return
+        # Connections that come and go at the view pile up until its socket is asked anything.
+        self._view.getsockopt(EVENTS)
         now_s = self._clock.now()
         self._all_seen = False
         for _ in range(_EVENTS_PER_CALL):
@@ -230,13 +215,14 @@ class RobotSockets(SocketShell):
         view = self._open_view(zmq.PUB)
         try:
             keys.secure(view)
-            gate = _Gate(self._context, view)
+            gate = self._watch(view)
         except zmq.ZMQError:
             view.close(linger=0)
             raise
         self._gates[1].close()
         self._view.close(linger=0)
         self._view, self._gates[1], self._view_outdated = view, gate, False
+        self._listen()
         self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
 
     def _bind_view_again(self) -> None:

@@ -34,8 +34,7 @@ class LoopAge:
         if not (math.isfinite(age_s) and age_s >= 0.0):
             raise ValueError(f"age_s = {age_s}; valid: a finite time of 0 s or more")
         before_s = self.value(now_s)
-        self._quantile.update(age_s)
-        self._held_s = max(before_s, self._quantile.value or 0.0)
+        self._held_s = max(before_s, self._quantile.update(age_s))
         self._held_since_s = now_s
 
     def reset(self) -> None:

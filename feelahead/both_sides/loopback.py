@@ -173,6 +173,7 @@ class Loopback:
         start_s = _WALL.now()
         outgoing = self.robot.tick(now_s)
         self.tick_time.add(_WALL.now() - start_s)
+        self.robot.observe(now_s)
         for message in outgoing:
             self._to_operator[message.stream].push(now_s, message.payload)
         if (words := self.robot.session.tuning.take_link()) is not None:

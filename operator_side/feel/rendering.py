@@ -19,12 +19,11 @@ from operator_side.dualsense.effects.official import (
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
+from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
 """From full strength to none, unless the trigger is released."""
-_FREE: Final = (0,) * ZONE_COUNT
 _ROUNDING: Final = 1e-9
 
 
@@ -54,7 +53,7 @@ class RenderedTrigger:
         self._travels = zone_travels(travel)
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
-        self._strengths: tuple[int, ...] = _FREE
+        self._strengths: tuple[int, ...] = FREE.strengths
         self._effect: TriggerEffect = Off()
 
     def render(
@@ -65,6 +64,9 @@ class RenderedTrigger:
             field, horizon_m, self._travels, other_travel, moving, horizon_s=self._settings.horizon_s
         )
         self.beyond_horizon += zones.beyond_horizon
+        if zones is FREE and not any(self._levels):
+            self._last_s = now_s
+            return self._effect
         fallen = MAX_STRENGTH * max(now_s - self._last_s, 0.0) / FALL_S
         self._last_s = now_s
         self._levels = [
@@ -76,7 +78,7 @@ class RenderedTrigger:
     def release(self) -> None:
         """Let go at once."""
         self._levels = [0.0] * ZONE_COUNT
-        self._show(_FREE)
+        self._show(FREE.strengths)
 
     def _show(self, strengths: tuple[int, ...]) -> None:
         if strengths == self._strengths:

@@ -11,7 +11,7 @@ and a zone's strength is how many of the field's ways D_z has passed, never less
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
@@ -29,6 +29,9 @@ class Zones(NamedTuple):
     """0 to 8, never falling with travel."""
     beyond_horizon: int
     """How many are full because nobody knows what lies so far ahead."""
+
+
+FREE: Final = Zones((0,) * ZONE_COUNT, 0)
 
 
 def zone_travels(travel: TriggerTravel) -> tuple[float, ...]:
@@ -66,6 +69,13 @@ def zone_strengths(
     arm is told. A zone that does not advance along the trigger, as the other one is pulled farther, has none.
     """
     full_m_s = field.full_speed_m_s
+    fastest_m_s = max(0.0, (travels[-1] - other_travel) * full_m_s)
+    excess_m_s = max(0.0, moving.speed_m_s)
+    # No zone needs more than its fastest speed and the whole excess together.
+    most_m = moving.way_m + fastest_m_s * horizon_s
+    most_m += (fastest_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
+    if most_m <= horizon_m and most_m < field.fast_m[0] and most_m < field.slow_m[0]:
+        return FREE
     touch_m_s = touch_speed_m_s(full_m_s)
     strengths: list[int] = []
     strength = beyond = 0

@@ -5,8 +5,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import msgspec
-
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, LeaseNotice
@@ -43,14 +41,13 @@ class Announcements:
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
         """The next header of our epoch, which has one sequence whoever it goes to; `link` None: to nobody named."""
-        header = (link or self._link).stamp(now_s)
-        return msgspec.structs.replace(header, sequence=next(self._sequence))
+        return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
         """The next header of what is made between the ticks, in a sequence of its own: what the core sends is the same
         whoever looks.
         """
-        return msgspec.structs.replace(self._link.stamp(now_s), sequence=next(self._shown))
+        return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:
         """Answer a Hello, at a bounded rate: ours, and where it stands."""
@@ -74,7 +71,7 @@ class Announcements:
 
     def take(self, now_s: float) -> list[Answer]:
         """What to send now: answers, and a notice for everyone when anything changed or the last ones are old."""
-        standing = [(one.epoch, one.state) for one in self._lease.present()]
+        standing = [(one.epoch, one.session.state) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:
             self._noticed_s, self._noticed, self._noticed_token = now_s, standing, self._lease.token
@@ -84,9 +81,7 @@ class Announcements:
         return answers
 
     def _hello(self, peer: bytes, link: LinkEnd, now_s: float) -> None:
-        hello = link.hello(now_s)
-        header = msgspec.structs.replace(hello.header, sequence=next(self._sequence))
-        self._answers.append(Answer(peer, encode(msgspec.structs.replace(hello, header=header))))
+        self._answers.append(Answer(peer, encode(link.hello(now_s, next(self._sequence)))))
 
     def _notice(self, participant: Participant, now_s: float) -> None:
         observers = self._lease.observers()

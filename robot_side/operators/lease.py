@@ -81,17 +81,18 @@ class Lease:
 
     def expire(self, now_s: float) -> None:
         """Let go of whoever has been silent for too long."""
-        for one in list(self.present()):
-            if now_s - one.heard_s >= self._safety.settings.lease_s:
+        limit_s = self._safety.settings.lease_s
+        for one in self._participants.values():
+            if now_s - one.heard_s >= limit_s and one.state is not SessionState.AWAY:
                 if one is self._owner:
                     self._release(SessionEvent.SILENT, now_s)
                 else:
                     one.session.handle(SessionEvent.SILENT)
-        away = sorted(
-            (one for one in self._participants.values() if one.state is SessionState.AWAY), key=lambda one: one.heard_s
-        )
-        for one in away[: max(0, len(away) - MOST_AWAY)]:
-            self._forget(one, SessionEvent.FORGOTTEN, now_s)
+        if len(self._participants) > MOST_AWAY:
+            away = [one for one in self._participants.values() if one.state is SessionState.AWAY]
+            away.sort(key=lambda one: one.heard_s)
+            for one in away[: max(0, len(away) - MOST_AWAY)]:
+                self._forget(one, SessionEvent.FORGOTTEN, now_s)
 
     def _own(self, participant: Participant, now_s: float) -> None:
         # Milliseconds of the monotonic clock keep it growing even when this process starts anew.

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode
@@ -19,8 +18,7 @@ from robot_side.operators.tuning import Tuning
 from robot_side.operators.watchers import Watchers
 
 
-@dataclass(frozen=True)
-class Receiver:
+class Receiver(NamedTuple):
     """Where to send what an operator is to feel, and the header to send it under."""
 
     peer: bytes

@@ -8,6 +8,7 @@ while a steady delay, however long, ages nothing.
 
 from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from common.protocol.link_end import Arrival
 from common.protocol.messages import MotionCommand, MotionState
@@ -46,8 +47,7 @@ class SafetySettings:
             raise ValueError(f"lease_s = {self.lease_s}; valid: above gap_s = {self.gap_s} to below 60")
 
 
-@dataclass(frozen=True)
-class Permission:
+class Permission(NamedTuple):
     """What may reach the arm in this tick."""
 
     state: MotionState

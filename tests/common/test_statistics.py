@@ -40,6 +40,60 @@ def test_agrees_with_the_whole_sample(values: list[float], probability: float) -
         assert running.sd == pytest.approx(statistics.stdev(values), rel=1e-9, abs=1e-7)
 
 
+@repeatable
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2000), st.sets(st.integers(0, 1999), max_size=5))
+def test_asking_in_between_changes_nothing(values: list[float], asked_at: set[int]) -> None:
+    quiet, asked = RunningStatistics(0), RunningStatistics(0)
+    for position, value in enumerate(values):
+        quiet.add(value)
+        asked.add(value)
+        if position in asked_at:
+            assert asked.mean == pytest.approx(np.mean(values[: position + 1]), rel=1e-12, abs=1e-9)
+    assert quiet.mean == pytest.approx(np.mean(values), rel=1e-12, abs=1e-9)
+    assert asked.mean == pytest.approx(quiet.mean, rel=1e-12, abs=1e-9)
+    assert quiet.sd == pytest.approx(np.std(values, ddof=1), rel=1e-12, abs=1e-9)
+    assert asked.sd == pytest.approx(quiet.sd, rel=1e-12, abs=1e-9)
+    assert (asked.count, asked.minimum, asked.maximum) == (len(values), min(values), max(values))
+    assert asked.quantile(0.37) == quiet.quantile(0.37) == np.quantile(values, 0.37)
+
+
+@repeatable
+@given(st.lists(st.lists(st.floats(-1e6, 1e6), max_size=700), max_size=4))
+def test_many_at_once_are_as_good_as_one_by_one(blocks: list[list[float]]) -> None:
+    together, single = RunningStatistics(0), RunningStatistics(0)
+    for block in blocks:
+        together.extend(block)
+        for value in block:
+            single.add(value)
+    assert (together.count, together.minimum, together.quantile(0.5)) == (
+        single.count,
+        single.minimum,
+        single.quantile(0.5),
+    )
+    assert together.mean == (None if single.mean is None else pytest.approx(single.mean, rel=1e-12, abs=1e-9))
+
+
+def test_the_reservoir_is_the_same_whenever_it_is_asked() -> None:
+    quiet, asked = RunningStatistics(3), RunningStatistics(3)
+    for value in range(RESERVOIR_SIZE + 20_000):
+        quiet.add(value)
+        asked.add(value)
+        if value % 1777 == 0:
+            assert asked.maximum == value
+    for probability in (0.1, 0.37, 0.9):
+        assert asked.quantile(probability) == quiet.quantile(probability)
+
+
+def test_numbers_beyond_any_sum_do_no_harm() -> None:
+    running = RunningStatistics(0)
+    for _ in range(3):
+        running.add(1.5e308)
+    assert running.mean == pytest.approx(1.5e308)
+    running.add(-1.5e308)
+    assert (running.minimum, running.maximum, running.count) == (-1.5e308, 1.5e308, 4)
+    assert running.sd is not None
+
+
 def test_a_large_offset_does_not_hide_the_spread() -> None:
     running = RunningStatistics(0)
     for value in range(1000):
@@ -74,6 +128,8 @@ def test_refuses_what_is_not_finite(value: float) -> None:
     running, sliding = RunningStatistics(0), SlidingQuantile()
     with pytest.raises(ValueError, match="value = "):
         running.add(value)
+    with pytest.raises(ValueError, match="values"):
+        running.extend([1.0, value])
     with pytest.raises(ValueError, match="value = "):
         sliding.update(value)
     assert running.count == 0

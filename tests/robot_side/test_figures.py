@@ -69,6 +69,35 @@ def test_mean_moving_is_over_the_ticks_in_which_the_tool_moved() -> None:
     assert MOVING_M_S == 0.01
 
 
+@pytest.mark.parametrize("asked_every", [1, 100, 10_000])
+def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
+    generator = np.random.default_rng(0)
+    enlargements, overlaps = generator.uniform(0.0, 0.1, (2, 5000))
+    speeds = generator.choice([0.0, 0.25], 5000)
+    figures = RunFigures()
+    for enlargement_m, overlap_m3, speed_m_s in zip(enlargements, overlaps, speeds, strict=True):
+        figures.tick(sensed(float(enlargement_m), float(overlap_m3)), float(speed_m_s), armed=False)
+        if figures.ticks % asked_every == 0:
+            figures.reckon()
+    summary = figures.summary()
+    assert summary["ticks"] == 5000
+    assert summary["enlargement_mm"]["mean"] == pytest.approx(1e3 * np.mean(enlargements), rel=1e-12)
+    assert summary["enlargement_mm"]["max"] == pytest.approx(1e3 * np.max(enlargements), rel=1e-12)
+    assert summary["enlargement_mm"]["mean_moving"] == pytest.approx(1e3 * np.mean(enlargements[speeds > 0]), rel=1e-12)
+    assert summary["overlap_mm3"]["mean"] == pytest.approx(1e9 * np.mean(overlaps), rel=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_tick_that_is_no_number_is_refused_and_the_others_stay(wrong: float) -> None:
+    figures = RunFigures()
+    figures.tick(sensed(0.030), 0.0)
+    with pytest.raises(ValueError, match="finite"):
+        figures.tick(sensed(wrong), 0.0)
+    assert figures.summary()["enlargement_mm"]["mean"] == pytest.approx(30.0)
+    figures.tick(sensed(0.030), wrong)  # a simulation about to become unstable
+    assert figures.summary()["ticks"] == 2
+
+
 def test_the_smallest_distance_is_kept_and_absence_is_no_distance() -> None:
     figures = RunFigures()
     figures.truth(truth(), ROLES, 0.0)

@@ -141,6 +141,7 @@ class Bench:
             while self._under_way and self._under_way[0][0] <= self.now_s:
                 _, receiver, arrived = self._under_way.popleft()
                 receiver.take(arrived, self.now_s)
+            self.robot.observe(self.now_s)
             command = self.robot.session.safety.permission(self.now_s).command
             if command is not None:
                 self.applied.setdefault(command.header.sequence, self.now_s - command.header.sent_s)

@@ -49,7 +49,8 @@ class SimulatedHands:
 
     def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
         """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError beyond."""
-        self._held = replace(self._held, left_stick=left, right_stick=right)
+        if (left, right) != (self._held.left_stick, self._held.right_stick):
+            self._held = replace(self._held, left_stick=left, right_stick=right)
 
     def set_buttons(self, pressed: frozenset[Button]) -> None:
         """Hold these buttons and no others.
@@ -60,7 +61,8 @@ class SimulatedHands:
             raise ValueError("pressed has L2 or R2; valid: any other button, and set_finger_force for these")
         if pressed & _EDGE_BUTTONS and self._model is not Model.EDGE:
             raise ValueError("pressed has a paddle or a function key; valid: only on a DualSense Edge")
-        self._held = replace(self._held, pressed=pressed)
+        if pressed != self._held.pressed:
+            self._held = replace(self._held, pressed=pressed)
 
     def set_motion(self, gyro_rad_s: Vector3 = (0.0, 0.0, 0.0), acceleration_m_s2: Vector3 = AT_REST_M_S2) -> None:
         """Turn and accelerate the controller, gravity's reaction included; ValueError for a non-finite one."""

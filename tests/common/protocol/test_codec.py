@@ -22,6 +22,7 @@ from common.protocol.messages import (
     Watch,
 )
 from common.protocol.session import SessionState
+from tests.common.protocol.packed import packed_by_msgpack
 from tests.helpers.felt import felt, field, ways
 
 unit = st.floats(0.0, 1.0)
@@ -94,6 +95,22 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of(
         horizon_m=unit,
         rumble=unit,
         state=st.sampled_from(["armed", "stopped"]),
+        told_m_s=st.none() | signed_unit,
+    ),
+    st.builds(
+        Telemetry,
+        headers,
+        state=st.sampled_from(["armed", "disarmed"]),
+        tool_position_m=st.tuples(finite, finite, finite),
+        tool_speed_m_s=unit,
+        target=st.none() | st.text(max_size=100),
+        target_in_tool_m=st.none() | st.tuples(finite, finite, finite),
+        up_in_tool=st.tuples(signed_unit, signed_unit, signed_unit),
+        gripper_opening_m=unit,
+        holding=st.booleans(),
+        enlargement_m=unit,
+        l2=unit,
+        r2=unit,
     ),
 )
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
@@ -105,6 +122,31 @@ def test_messages_come_back_as_they_were(message: AnyMessage) -> None:
     payload = encode(message)
     assert decode(payload) == message
     assert len(payload) <= MAXIMUM_BYTES
+
+
+@given(messages)
+@settings(derandomize=True, deadline=None)
+def test_the_bytes_are_those_that_messagepack_gives_for_the_same_values(message: AnyMessage) -> None:
+    assert encode(message) == packed_by_msgpack(message)
+
+
+@given(messages, st.data())
+@settings(derandomize=True, deadline=None, max_examples=300)
+def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, data: st.DataObject) -> None:
+    payload = bytearray(encode(message))
+    # Not the version: bytes of another one are not looked into.
+    position = data.draw(st.integers(2, len(payload) - 1))
+    payload[position] = data.draw(st.integers(0, 255))
+    expected: AnyMessage | None
+    try:
+        expected = msgspec.convert(msgpack.unpackb(bytes(payload))[1], AnyMessage)
+    except (ValueError, TypeError, msgspec.ValidationError):
+        expected = None
+    try:
+        decoded = decode(bytes(payload))
+    except RemoteProtocolError:
+        decoded = None
+    assert decoded == expected
 
 
 @given(st.binary(max_size=200))
@@ -185,6 +227,11 @@ def test_another_version_is_told_apart_from_garbage() -> None:
     content[0] = PROTOCOL_VERSION + 1
     with pytest.raises(OtherVersionError, match=f"protocol version {PROTOCOL_VERSION + 1}"):
         decode(msgpack.packb(content))
+
+
+def test_another_version_is_told_whatever_else_the_bytes_hold() -> None:
+    with pytest.raises(OtherVersionError):
+        decode(bytes([0x92, PROTOCOL_VERSION + 1, 0xA1, 0xFF]))  # a text that is none
 
 
 @pytest.mark.parametrize("version", [-1, True, "2", None, 2.0, [2]])

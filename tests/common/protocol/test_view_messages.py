@@ -7,6 +7,7 @@ from common.errors import RemoteProtocolError
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared, decode, decode_view, encode
 from common.protocol.messages import Header, Hello
 from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneShapes, SceneState, Shape, VideoFrame
+from tests.common.protocol.packed import packed_by_msgpack
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
@@ -51,6 +52,7 @@ def state(**changes: object) -> SceneState:
 def test_they_come_back_as_they_were_and_are_no_control_messages(message: AnyViewMessage) -> None:
     payload = encode(message)
     assert decode_view(payload) == message
+    assert payload == packed_by_msgpack(message)
     with pytest.raises(RemoteProtocolError):
         decode(payload)
     with pytest.raises(RemoteProtocolError):
@@ -90,7 +92,7 @@ def test_a_message_that_is_prepared_is_the_same_under_any_header() -> None:
     ):
         prepared = Prepared(message)
         for header in (HEADER, Header(7, 2**40, 1e6, 0.25, 0.5, 0.125, 0.75)):
-            assert decode_view(prepared.under(header)) == msgspec.structs.replace(message, header=header)
+            assert prepared.under(header) == encode(msgspec.structs.replace(message, header=header))
 
 
 def test_poses_of_objects_are_a_row_for_each_or_none() -> None:

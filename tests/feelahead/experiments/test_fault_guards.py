@@ -64,7 +64,7 @@ def valid_for_half(patch: pytest.MonkeyPatch) -> None:
 
     def shorter(self: Safety, now_s: float) -> Permission:
         found = permission(self, now_s)
-        return replace(found, valid_until_s=found.valid_until_s - self.settings.gap_s / 2)
+        return found._replace(valid_until_s=found.valid_until_s - self.settings.gap_s / 2)
 
     patch.setattr(Safety, "permission", shorter)
 

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
+from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
+from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel
 from tests.helpers.felt import field, ways
 
@@ -53,6 +54,40 @@ def test_an_example_worked_out_by_hand() -> None:
     assert zones == ((1, 1, 1, 3, 4, 6, 7, 7, 7, 7), 0)
     zones = zone_strengths(ahead, 0.11, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
     assert zones == ((1, 1, 1, 3, 4, 6, 7, 8, 8, 8), 3)
+
+
+def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, moving: Displacement) -> list[int]:
+    """Each zone's strength by the equation alone."""
+    full, strengths = ahead.full_speed_m_s, [0]
+    advancing = [travel for travel in travels if travel > other]
+    for travel in travels:
+        u, w = (travel - other) * full, moving.speed_m_s
+        needed = moving.way_m + u * HORIZON_S + (u * u + max(0.0, w - u) ** 2) / (2.0 * ahead.acceleration_m_s2)
+        slow = travel == advancing[0] or u < touch_speed_m_s(full) if advancing else True
+        stiff = sum(way <= needed for way in (ahead.slow_m if slow else ahead.fast_m))
+        strengths.append(max(strengths[-1], 8 if needed > HORIZON_M else stiff) if u > 0.0 else strengths[-1])
+    return strengths[1:]
+
+
+@given(fields(), TRAVEL, MOVING, st.floats(0.0, 0.4))
+@REPEATABLE
+def test_each_zone_is_what_the_equation_gives(
+    ahead: TriggerField, other: float, moving: Displacement, away: float
+) -> None:
+    farther = field(
+        ways(*(min(way + away, HORIZON_M) for way in ahead.fast_m)),
+        ways(*(min(way + away, HORIZON_M) for way in ahead.slow_m)),
+        full_speed_m_s=ahead.full_speed_m_s,
+        acceleration_m_s2=ahead.acceleration_m_s2,
+    )
+    found = zone_strengths(farther, HORIZON_M, USUAL, other, moving)
+    assert list(found.strengths) == one_by_one(farther, USUAL, other, moving)
+
+
+def test_a_way_that_nothing_gets_to_is_free() -> None:
+    far = field(ways(HORIZON_M), full_speed_m_s=0.1, acceleration_m_s2=3.0)
+    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, STILL) is FREE
+    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, Displacement(HORIZON_M, 0.0)) is not FREE
 
 
 @given(fields(), TRAVEL, MOVING)
