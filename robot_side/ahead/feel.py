@@ -12,22 +12,22 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from robot_side.ahead.ask import NOTHING, add_to_node, most_strength
+from common.arrays import FloatArray
+from robot_side.ahead.ask import NOTHING, add_to_node, most_strength, room_of
 from robot_side.ahead.nodes import ends
-from robot_side.ahead.tables import DONE, FIRST, GOING, JOB, PAIR, RAMP, STRENGTHS, TOUCH_STRENGTH, Record
-from robot_side.compiled.kernel import (
-    COUNT,
-    NUMBER,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    input_indices,
-    output_array,
-    record_array,
+from robot_side.ahead.tables import (
+    DONE,
+    FIRST,
+    GOING,
+    JOB_KINDS,
+    RAMPS,
+    STRENGTHS,
+    TOUCH_STRENGTH,
+    Record,
+    TableColumns,
 )
-from robot_side.compiled.vectors import load
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, load
 
 _PARTS: Final = 8
 """So finely the cubic between two nodes is looked through for where a strength begins."""
@@ -149,33 +149,16 @@ def _take_first(ramp: Record) -> None:
     ramp.state = GOING
 
 
-@compiled(
-    *(input_array(1), record_array(RAMP), record_array(PAIR), COUNT),
-    *(NUMBER, NUMBER, output_array(1), output_array(1)),
-    *(input_indices(), record_array(JOB), input_array(1), input_array(2)),
-)
-def take(
-    direction: FloatArray,
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    count: int,
-    margin: float,
-    reach: float,
-    fast: FloatArray,
-    slow: FloatArray,
-    counts: IntArray,
-    owners: np.ndarray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-) -> None:
-    """Put the results of the jobs into the first `count` ramps, and shorten the ways `fast` and `slow` (8,)."""
-    along = load(direction.reshape(1, 3), 0)
-    for kind in range(counts.size):
-        first = kind * (owners.size // counts.size)
-        for job in range(first, first + counts[kind]):
-            owner = owners[job]
-            add_to_node(ramps[owner.ramp], owner.node, volumes[job], load(gradients, job), along)
-    for k in range(count):
+@building_block
+def take(tables: TableColumns, along: Vector, margin: float, reach: float) -> None:
+    """Put the results of the jobs into the ramps, and shorten the ways."""
+    ramps, jobs, fast, slow = tables.ramps, tables.jobs, tables.ways[0], tables.ways[1]
+    for kind in range(JOB_KINDS):
+        first = kind * room_of(jobs)
+        for job in range(first, first + jobs.counts[kind]):
+            owner = jobs.owners[job]
+            add_to_node(ramps[owner.ramp], owner.node, jobs.volumes[job], load(jobs.gradients, job), along)
+    for k in range(tables.progress[RAMPS]):
         ramp = ramps[k]
         if ramp.asked == 0:
             continue
@@ -184,13 +167,13 @@ def take(
         if ramp.state == FIRST:
             _take_first(ramp)
         if math.isnan(ramp.free) and not _begin_to_rise(ramp):
-            _go_on(ramp, pairs)
+            _go_on(ramp, tables.pairs)
             if ramp.start >= reach:
                 ramp.state = DONE
         elif ramp.nodes > 1:
             ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
             if ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9):
                 full = _shorten(ramp, margin, fast, slow)
-                entered, may_rise = _to_come(ramp, pairs)
+                entered, may_rise = _to_come(ramp, tables.pairs)
                 if full or ended or (entered == math.inf and not may_rise):
                     ramp.state = DONE

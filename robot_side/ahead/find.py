@@ -2,13 +2,12 @@
 
 import math
 
-import numpy as np
-
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.ahead.kinds.layout import HALF_SPACE
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
-from robot_side.ahead.tables import BLOCK, MEETING
+from robot_side.ahead.scene_table import SceneColumns, scene_at
+from robot_side.ahead.tables import BLOCK, begin, tables_at
 from robot_side.ahead.way import passes, way_to
+from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.kernel import (
     COUNT,
     NUMBER,
@@ -16,10 +15,8 @@ from robot_side.compiled.kernel import (
     compiled,
     inlined,
     input_array,
+    input_flags,
     input_indices,
-    output_array,
-    output_indices,
-    record_array,
 )
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 
@@ -81,14 +78,14 @@ def _least_way(
 
 
 @compiled(
-    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER),
-    *(input_indices(), input_array(1)),
-    *SCENE_COLUMNS,
-    *(output_array(2), output_array(2), record_array(MEETING), output_indices()),
+    *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
     returns=COUNT,
 )
 def find(
-    spheres: FloatArray,
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
     tool: FloatArray,
     jacobian: FloatArray,
     encoder_variance: FloatArray,
@@ -99,46 +96,45 @@ def find(
     reach: float,
     standing: IntArray,
     early: FloatArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    sigma: FloatArray,
-    blocks: FloatArray,
-    meetings: np.ndarray,
-    near: IntArray,
+    scene_bundle: IntArray,
+    tables_bundle: IntArray,
 ) -> int:
-    """Fill `sigma`, `blocks` and `meetings`; the number of meetings, more than there is room for where it is short.
+    """Fill the tables' spheres, D_σ, blocks and meetings; the number of meetings, more than fit where room is short.
 
     -1 for spheres, or errors, that are not finite: they would compare as far away, and silently give no warning.
 
-    spheres (m, 4): centres and radii. tool (3,), jacobian (6, n), encoder_variance (n,), direction: the unit û (3,).
-    mean, variance: of eq. 10 along û, without the joints' part; quantile: Φ⁻¹(P). standing (k,): what each object is.
-    early (k,): by how much its ways are to be shorter, as it comes towards the gripper.
-    The scene: see SceneColumns. near: room for an object's rows.
+    centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
+    encoder_variance (n,), direction: the unit û (3,). mean, variance: of eq. 10 along û, without the joints' part;
+    quantile: Φ⁻¹(P). standing (k,): what each object is. early (k,): by how much its ways are to be shorter, as it
+    comes towards the gripper. The bundles: of `scene_at` and `tables_at`.
     """
-    along, origin = load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
+    scene, tables = scene_at(scene_bundle), tables_at(tables_bundle)
+    sigma, blocks, meetings, near = tables.sigma, tables.blocks, tables.meetings, tables.near
+    spheres, along, origin = tables.spheres, load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
+    size = radii.size
+    for i in range(size):
+        for axis in range(3):
+            spheres[i, axis] = centers[i, axis]
+        spheres[i, 3] = radii[i]
+        tables.on_finger[i] = on_finger[i]
     # A maximum may hide what is no number.
     check = 0.0
-    for i in range(spheres.shape[0]):
+    for i in range(size):
         lever = subtract(load(spheres, i), origin)
         spread = math.sqrt(_variance_along(lever, jacobian, encoder_variance, along) + variance)
         sigma[i, 0], sigma[i, 1] = max(0.0, mean + quantile * spread), max(0.0, mean)
         check += quantile * spread + mean + lever[0] + lever[1] + lever[2] + spheres[i, 3]
-    middle, around = _around(spheres, sigma, 0, spheres.shape[0])
+    middle, around = _around(spheres, sigma, 0, size)
     if not math.isfinite(check + around + reach):
         return -1
-    total = (spheres.shape[0] + BLOCK - 1) // BLOCK
+    total = (size + BLOCK - 1) // BLOCK
     for block in range(total):
-        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0]))
+        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, size))
         blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
     found = 0
     for thing in range(standing.size):
         farthest = reach + early[thing]
-        if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, object_bounds, thing, around):
+        if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, scene.object_bounds, thing, around):
             continue
         count = near_rows(scene, thing, middle, around, along, farthest, near)
         for block in range(total):
@@ -149,4 +145,5 @@ def find(
                     meeting.block, meeting.object, meeting.met = block, thing, 0
                     meeting.bound = least - early[thing]
                 found += 1
+    begin(tables, found)
     return found

@@ -9,14 +9,16 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds import box, half_space, sphere, tetrahedron
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
-from robot_side.compiled.kernel import input_array, input_indices
+from robot_side.compiled.bundle import addresses, indices, numbers
+from robot_side.compiled.bundle import rows as rows_at
+from robot_side.compiled.kernel import inlined
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.objects.validity import require_valid
 
 
 class SceneColumns(NamedTuple):
-    """A scene as kernels read it; the fields are those of SceneTable."""
+    """A scene as kernels read it, from `SceneTable.addresses`; the fields are those of SceneTable."""
 
     bounds: FloatArray
     shapes: FloatArray
@@ -26,11 +28,17 @@ class SceneColumns(NamedTuple):
     object_volumes: FloatArray
 
 
-SCENE_COLUMNS: Final = (
-    *(input_array(2), input_array(2), input_indices(), input_indices()),
-    *(input_array(2), input_array(1)),
-)
-"""Of a kernel's arguments, the fields of SceneColumns."""
+@inlined
+def scene_at(bundle: IntArray) -> SceneColumns:
+    """A scene by its addresses, in kernels."""
+    return SceneColumns(
+        rows_at(bundle, 0, 4),
+        rows_at(bundle, 1, SHAPE_NUMBERS),
+        indices(bundle, 2),
+        indices(bundle, 3),
+        rows_at(bundle, 4, 4),
+        numbers(bundle, 5),
+    )
 
 
 @dataclass(frozen=True)
@@ -56,11 +64,9 @@ class SceneTable:
     """How many primitives have no volume, and so nothing to overlap: they are left out."""
 
     @cached_property
-    def columns(self) -> SceneColumns:
-        """What kernels read of it."""
-        return SceneColumns(
-            self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes
-        )
+    def addresses(self) -> IntArray:
+        """What kernels read of it: a bundle for `scene_at`."""
+        return addresses(self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes)
 
     @cached_property
     def object_index(self) -> IntArray:

@@ -8,9 +8,10 @@ from robot_side.ahead.find import PASSED_OVER
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import HALF_SPACE, SPHERE
 from robot_side.ahead.overlaps import work_out
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns, SceneTable
-from robot_side.ahead.tables import JOB_COLUMNS, JobColumns, Tables
+from robot_side.ahead.scene_table import SceneTable, scene_at
+from robot_side.ahead.tables import Tables, tables_at
 from robot_side.ahead.way import passes
+from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices
 from robot_side.compiled.vectors import load
 
@@ -24,12 +25,9 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
     total = 0.0
     for first in range(0, len(spheres), _AT_A_TIME):
         part = np.ascontiguousarray(spheres[first : first + _AT_A_TIME])
-        while True:
-            jobs = tables.jobs
-            at_once = _gather(part, standing, *scene.columns, *jobs.columns)
-            if at_once >= 0.0:
-                break
-            tables.jobs = type(jobs)(2 * jobs.room)
+        while (at_once := _gather(part, standing, scene.addresses, tables.addresses)) < 0.0:
+            tables.grow_jobs()
+        jobs = tables.jobs
         total += at_once
         if work_out(jobs, scene):
             counts, volumes = jobs.columns.counts, jobs.columns.volumes
@@ -40,33 +38,11 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
 _AT_A_TIME = 256
 
 
-@compiled(input_array(2), input_indices(), *SCENE_COLUMNS, *JOB_COLUMNS, returns=NUMBER)
-def _gather(
-    spheres: FloatArray,
-    standing: IntArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    counts: IntArray,
-    owners: np.ndarray,
-    centers: FloatArray,
-    radii: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    vertices: FloatArray,
-) -> float:
+@compiled(input_array(2), input_indices(), BUNDLE, BUNDLE, returns=NUMBER)
+def _gather(spheres: FloatArray, standing: IntArray, scene_bundle: IntArray, tables_bundle: IntArray) -> float:
     """Write a job for each pair that bounds do not settle; the sum of the closed forms, -1 where there is no room."""
-    jobs = JobColumns(
-        counts, owners, centers, radii, volumes, gradients, box_centers, box_rotations, box_half_sizes, vertices
-    )
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
-    counts[:] = 0
+    scene, jobs = scene_at(scene_bundle), tables_at(tables_bundle).jobs
+    jobs.counts[:] = 0
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
     for thing in range(standing.size):
         if standing[thing] == PASSED_OVER:
@@ -83,7 +59,7 @@ def _gather(
                     if kind == SPHERE:
                         total += sphere.overlap(scene.shapes, row, center, radius)[0]
                         continue
-                    if counts.max() == room_of(jobs):
+                    if jobs.counts.max() == room_of(jobs):
                         return -1.0
                     write_job(kind, row, i, 0, center, radius, scene.shapes, jobs)
     return total
