@@ -45,12 +45,23 @@ class Along:
 class Field:
     """What is ahead along one direction, as it was when it was looked at."""
 
-    fast_m: FloatArray
-    """(8,) the ways at which strengths 1 to 8 begin, never falling; infinite beyond the reach"""
-    slow_m: FloatArray
-    """(8,) the same where what is to be touched is felt less, and where it is expected"""
+    ways_m: FloatArray
+    """(2, 8) the ways at which strengths 1 to 8 begin, never falling, infinite beyond the reach: the fast list, and the
+    slow one, where what is to be touched is felt less, and where it is expected"""
     sigma_m: float
     """The largest D_σ of the gripper's spheres."""
+
+    @property
+    def fast_m(self) -> FloatArray:
+        """(8,)"""
+        fast_m: FloatArray = self.ways_m[0]
+        return fast_m
+
+    @property
+    def slow_m(self) -> FloatArray:
+        """(8,)"""
+        slow_m: FloatArray = self.ways_m[1]
+        return slow_m
 
 
 @dataclass
@@ -104,8 +115,7 @@ class Ahead:
             counts.limited += int(tables.progress[LIMITED])
         else:
             counts.with_nothing_near += 1
-        fast_m, slow_m = tables.ways_m.copy()
-        return Field(fast_m, slow_m, float(tables.sigma_m[:size, 0].max()))
+        return Field(tables.ways_m.copy(), float(tables.sigma_m[:size, 0].max()))
 
     def _find(self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, early_m: FloatArray) -> int:
         while True:

@@ -19,7 +19,7 @@ SPACING_M: Final = 0.015
 who gets beyond the most places times this, places are farther apart."""
 _LEAST_M: Final = 0.003
 """Who gets no farther than this is looked at where it is."""
-_MOST_PLACES: Final = 8
+MOST_PLACES: Final = 8
 _NOISE_M_S: Final = 0.015
 """Slower than this, fingers rest: their readings are noisy."""
 _FINGERS_S: Final = 0.06
@@ -57,7 +57,7 @@ class Sideways:
         """
         farthest_m = self.farthest_m(pose, until_s, ahead_m)
         moves = farthest_m >= _LEAST_M and math.isfinite(farthest_m)
-        count = min(math.ceil(farthest_m / SPACING_M), _MOST_PLACES) if moves else 0
+        count = min(math.ceil(farthest_m / SPACING_M), MOST_PLACES) if moves else 0
         return tuple(until_s * (number + 1) / count for number in range(count))
 
     def moved(self, pose: GripperPose, after_s: float) -> GripperPose:
