@@ -49,7 +49,7 @@ from robot_side.ahead.looks import L2, R2, STICK, Looks
 from robot_side.ahead.scene_table import scene_table
 from robot_side.ahead.sideways import FingerMotion, Sideways
 from robot_side.ahead.tables import STRENGTHS
-from robot_side.ahead.total_overlap import total_overlap_m3
+from robot_side.ahead.total_overlap import looked_overlap_m3
 from robot_side.arm.ability import Ability, JointLimits, ability, along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings, deflected
@@ -190,9 +190,9 @@ class SweptLaw:
         found = self.ahead.look(pose, scene, standing, along, widest_m)
         overlap_m3 = 0.0
         if place == 0 and side == (R2 if speed_m_s >= 0.0 else L2):
-            sigma_m = self.ahead.tables.sigma_m[: len(pose.sphere_radii_m), 0]
-            spheres = moved_and_inflated(pose, abs(speed_m_s) * situation.loop_age_s * along.direction, sigma_m)
-            overlap_m3 = total_overlap_m3(spheres, scene, standing, self.ahead.tables)
+            moved_m = abs(speed_m_s) * situation.loop_age_s * along.direction
+            spheres = len(pose.sphere_radii_m)
+            overlap_m3 = looked_overlap_m3(moved_m, spheres, scene, standing, self.ahead.tables)
         where = along.direction, pose.tool_position_m, found.ways_m
         self._looks.add(side, place, now_s, *where, able, along.reach_m, found.sigma_m, overlap_m3)
 

@@ -1,8 +1,10 @@
 """How much of some spheres lies in the objects now, in all: Σ V_ij (eq. 11-12)."""
 
+import math
+
 import numpy as np
 
-from common.arrays import FloatArray, IntArray, require_finite
+from common.arrays import FloatArray, IntArray
 from robot_side.ahead.ask import room_of, write_job
 from robot_side.ahead.find import PASSED_OVER
 from robot_side.ahead.kinds import half_space, sphere
@@ -12,8 +14,8 @@ from robot_side.ahead.scene_table import SceneTable, scene_at
 from robot_side.ahead.tables import Tables, tables_at
 from robot_side.ahead.way import passes
 from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices
-from robot_side.compiled.vectors import load
+from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, input_indices
+from robot_side.compiled.vectors import add, load
 
 
 def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray, tables: Tables) -> float:
@@ -21,14 +23,32 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
 
     ValueError for a sphere that is not finite, which would compare as far away from everything.
     """
-    require_finite("spheres", spheres)
+    return _total_m3(spheres, len(spheres), np.zeros_like(spheres), np.zeros(3), scene, standing, tables)
+
+
+def looked_overlap_m3(moved_m: FloatArray, count: int, scene: SceneTable, standing: IntArray, tables: Tables) -> float:
+    """The same for the `count` spheres of the last look, inflated by D_σ as it was found there, moved by (3,)."""
+    return _total_m3(tables.spheres, count, tables.sigma_m, moved_m, scene, standing, tables)
+
+
+def _total_m3(
+    spheres: FloatArray,
+    count: int,
+    inflated_m: FloatArray,
+    moved_m: FloatArray,
+    scene: SceneTable,
+    standing: IntArray,
+    tables: Tables,
+) -> float:
     total = 0.0
-    for first in range(0, len(spheres), _AT_A_TIME):
-        part = np.ascontiguousarray(spheres[first : first + _AT_A_TIME])
-        while (at_once := _gather(part, standing, scene.addresses, tables.addresses)) < 0.0:
+    for first in range(0, count, _AT_A_TIME):
+        part = spheres, inflated_m, moved_m, first, min(first + _AT_A_TIME, count), standing
+        while (at_once := _gather(*part, scene.addresses, tables.addresses)) < 0.0:
             tables.grow_jobs()
-        jobs = tables.jobs
+        if math.isnan(at_once):
+            raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
         total += at_once
+        jobs = tables.jobs
         if work_out(jobs, scene):
             counts, volumes = jobs.columns.counts, jobs.columns.volumes
             total += sum(volumes[kind * jobs.room :][:count].sum() for kind, count in enumerate(counts))
@@ -38,17 +58,39 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
 _AT_A_TIME = 256
 
 
-@compiled(input_array(2), input_indices(), BUNDLE, BUNDLE, returns=NUMBER)
-def _gather(spheres: FloatArray, standing: IntArray, scene_bundle: IntArray, tables_bundle: IntArray) -> float:
-    """Write a job for each pair that bounds do not settle; the sum of the closed forms, -1 where there is no room."""
+@compiled(
+    *(input_array(2), input_array(2), input_array(1), COUNT, COUNT, input_indices(), BUNDLE, BUNDLE),
+    returns=NUMBER,
+)
+def _gather(
+    spheres: FloatArray,
+    inflated: FloatArray,
+    moved: FloatArray,
+    begin: int,
+    end: int,
+    standing: IntArray,
+    scene_bundle: IntArray,
+    tables_bundle: IntArray,
+) -> float:
+    """Write a job for each pair that bounds do not settle; the sum of the closed forms.
+
+    spheres (m, 4), of which those from `begin` to `end` count; inflated (m, 1 or more): by its first column. -1 where
+    there is no room, NaN for what is not finite.
+    """
     scene, jobs = scene_at(scene_bundle), tables_at(tables_bundle).jobs
+    shift = load(moved.reshape(1, 3), 0)
+    check = 0.0
+    for i in range(begin, end):
+        check += spheres[i, 0] + spheres[i, 1] + spheres[i, 2] + spheres[i, 3] + inflated[i, 0]
+    if not math.isfinite(check + shift[0] + shift[1] + shift[2]):
+        return math.nan
     jobs.counts[:] = 0
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
     for thing in range(standing.size):
         if standing[thing] == PASSED_OVER:
             continue
-        for i in range(spheres.shape[0]):
-            center, radius = load(spheres, i), spheres[i, 3]
+        for i in range(begin, end):
+            center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
             if not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
                 continue
             for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
