@@ -157,7 +157,7 @@ def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float,
         ramp = ramps[k]
         if ramp.state == DONE or (ramp.state == NEW and ramp.start - ramp.before > nearest + WINDOW * margin):
             continue
-        if jobs.counts.max() + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):
+        if max(jobs.counts[0], jobs.counts[1], jobs.counts[2]) + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):
             if asked == 0:
                 return -1
             continue

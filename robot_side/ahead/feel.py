@@ -8,7 +8,7 @@ nearest first; `take` puts their results into the ramps and shortens the ways.
 """
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -33,21 +33,45 @@ _PARTS: Final = 8
 """So finely the cubic between two nodes is looked through for where a strength begins."""
 
 
+class _Piece(NamedTuple):
+    """The overlap between two nodes: their ways, values and slopes, and what the cubic between them stays within."""
+
+    way: float
+    step: float
+    volume: float
+    next_volume: float
+    slope: float
+    next_slope: float
+    low: float
+    high: float
+
+
 @inlined
-def _cubic(ramp: Record, node: int, part: float) -> float:
-    """V at `part`, 0 to 1, of the way from `node` to the next one, by both nodes' values and slopes."""
-    rest, step = 1.0 - part, ramp.way[node + 1] - ramp.way[node]
-    value: float = (
-        rest * rest * (1.0 + 2.0 * part) * ramp.volume[node]
-        + part * part * (3.0 - 2.0 * part) * ramp.volume[node + 1]
-        + step * part * rest * (rest * ramp.slope[node] - part * ramp.slope[node + 1])
+def _piece(ramp: Record, node: int) -> _Piece:
+    """What rises at both ends, or falls, has no peak in between, though the cubic may where something more is met."""
+    volume, next_volume, slope, next_slope = (
+        ramp.volume[node],
+        ramp.volume[node + 1],
+        ramp.slope[node],
+        ramp.slope[node + 1],
     )
-    if ramp.slope[node] * ramp.slope[node + 1] < 0.0:
-        return value
-    # What rises at both ends, or falls, has no peak between them, though the cubic may where something more is met.
-    low, high = min(ramp.volume[node], ramp.volume[node + 1]), max(ramp.volume[node], ramp.volume[node + 1])
-    limited: float = min(max(value, low), high)
-    return limited
+    low, high = min(volume, next_volume), max(volume, next_volume)
+    if slope * next_slope < 0.0:
+        low, high = -math.inf, math.inf
+    way = ramp.way[node]
+    return _Piece(way, ramp.way[node + 1] - way, volume, next_volume, slope, next_slope, low, high)
+
+
+@inlined
+def _cubic(piece: _Piece, part: float) -> float:
+    """V at `part`, 0 to 1, of the way from one node to the next one, by both nodes' values and slopes."""
+    rest = 1.0 - part
+    value: float = (
+        rest * rest * (1.0 + 2.0 * part) * piece.volume
+        + part * part * (3.0 - 2.0 * part) * piece.next_volume
+        + piece.step * part * rest * (rest * piece.slope - part * piece.next_slope)
+    )
+    return min(max(value, piece.low), piece.high)
 
 
 @building_block
@@ -60,10 +84,11 @@ def _begin_to_rise(ramp: Record) -> bool:
         ramp.free = way
         return True
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
         for part in range(1, _PARTS + 1):
             share = part / _PARTS
-            further = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
-            now = _cubic(ramp, node, share) - ramp.floor
+            further = piece.way + share * piece.step
+            now = _cubic(piece, share) - ramp.floor
             if now > nothing:
                 # From a deficit it passes 0 in between; else it rises from where it stood.
                 ramp.free = way + (further - way) * max(0.0, -excess) / (now - min(excess, 0.0))
@@ -107,25 +132,41 @@ def _go_on(ramp: Record, pairs: np.ndarray) -> None:
 
 
 @building_block
-def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
-    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
-    full_from = ramp.free + margin
+def _top(ramp: Record, margin: float) -> float:
+    """W(d + m), the most that V exceeds V(0) by until then."""
+    end = (ramp.free + margin) * (1.0 + 1e-12)
     top = 0.0
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
+        if piece.way > end:
+            break
+        if piece.way + piece.step <= end and piece.high < math.inf:
+            top = max(top, piece.high - ramp.floor)
+            continue
         for part in range(_PARTS + 1):
             share = part / _PARTS
-            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
-            if way <= full_from * (1.0 + 1e-12):
-                top = max(top, _cubic(ramp, node, share) - ramp.floor)
-    reference = max(top, margin * ramp.lean, ramp.least)
+            if piece.way + share * piece.step <= end:
+                top = max(top, _cubic(piece, share) - ramp.floor)
+    return top
+
+
+@building_block
+def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
+    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
+    reference = max(_top(ramp, margin), margin * ramp.lean, ramp.least)
     level, before, reached = 0, ramp.free, 0.0
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
+        if level == STRENGTHS:
+            break
+        if piece.way + piece.step <= ramp.free:
+            continue
         for part in range(1, _PARTS + 1):
             share = part / _PARTS
-            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
+            way = piece.way + share * piece.step
             if way <= ramp.free:
                 continue
-            strength = max(reached, min(1.0, (_cubic(ramp, node, share) - ramp.floor) / reference))
+            strength = max(reached, min(1.0, (_cubic(piece, share) - ramp.floor) / reference))
             while level < STRENGTHS and strength >= (level + 0.5) / STRENGTHS:
                 share_of_step = ((level + 0.5) / STRENGTHS - reached) / (strength - reached)
                 found = before + share_of_step * (way - before) - margin - ramp.before

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.ahead.kinds.layout import HALF_SPACE
 from robot_side.ahead.scene_table import SceneColumns, scene_at
@@ -26,14 +28,26 @@ while something is held; what is ignored or held is passed over."""
 
 
 @inlined
-def _variance_along(lever: Vector, jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> float:
-    """ûᵀ J diag(σ²) Jᵀ û of the point at `lever` from the tool (eq. 5): û·(v + ω × r) for each joint."""
-    total = 0.0
+def _joints_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> FloatArray:
+    """For each joint (n, 5) û × ω, û·v and its variance."""
+    joints = np.empty((encoder_variance.size, 5))
     for joint in range(encoder_variance.size):
         linear = jacobian[0, joint], jacobian[1, joint], jacobian[2, joint]
         angular = jacobian[3, joint], jacobian[4, joint], jacobian[5, joint]
-        part = dot(along, linear) + dot(cross(along, angular), lever)
-        total += encoder_variance[joint] * part * part
+        turning = cross(along, angular)
+        for axis in range(3):
+            joints[joint, axis] = turning[axis]
+        joints[joint, 3], joints[joint, 4] = dot(along, linear), encoder_variance[joint]
+    return joints
+
+
+@inlined
+def _variance_along(lever: Vector, joints: FloatArray) -> float:
+    """ûᵀ J diag(σ²) Jᵀ û of the point at `lever` from the tool (eq. 5): û·(v + ω × r) for each joint."""
+    total = 0.0
+    for joint in range(joints.shape[0]):
+        part = joints[joint, 3] + dot(load(joints, joint), lever)
+        total += joints[joint, 4] * part * part
     return total
 
 
@@ -118,19 +132,21 @@ def find(
         spheres[i, 3] = radii[i]
         tables.on_finger[i] = on_finger[i]
     # A maximum may hide what is no number.
-    check = 0.0
+    check, joints = 0.0, _joints_along(jacobian, encoder_variance, along)
     for i in range(size):
         lever = subtract(load(spheres, i), origin)
-        spread = math.sqrt(_variance_along(lever, jacobian, encoder_variance, along) + variance)
+        spread = math.sqrt(_variance_along(lever, joints) + variance)
         sigma[i, 0], sigma[i, 1] = max(0.0, mean + quantile * spread), max(0.0, mean)
         check += quantile * spread + mean + lever[0] + lever[1] + lever[2] + spheres[i, 3]
-    middle, around = _around(spheres, sigma, 0, size)
-    if not math.isfinite(check + around + reach):
+    if not math.isfinite(check + reach):
         return -1
-    total = (size + BLOCK - 1) // BLOCK
+    total, middle, around = (size + BLOCK - 1) // BLOCK, (0.0, 0.0, 0.0), 0.0
     for block in range(total):
         center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, size))
         blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
+        middle = add(middle, scale(1.0 / total, center))
+    for block in range(total):
+        around = max(around, norm(subtract(load(blocks, block), middle)) + blocks[block, 3])
     found = 0
     for thing in range(standing.size):
         farthest = reach + early[thing]
