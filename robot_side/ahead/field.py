@@ -115,7 +115,7 @@ class Ahead:
             counts.limited += int(tables.progress[LIMITED])
         else:
             counts.with_nothing_near += 1
-        return Field(tables.ways_m.copy(), float(tables.sigma_m[:size, 0].max()))
+        return Field(tables.ways_m.copy(), float(tables.largest_m[0]))
 
     def _find(self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, early_m: FloatArray) -> int:
         while True:

@@ -132,11 +132,13 @@ def find(
         spheres[i, 3] = radii[i]
         tables.on_finger[i] = on_finger[i]
     # A maximum may hide what is no number.
+    tables.largest[0] = 0.0
     check, joints = 0.0, _joints_along(jacobian, encoder_variance, along)
     for i in range(size):
         lever = subtract(load(spheres, i), origin)
         spread = math.sqrt(_variance_along(lever, joints) + variance)
         sigma[i, 0], sigma[i, 1] = max(0.0, mean + quantile * spread), max(0.0, mean)
+        tables.largest[0] = max(tables.largest[0], sigma[i, 0])
         check += quantile * spread + mean + lever[0] + lever[1] + lever[2] + spheres[i, 3]
     if not math.isfinite(check + reach):
         return -1

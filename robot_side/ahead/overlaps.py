@@ -1,7 +1,7 @@
 """The overlaps that a round asks for, by the kernels of each kind (eq. 11-12)."""
 
 from robot_side.ahead.scene_table import SceneTable
-from robot_side.ahead.tables import MESH_JOBS, TETRAHEDRON_JOBS, Jobs
+from robot_side.ahead.tables import BOX_JOBS, MESH_JOBS, TETRAHEDRON_JOBS, JobParts, Jobs
 from robot_side.compiled.kernel import Compiled
 from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
@@ -11,26 +11,22 @@ from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 def work_out(jobs: Jobs, scene: SceneTable) -> int:
     """Fill in volumes and gradients of all jobs; how many there were."""
     columns = jobs.columns
-    boxes, tetrahedra, meshes = (int(count) for count in columns.counts)
+    boxes, tetrahedra, meshes = columns.counts.tolist()
     if boxes:
-        shapes = columns.box_centers[:boxes], columns.box_rotations[:boxes], columns.box_half_sizes[:boxes]
-        _exactly(overlap_boxes, precise_boxes, jobs, slice(0, boxes), shapes)
+        shapes = columns.box_centers, columns.box_rotations, columns.box_half_sizes
+        _exactly(overlap_boxes, precise_boxes, jobs.parts(BOX_JOBS, boxes, shapes))
     if tetrahedra:
-        part = slice(TETRAHEDRON_JOBS * jobs.room, TETRAHEDRON_JOBS * jobs.room + tetrahedra)
-        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs, part, (columns.vertices[:tetrahedra],))
+        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs.parts(TETRAHEDRON_JOBS, tetrahedra, (columns.vertices,)))
     if meshes:
         _meshes(jobs, scene, meshes)
-    return boxes + tetrahedra + meshes
+    return int(boxes + tetrahedra + meshes)
 
 
-def _exactly(overlap: Compiled, precise: Compiled, jobs: Jobs, part: slice, shapes: tuple[object, ...]) -> None:
+def _exactly(overlap: Compiled, precise: Compiled, parts: JobParts) -> None:
     """The lanes, and the precise forms for those for which doubles do not suffice."""
-    results = jobs.columns.volumes[part], jobs.columns.gradients[part], jobs.areas[part]
-    rows = jobs.unsettled[: part.stop - part.start + 1]
-    spheres = jobs.columns.centers[part], jobs.columns.radii[part]
-    unsettled = overlap(*spheres, *shapes, *results, rows)
+    unsettled = overlap(*parts.given, *parts.results, parts.unsettled)
     if unsettled:
-        precise(*spheres, *shapes, rows[:unsettled], *results)
+        precise(*parts.given, parts.unsettled[:unsettled], *parts.results)
 
 
 def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
-from robot_side.compiled.vectors import Vector, add, cross, load, norm, scale, subtract, unit
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract, unit
 
 SPACING_M: Final = 0.015
 """No sphere gets farther between two places that are looked from, less than an inflated fingertip's sphere is wide. Of
@@ -155,7 +155,9 @@ class FingerMotion:
 
     def see(self, pose: GripperPose, now_s: float) -> FloatArray:
         """Take in a pose; velocities (m, 3) in m/s against the tool, world frame; 0 where there were other spheres."""
-        in_tool = (pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation
+        in_tool = np.empty(pose.sphere_centers_m.shape)
+        rotation = np.ascontiguousarray(pose.tool_rotation)
+        _to_tool(np.ascontiguousarray(pose.sphere_centers_m), pose.tool_position_m, rotation, in_tool)
         if self._seen and self._seen[-1][1].shape != in_tool.shape:
             self._seen.clear()
         self._seen.append((now_s, in_tool))
@@ -164,5 +166,31 @@ class FingerMotion:
         then_s, then = self._seen[0]
         if now_s <= then_s:
             return np.zeros_like(in_tool)
-        velocities: FloatArray = (in_tool - then) / (now_s - then_s) @ pose.tool_rotation.T
-        return velocities if np.abs(velocities).max(initial=0.0) > _NOISE_M_S else np.zeros_like(velocities)
+        velocities: FloatArray = np.empty(in_tool.shape)
+        _move_in_tool(in_tool, then, now_s - then_s, rotation, velocities)
+        return velocities
+
+
+@compiled(input_array(2), input_array(1), input_array(2), output_array(2))
+def _to_tool(centers: FloatArray, tool: FloatArray, rotation: FloatArray, in_tool: FloatArray) -> None:
+    """Fill `in_tool` (m, 3): Rᵀ (c - t)."""
+    origin = load(tool.reshape(1, 3), 0)
+    for i in range(centers.shape[0]):
+        lever = subtract(load(centers, i), origin)
+        for axis in range(3):
+            in_tool[i, axis] = dot(lever, (rotation[0, axis], rotation[1, axis], rotation[2, axis]))
+
+
+@compiled(input_array(2), input_array(2), NUMBER, input_array(2), output_array(2))
+def _move_in_tool(
+    now: FloatArray, then: FloatArray, passed: float, rotation: FloatArray, velocities: FloatArray
+) -> None:
+    """Fill velocities (m, 3), world frame, of what was at `then` and is at `now` in the tool frame; 0 for noise."""
+    fastest = 0.0
+    for i in range(now.shape[0]):
+        moved = scale(1.0 / passed, subtract(load(now, i), load(then, i)))
+        for axis in range(3):
+            velocities[i, axis] = dot(load(rotation, axis), moved)
+            fastest = max(fastest, abs(velocities[i, axis]))
+    if not fastest > _NOISE_M_S:
+        velocities[:] = 0.0

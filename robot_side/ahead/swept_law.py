@@ -53,6 +53,8 @@ from robot_side.ahead.total_overlap import looked_overlap_m3
 from robot_side.arm.ability import Ability, JointLimits, ability, along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings, deflected
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+from robot_side.compiled.vectors import dot, load
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.objects.perceived import Role
 
@@ -243,9 +245,16 @@ def _early_m(situation: Situation, direction: FloatArray, able: Ability) -> Floa
     velocities = situation.objects.velocities_m_s
     if velocities is None:
         return None
-    nearing_m_s = np.maximum(-(velocities @ direction), 0.0)
-    early: FloatArray = np.minimum(nearing_m_s * _stopping_s(situation, able), MOST_M)
+    early: FloatArray = np.empty(len(velocities))
+    _nearing(np.ascontiguousarray(velocities), direction, _stopping_s(situation, able), early)
     return early
+
+
+@compiled(input_array(2), input_array(1), NUMBER, output_array(1))
+def _nearing(velocities: FloatArray, direction: FloatArray, stopping: float, early: FloatArray) -> None:
+    along = load(direction.reshape(1, 3), 0)
+    for thing in range(early.size):
+        early[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
 
 
 def _stopping_s(situation: Situation, able: Ability) -> float:

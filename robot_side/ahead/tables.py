@@ -102,6 +102,16 @@ class JobColumns(NamedTuple):
     """(r, 4, 3)"""
 
 
+class JobParts(NamedTuple):
+    """The first so many jobs of one kind, as the kernels of overlaps take them."""
+
+    given: tuple[np.ndarray, ...]
+    """Spheres' centres and radii, and the shapes"""
+    results: tuple[np.ndarray, ...]
+    """Volumes, gradients and areas"""
+    unsettled: IntArray
+
+
 class Jobs:
     """Room for so many overlaps of each kind."""
 
@@ -121,6 +131,19 @@ class Jobs:
         )
         self.areas: FloatArray = np.zeros(JOB_KINDS * room)
         self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
+        self._parts: dict[tuple[int, int], JobParts] = {}
+
+    def parts(self, kind: int, count: int, shapes: tuple[np.ndarray, ...]) -> JobParts:
+        """The first `count` of a kind with these shapes; kept, as to make the views takes as long as an overlap."""
+        known = self._parts.get((kind, count))
+        if known is None:
+            columns, part = self.columns, slice(kind * self.room, kind * self.room + count)
+            known = self._parts[kind, count] = JobParts(
+                (columns.centers[part], columns.radii[part], *(shape[:count] for shape in shapes)),
+                (columns.volumes[part], columns.gradients[part], self.areas[part]),
+                self.unsettled[: count + 1],
+            )
+        return known
 
 
 PAIRS, RAMPS, LIMITED = 0, 1, 2
@@ -145,6 +168,7 @@ class TableColumns(NamedTuple):
     near: IntArray
     progress: IntArray
     ways: FloatArray
+    largest: FloatArray
     jobs: JobColumns
 
 
@@ -162,17 +186,18 @@ def tables_at(bundle: IntArray) -> TableColumns:
         indices(bundle, 7),
         indices(bundle, 8),
         rows(bundle, 9, STRENGTHS),
+        numbers(bundle, 10),
         JobColumns(
-            indices(bundle, 10),
-            records(bundle, 11, JOB),
-            rows(bundle, 12, 3),
-            numbers(bundle, 13),
+            indices(bundle, 11),
+            records(bundle, 12, JOB),
+            rows(bundle, 13, 3),
             numbers(bundle, 14),
-            rows(bundle, 15, 3),
+            numbers(bundle, 15),
             rows(bundle, 16, 3),
-            matrices(bundle, 17, 3, 3),
-            rows(bundle, 18, 3),
-            matrices(bundle, 19, 4, 3),
+            rows(bundle, 17, 3),
+            matrices(bundle, 18, 3, 3),
+            rows(bundle, 19, 3),
+            matrices(bundle, 20, 4, 3),
         ),
     )
 
@@ -200,6 +225,8 @@ class Tables:
         self.progress: IntArray = np.zeros(PROGRESS, dtype=np.int64)
         self.ways_m: FloatArray = np.zeros((2, STRENGTHS))
         """Fast and slow, of the last look"""
+        self.largest_m: FloatArray = np.zeros(1)
+        """D_σ, of all spheres"""
         self._make_room(most_spheres)
 
     def _make_room(self, spheres: int) -> None:
@@ -215,7 +242,7 @@ class Tables:
     def _join(self) -> None:
         self.addresses: IntArray = addresses(
             *(self.spheres, self.on_finger, self.sigma_m, self.blocks, self.meetings, self.ramps, self.pairs),
-            *(self.near, self.progress, self.ways_m, *self.jobs.columns),
+            *(self.near, self.progress, self.ways_m, self.largest_m, *self.jobs.columns),
         )
         """What kernels read and fill of them: a bundle for `tables_at`."""
 
