@@ -65,14 +65,16 @@ class Kept:
         return [one for one in self.sides[side] if one.place == 0][-1]
 
     def ways_m(self, side: int, tool_m: FloatArray) -> FloatArray:
-        return np.min([one.ways_m - one.moved_m(tool_m) for one in self.sides[side]], axis=0)
+        ways_m: FloatArray = np.min([one.ways_m - one.moved_m(tool_m) for one in self.sides[side]], axis=0)
+        return ways_m
 
 
 def random_look(rng: np.random.Generator, place: int, now_s: float) -> Look:
     direction = np.array([0.0, 0.0, 1.0]) + rng.choice([0.005, 0.1]) * rng.normal(size=3)
     ways_m = np.sort(rng.uniform(-0.01, 0.3, (2, 8)))
     ways_m[:, rng.integers(0, 9) :] = np.inf
-    able = Ability(*rng.uniform(0.1, 1.0, 2), within_reach=True)
+    speed_m_s, acceleration_m_s2 = rng.uniform(0.1, 1.0, 2).tolist()
+    able = Ability(speed_m_s, acceleration_m_s2, within_reach=True)
     direction /= np.linalg.norm(direction)
     return Look(place, now_s, direction, 0.01 * rng.normal(size=3), ways_m, able, *rng.uniform(0.1, 0.4, 3))
 
@@ -111,17 +113,15 @@ def test_the_shortest_ways_hold_less_what_the_tool_has_moved(seed: int, known: b
     feel(looks.seen, looks.counts, looks.newest, tool_m, rotation, *motion, felt)
 
     velocity = jacobian[:3] @ rates
-    speed_m_s = velocity @ rotation[:, 2]
+    speed_m_s = float(velocity @ rotation[:, 2])
     newest = [kept.newest(side) for side in (R2, L2)]
-    horizon_m = min(
-        min(
-            (able := one.able).full_speed_m_s * (loop_s + HORIZON_S)
-            + able.full_speed_m_s**2 / (2.0 * able.acceleration_m_s2)
-            + BEYOND_M,
-            one.reach_m - one.moved_m(tool_m),
-        )
+    stops_m = [
+        one.able.full_speed_m_s * (loop_s + HORIZON_S)
+        + one.able.full_speed_m_s**2 / (2.0 * one.able.acceleration_m_s2)
+        + BEYOND_M
         for one in newest
-    )
+    ]
+    horizon_m = min(*stops_m, *(one.reach_m - one.moved_m(tool_m) for one in newest))
     assert felt[HORIZON] == pytest.approx(horizon_m, abs=1e-12)
     assert felt[SPEED] == pytest.approx(speed_m_s, abs=1e-12)
     leading = newest[0 if speed_m_s >= 0.0 else 1]
