@@ -7,10 +7,10 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.ahead.find import find
-from robot_side.ahead.overlaps import work_out
 from robot_side.ahead.rounds import ENDED, MORE_JOBS, MORE_RAMPS, OVERLAPS, go_on
 from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.tables import ENTERED, LIMITED, RAMPS, Tables
+from robot_side.ahead.total_overlap import work_out
 from robot_side.arm.port import GripperPose
 
 if TYPE_CHECKING:

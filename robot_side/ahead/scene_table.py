@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds import box, half_space, sphere, tetrahedron
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
-from robot_side.ahead.next_frame import place, room
+from robot_side.ahead.kinds.next_frame import place, room
 from robot_side.compiled.bundle import addresses, indices, numbers
 from robot_side.compiled.bundle import rows as rows_at
 from robot_side.compiled.kernel import inlined

@@ -20,7 +20,7 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
         "robot_side.ahead.felt",
         "robot_side.ahead.find",
         "robot_side.ahead.looks",
-        "robot_side.ahead.next_frame",
+        "robot_side.ahead.kinds.next_frame",
         "robot_side.ahead.rounds",
         "robot_side.ahead.sideways",
         "robot_side.ahead.total_overlap",
