@@ -5,37 +5,28 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
 from robot_side.ahead.nodes import NODES_PER_MARGIN, is_spent, plan
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
+from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import (
     BOX_JOBS,
     DONE,
     FIRST,
-    JOB_COLUMNS,
     JOB_KINDS,
     MESH_JOBS,
     NEW,
-    PAIR,
-    RAMP,
+    RAMPS,
     STRENGTHS,
     TETRAHEDRON_JOBS,
     TOUCH_STRENGTH,
     WINDOW,
     JobColumns,
     Record,
+    TableColumns,
 )
-from robot_side.compiled.kernel import (
-    COUNT,
-    NUMBER,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    record_array,
-)
+from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, load, scale
 
 _PLACES: Final = np.array([0, BOX_JOBS, TETRAHEDRON_JOBS, 0, MESH_JOBS])
@@ -144,50 +135,15 @@ def _ask_node(
             write_job(kind, row, k, node, center, ramp.radius, scene.shapes, jobs)
 
 
-@compiled(
-    *(input_array(2), input_array(1), record_array(RAMP), record_array(PAIR), COUNT, NUMBER, NUMBER),
-    *(input_array(1), input_array(1)),
-    *SCENE_COLUMNS,
-    *JOB_COLUMNS,
-    returns=COUNT,
-)
-def ask(
-    spheres: FloatArray,
-    direction: FloatArray,
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    count: int,
-    margin: float,
-    reach: float,
-    fast: FloatArray,
-    slow: FloatArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    counts: IntArray,
-    owners: np.ndarray,
-    centers: FloatArray,
-    radii: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    vertices: FloatArray,
-) -> int:
-    """Write the jobs of the next round of the first `count` ramps; the number of nodes asked for, -1 without room.
+@building_block
+def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float) -> int:
+    """Write the jobs of the next round of the ramps there are; the number of nodes asked for, -1 without room.
 
-    fast and slow (8,): the ways so far. Spheres and half-spaces are worked out here, by their closed forms.
+    Spheres and half-spaces are worked out here, by their closed forms.
     """
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
-    jobs = JobColumns(
-        counts, owners, centers, radii, volumes, gradients, box_centers, box_rotations, box_half_sizes, vertices
-    )
-    along = load(direction.reshape(1, 3), 0)
-    counts[:] = 0
+    ramps, pairs, jobs, count = tables.ramps, tables.pairs, tables.jobs, tables.progress[RAMPS]
+    fast, slow = tables.ways[0], tables.ways[1]
+    jobs.counts[:] = 0
     nearest = math.inf
     for k in range(count):
         ramp = ramps[k]
@@ -201,7 +157,7 @@ def ask(
         ramp = ramps[k]
         if ramp.state == DONE or (ramp.state == NEW and ramp.start - ramp.before > nearest + WINDOW * margin):
             continue
-        if counts.max() + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):
+        if max(jobs.counts[0], jobs.counts[1], jobs.counts[2]) + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):
             if asked == 0:
                 return -1
             continue
@@ -212,6 +168,6 @@ def ask(
         ramp.rising = 0.0
         for node in range(ramp.nodes, ramp.nodes + ramp.asked):
             ramp.volume[node] = ramp.slope[node] = 0.0
-            _ask_node(ramp, k, node, load(spheres, ramp.sphere), along, scene, pairs, jobs)
+            _ask_node(ramp, k, node, load(tables.spheres, ramp.sphere), along, scene, pairs, jobs)
         asked += ramp.asked
     return asked

@@ -13,6 +13,7 @@ from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.tables import Tables
 from robot_side.ahead.total_overlap import total_overlap_m3
+from robot_side.arm.port import GripperPose
 
 Trigger = Literal["l2", "r2"]
 Overlaps = dict[int, float]
@@ -81,7 +82,6 @@ def overlaps_by_object(spheres: FloatArray, scene: SceneTable, standing: IntArra
     return found
 
 
-def moved_and_inflated(situation: Situation, moved_m: FloatArray, by_m: FloatArray) -> FloatArray:
+def moved_and_inflated(pose: GripperPose, moved_m: FloatArray, by_m: FloatArray) -> FloatArray:
     """The gripper's spheres (m, 4): moved by (3,), inflated by (m,)."""
-    pose = situation.pose
     return np.concatenate([pose.sphere_centers_m + moved_m, (pose.sphere_radii_m + by_m)[:, None]], axis=1)

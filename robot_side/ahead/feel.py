@@ -8,46 +8,70 @@ nearest first; `take` puts their results into the ramps and shortens the ways.
 """
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from robot_side.ahead.ask import NOTHING, add_to_node, most_strength
+from common.arrays import FloatArray
+from robot_side.ahead.ask import NOTHING, add_to_node, most_strength, room_of
 from robot_side.ahead.nodes import ends
-from robot_side.ahead.tables import DONE, FIRST, GOING, JOB, PAIR, RAMP, STRENGTHS, TOUCH_STRENGTH, Record
-from robot_side.compiled.kernel import (
-    COUNT,
-    NUMBER,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    input_indices,
-    output_array,
-    record_array,
+from robot_side.ahead.tables import (
+    DONE,
+    FIRST,
+    GOING,
+    JOB_KINDS,
+    RAMPS,
+    STRENGTHS,
+    TOUCH_STRENGTH,
+    Record,
+    TableColumns,
 )
-from robot_side.compiled.vectors import load
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, load
 
 _PARTS: Final = 8
 """So finely the cubic between two nodes is looked through for where a strength begins."""
 
 
+class _Piece(NamedTuple):
+    """The overlap between two nodes: their ways, values and slopes, and what the cubic between them stays within."""
+
+    way: float
+    step: float
+    volume: float
+    next_volume: float
+    slope: float
+    next_slope: float
+    low: float
+    high: float
+
+
 @inlined
-def _cubic(ramp: Record, node: int, part: float) -> float:
-    """V at `part`, 0 to 1, of the way from `node` to the next one, by both nodes' values and slopes."""
-    rest, step = 1.0 - part, ramp.way[node + 1] - ramp.way[node]
-    value: float = (
-        rest * rest * (1.0 + 2.0 * part) * ramp.volume[node]
-        + part * part * (3.0 - 2.0 * part) * ramp.volume[node + 1]
-        + step * part * rest * (rest * ramp.slope[node] - part * ramp.slope[node + 1])
+def _piece(ramp: Record, node: int) -> _Piece:
+    """What rises at both ends, or falls, has no peak in between, though the cubic may where something more is met."""
+    volume, next_volume, slope, next_slope = (
+        ramp.volume[node],
+        ramp.volume[node + 1],
+        ramp.slope[node],
+        ramp.slope[node + 1],
     )
-    if ramp.slope[node] * ramp.slope[node + 1] < 0.0:
-        return value
-    # What rises at both ends, or falls, has no peak between them, though the cubic may where something more is met.
-    low, high = min(ramp.volume[node], ramp.volume[node + 1]), max(ramp.volume[node], ramp.volume[node + 1])
-    limited: float = min(max(value, low), high)
-    return limited
+    low, high = min(volume, next_volume), max(volume, next_volume)
+    if slope * next_slope < 0.0:
+        low, high = -math.inf, math.inf
+    way = ramp.way[node]
+    return _Piece(way, ramp.way[node + 1] - way, volume, next_volume, slope, next_slope, low, high)
+
+
+@inlined
+def _cubic(piece: _Piece, part: float) -> float:
+    """V at `part`, 0 to 1, of the way from one node to the next one, by both nodes' values and slopes."""
+    rest = 1.0 - part
+    value: float = (
+        rest * rest * (1.0 + 2.0 * part) * piece.volume
+        + part * part * (3.0 - 2.0 * part) * piece.next_volume
+        + piece.step * part * rest * (rest * piece.slope - part * piece.next_slope)
+    )
+    return min(max(value, piece.low), piece.high)
 
 
 @building_block
@@ -60,10 +84,11 @@ def _begin_to_rise(ramp: Record) -> bool:
         ramp.free = way
         return True
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
         for part in range(1, _PARTS + 1):
             share = part / _PARTS
-            further = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
-            now = _cubic(ramp, node, share) - ramp.floor
+            further = piece.way + share * piece.step
+            now = _cubic(piece, share) - ramp.floor
             if now > nothing:
                 # From a deficit it passes 0 in between; else it rises from where it stood.
                 ramp.free = way + (further - way) * max(0.0, -excess) / (now - min(excess, 0.0))
@@ -107,25 +132,41 @@ def _go_on(ramp: Record, pairs: np.ndarray) -> None:
 
 
 @building_block
-def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
-    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
-    full_from = ramp.free + margin
+def _top(ramp: Record, margin: float) -> float:
+    """W(d + m), the most that V exceeds V(0) by until then."""
+    end = (ramp.free + margin) * (1.0 + 1e-12)
     top = 0.0
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
+        if piece.way > end:
+            break
+        if piece.way + piece.step <= end and piece.high < math.inf:
+            top = max(top, piece.high - ramp.floor)
+            continue
         for part in range(_PARTS + 1):
             share = part / _PARTS
-            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
-            if way <= full_from * (1.0 + 1e-12):
-                top = max(top, _cubic(ramp, node, share) - ramp.floor)
-    reference = max(top, margin * ramp.lean, ramp.least)
+            if piece.way + share * piece.step <= end:
+                top = max(top, _cubic(piece, share) - ramp.floor)
+    return top
+
+
+@building_block
+def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
+    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
+    reference = max(_top(ramp, margin), margin * ramp.lean, ramp.least)
     level, before, reached = 0, ramp.free, 0.0
     for node in range(ramp.nodes - 1):
+        piece = _piece(ramp, node)
+        if level == STRENGTHS:
+            break
+        if piece.way + piece.step <= ramp.free:
+            continue
         for part in range(1, _PARTS + 1):
             share = part / _PARTS
-            way = ramp.way[node] + share * (ramp.way[node + 1] - ramp.way[node])
+            way = piece.way + share * piece.step
             if way <= ramp.free:
                 continue
-            strength = max(reached, min(1.0, (_cubic(ramp, node, share) - ramp.floor) / reference))
+            strength = max(reached, min(1.0, (_cubic(piece, share) - ramp.floor) / reference))
             while level < STRENGTHS and strength >= (level + 0.5) / STRENGTHS:
                 share_of_step = ((level + 0.5) / STRENGTHS - reached) / (strength - reached)
                 found = before + share_of_step * (way - before) - margin - ramp.before
@@ -149,33 +190,16 @@ def _take_first(ramp: Record) -> None:
     ramp.state = GOING
 
 
-@compiled(
-    *(input_array(1), record_array(RAMP), record_array(PAIR), COUNT),
-    *(NUMBER, NUMBER, output_array(1), output_array(1)),
-    *(input_indices(), record_array(JOB), input_array(1), input_array(2)),
-)
-def take(
-    direction: FloatArray,
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    count: int,
-    margin: float,
-    reach: float,
-    fast: FloatArray,
-    slow: FloatArray,
-    counts: IntArray,
-    owners: np.ndarray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-) -> None:
-    """Put the results of the jobs into the first `count` ramps, and shorten the ways `fast` and `slow` (8,)."""
-    along = load(direction.reshape(1, 3), 0)
-    for kind in range(counts.size):
-        first = kind * (owners.size // counts.size)
-        for job in range(first, first + counts[kind]):
-            owner = owners[job]
-            add_to_node(ramps[owner.ramp], owner.node, volumes[job], load(gradients, job), along)
-    for k in range(count):
+@building_block
+def take(tables: TableColumns, along: Vector, margin: float, reach: float) -> None:
+    """Put the results of the jobs into the ramps, and shorten the ways."""
+    ramps, jobs, fast, slow = tables.ramps, tables.jobs, tables.ways[0], tables.ways[1]
+    for kind in range(JOB_KINDS):
+        first = kind * room_of(jobs)
+        for job in range(first, first + jobs.counts[kind]):
+            owner = jobs.owners[job]
+            add_to_node(ramps[owner.ramp], owner.node, jobs.volumes[job], load(jobs.gradients, job), along)
+    for k in range(tables.progress[RAMPS]):
         ramp = ramps[k]
         if ramp.asked == 0:
             continue
@@ -184,13 +208,13 @@ def take(
         if ramp.state == FIRST:
             _take_first(ramp)
         if math.isnan(ramp.free) and not _begin_to_rise(ramp):
-            _go_on(ramp, pairs)
+            _go_on(ramp, tables.pairs)
             if ramp.start >= reach:
                 ramp.state = DONE
         elif ramp.nodes > 1:
             ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
             if ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9):
                 full = _shorten(ramp, margin, fast, slow)
-                entered, may_rise = _to_come(ramp, pairs)
+                entered, may_rise = _to_come(ramp, tables.pairs)
                 if full or ended or (entered == math.inf and not may_rise):
                     ramp.state = DONE

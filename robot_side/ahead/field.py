@@ -5,14 +5,12 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray, IntArray, require_finite
-from robot_side.ahead.ask import ask
-from robot_side.ahead.feel import take
+from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.ahead.find import find
-from robot_side.ahead.meet import COUNTED, LIMITED, RAMPS, meet
-from robot_side.ahead.overlaps import work_out
+from robot_side.ahead.rounds import ENDED, MORE_JOBS, MORE_RAMPS, OVERLAPS, go_on
 from robot_side.ahead.scene_table import SceneTable
-from robot_side.ahead.tables import STRENGTHS, Tables
+from robot_side.ahead.tables import ENTERED, LIMITED, RAMPS, Tables
+from robot_side.ahead.total_overlap import work_out
 from robot_side.arm.port import GripperPose
 
 if TYPE_CHECKING:
@@ -23,7 +21,6 @@ MARGIN_M = 0.012
 LEAST_DEPTH_M = 0.0005
 """What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.5 mm)². Noise in the encoders turns a way
 aside by less."""
-_MOST_ROUNDS = 1000
 
 
 @dataclass(frozen=True)
@@ -48,12 +45,23 @@ class Along:
 class Field:
     """What is ahead along one direction, as it was when it was looked at."""
 
-    fast_m: FloatArray
-    """(8,) the ways at which strengths 1 to 8 begin, never falling; infinite beyond the reach"""
-    slow_m: FloatArray
-    """(8,) the same where what is to be touched is felt less, and where it is expected"""
+    ways_m: FloatArray
+    """(2, 8) the ways at which strengths 1 to 8 begin, never falling, infinite beyond the reach: the fast list, and the
+    slow one, where what is to be touched is felt less, and where it is expected"""
     sigma_m: float
     """The largest D_σ of the gripper's spheres."""
+
+    @property
+    def fast_m(self) -> FloatArray:
+        """(8,)"""
+        fast_m: FloatArray = self.ways_m[0]
+        return fast_m
+
+    @property
+    def slow_m(self) -> FloatArray:
+        """(8,)"""
+        slow_m: FloatArray = self.ways_m[1]
+        return slow_m
 
 
 @dataclass
@@ -95,39 +103,26 @@ class Ahead:
         ValueError that names the field of `pose` or `along` that holds NaN or infinity: that would compare as far away
         and silently give no warning.
         """
-        tables, counts = self.tables, self.counts
-        spheres = _spheres(pose)
-        tables.require(len(spheres), len(scene.bounds))
+        tables, counts, size = self.tables, self.counts, len(pose.sphere_radii_m)
+        tables.require(size, len(scene.bounds))
         early_m = np.zeros(len(standing)) if along.early_m is None else along.early_m
-        meetings = self._find(pose, spheres, scene, standing, along, early_m)
-        fast, slow = np.full(STRENGTHS, np.inf), np.full(STRENGTHS, np.inf)
+        meetings = self._find(pose, scene, standing, along, early_m)
         counts.fields += 1
         counts.flat = scene.flat
-        sigma_m = float(tables.sigma_m[: len(spheres), 0].max())
         if meetings:
-            found = np.zeros(COUNTED, dtype=np.int64)
-            self._shorten(pose, spheres, scene, standing, along, early_m, widest_m, meetings, fast, slow, found)
-            # Beyond the reach not all is known.
-            fast[fast > along.reach_m] = slow[slow > along.reach_m] = np.inf
-            counts.ramps += int(found[RAMPS])
-            counts.limited += int(found[LIMITED])
+            self._shorten(size, meetings, scene, standing, along, early_m, widest_m)
+            counts.ramps += int(tables.progress[RAMPS])
+            counts.limited += int(tables.progress[LIMITED])
         else:
             counts.with_nothing_near += 1
-        return Field(fast, slow, sigma_m)
+        return Field(tables.ways_m.copy(), float(tables.largest_m[0]))
 
-    def _find(
-        self,
-        pose: GripperPose,
-        spheres: FloatArray,
-        scene: SceneTable,
-        standing: IntArray,
-        along: Along,
-        early_m: FloatArray,
-    ) -> int:
-        tables = self.tables
+    def _find(self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, early_m: FloatArray) -> int:
         while True:
             count: int = find(
-                spheres,
+                np.ascontiguousarray(pose.sphere_centers_m),
+                pose.sphere_radii_m,
+                pose.sphere_on_finger,
                 pose.tool_position_m,
                 np.ascontiguousarray(pose.tool_jacobian),
                 self._encoder_variance,
@@ -138,96 +133,51 @@ class Ahead:
                 along.reach_m + self.margin_m,
                 standing,
                 early_m,
-                *scene.columns,
-                tables.sigma_m,
-                tables.blocks,
-                tables.meetings,
-                tables.near,
+                scene.addresses,
+                self.tables.addresses,
             )
             if count < 0:
                 _refuse(pose, along)
-            if count <= len(tables.meetings):
+            if count <= len(self.tables.meetings):
                 return count
-            tables.meetings = np.zeros(2 * count, dtype=tables.meetings.dtype)
+            self.tables.grow_meetings(count)
 
     def _shorten(
         self,
-        pose: GripperPose,
-        spheres: FloatArray,
+        spheres: int,
+        meetings: int,
         scene: SceneTable,
         standing: IntArray,
         along: Along,
         early_m: FloatArray,
         widest_m: float,
-        meetings: int,
-        fast: FloatArray,
-        slow: FloatArray,
-        found: IntArray,
     ) -> None:
-        """Round after round, the nearest first, until nothing could shorten a way any more."""
-        tables = self.tables
-        reach_m = along.reach_m + self.margin_m
-        on_finger = _as_indices(pose.sphere_on_finger)
-        meshes = _mesh_ways(scene, tables, spheres, along.direction, reach_m, self.margin_m)
-        left = meetings
-        for _ in range(_MOST_ROUNDS):
-            known = int(found[RAMPS])
-            if left:
-                left = meet(
-                    spheres,
-                    on_finger,
-                    along.direction,
-                    widest_m,
-                    self.margin_m,
-                    reach_m,
-                    self.least_depth_m,
-                    slow,
-                    tables.meetings,
-                    meetings,
-                    standing,
-                    early_m,
-                    *scene.columns,
-                    tables.sigma_m,
-                    tables.blocks,
-                    tables.ramps,
-                    tables.pairs,
-                    tables.near,
-                    found,
-                )
+        tables, progress = self.tables, self.tables.progress
+        looked = along.direction, along.reach_m, self.margin_m, widest_m, self.least_depth_m
+        around = scene.has_meshes, standing, early_m, scene.addresses
+        meshes = _mesh_ways(scene, tables, along.direction, along.reach_m + self.margin_m, self.margin_m)
+        while (what := go_on(spheres, meetings, *looked, *around, tables.addresses)) != ENDED:
+            if what == OVERLAPS:
+                self.counts.overlaps += work_out(tables.jobs, scene)
                 if meshes is not None:
-                    meshes.enter(slice(known, int(found[RAMPS])))
-                if left < 0:
-                    tables.grow()
-                    continue
-            jobs = tables.jobs
-            of_ramps = tables.ramps, tables.pairs, int(found[RAMPS]), self.margin_m, reach_m, fast, slow
-            asked = ask(spheres, along.direction, *of_ramps, *scene.columns, *jobs.columns)
-            if asked < 0:
-                tables.jobs = type(jobs)(2 * jobs.room)
-                continue
-            if asked == 0 and left == 0:
-                return
-            self.counts.overlaps += work_out(jobs, scene)
-            if meshes is not None:
-                meshes.look_again(int(found[RAMPS]))
-            done = jobs.columns
-            take(along.direction, *of_ramps, done.counts, done.owners, done.volumes, done.gradients)
+                    meshes.look_again(int(progress[RAMPS]))
+            elif what == MORE_RAMPS:
+                tables.grow_ramps()
+            elif what == MORE_JOBS:
+                tables.grow_jobs()
+            elif meshes is not None:
+                meshes.enter(slice(int(progress[ENTERED]), int(progress[RAMPS])))
 
 
 def _mesh_ways(
-    scene: SceneTable, tables: Tables, spheres: FloatArray, direction: FloatArray, reach_m: float, margin_m: float
+    scene: SceneTable, tables: Tables, direction: FloatArray, reach_m: float, margin_m: float
 ) -> "MeshWays | None":
     if not scene.has_meshes:
         return None
     # A scene without meshes does not load the kernels for them.
     from robot_side.ahead.mesh_ways import MeshWays  # noqa: PLC0415
 
-    return MeshWays(scene, tables, spheres, direction, reach_m + margin_m, margin_m)
-
-
-def _spheres(pose: GripperPose) -> FloatArray:
-    """Centres and radii (m, 4)."""
-    return np.concatenate([pose.sphere_centers_m, pose.sphere_radii_m[:, None]], axis=1)
+    return MeshWays(scene, tables, direction, reach_m + margin_m, margin_m)
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:
@@ -237,7 +187,3 @@ def _refuse(pose: GripperPose, along: Along) -> NoReturn:
     for name in ("direction", "mean_m", "variance_m2", "quantile", "reach_m"):
         require_finite(f"along.{name}", getattr(along, name))
     raise ValueError("the encoders' errors or the sums of all these are not finite; valid: metres and radians")
-
-
-def _as_indices(flags: BoolArray) -> IntArray:
-    return flags.astype(np.int64)

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.ahead.kinds.layout import HALF_SPACE
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
-from robot_side.ahead.tables import BLOCK, MEETING
+from robot_side.ahead.scene_table import SceneColumns, scene_at
+from robot_side.ahead.tables import BLOCK, begin, tables_at
 from robot_side.ahead.way import passes, way_to
+from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.kernel import (
     COUNT,
     NUMBER,
@@ -16,10 +17,8 @@ from robot_side.compiled.kernel import (
     compiled,
     inlined,
     input_array,
+    input_flags,
     input_indices,
-    output_array,
-    output_indices,
-    record_array,
 )
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 
@@ -29,14 +28,26 @@ while something is held; what is ignored or held is passed over."""
 
 
 @inlined
-def _variance_along(lever: Vector, jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> float:
-    """ûᵀ J diag(σ²) Jᵀ û of the point at `lever` from the tool (eq. 5): û·(v + ω × r) for each joint."""
-    total = 0.0
+def _joints_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> FloatArray:
+    """For each joint (n, 5) û × ω, û·v and its variance."""
+    joints = np.empty((encoder_variance.size, 5))
     for joint in range(encoder_variance.size):
         linear = jacobian[0, joint], jacobian[1, joint], jacobian[2, joint]
         angular = jacobian[3, joint], jacobian[4, joint], jacobian[5, joint]
-        part = dot(along, linear) + dot(cross(along, angular), lever)
-        total += encoder_variance[joint] * part * part
+        turning = cross(along, angular)
+        for axis in range(3):
+            joints[joint, axis] = turning[axis]
+        joints[joint, 3], joints[joint, 4] = dot(along, linear), encoder_variance[joint]
+    return joints
+
+
+@inlined
+def _variance_along(lever: Vector, joints: FloatArray) -> float:
+    """ûᵀ J diag(σ²) Jᵀ û of the point at `lever` from the tool (eq. 5): û·(v + ω × r) for each joint."""
+    total = 0.0
+    for joint in range(joints.shape[0]):
+        part = joints[joint, 3] + dot(load(joints, joint), lever)
+        total += joints[joint, 4] * part * part
     return total
 
 
@@ -81,14 +92,14 @@ def _least_way(
 
 
 @compiled(
-    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER),
-    *(input_indices(), input_array(1)),
-    *SCENE_COLUMNS,
-    *(output_array(2), output_array(2), record_array(MEETING), output_indices()),
+    *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
     returns=COUNT,
 )
 def find(
-    spheres: FloatArray,
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
     tool: FloatArray,
     jacobian: FloatArray,
     encoder_variance: FloatArray,
@@ -99,46 +110,49 @@ def find(
     reach: float,
     standing: IntArray,
     early: FloatArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    sigma: FloatArray,
-    blocks: FloatArray,
-    meetings: np.ndarray,
-    near: IntArray,
+    scene_bundle: IntArray,
+    tables_bundle: IntArray,
 ) -> int:
-    """Fill `sigma`, `blocks` and `meetings`; the number of meetings, more than there is room for where it is short.
+    """Fill the tables' spheres, D_σ, blocks and meetings; the number of meetings, more than fit where room is short.
 
     -1 for spheres, or errors, that are not finite: they would compare as far away, and silently give no warning.
 
-    spheres (m, 4): centres and radii. tool (3,), jacobian (6, n), encoder_variance (n,), direction: the unit û (3,).
-    mean, variance: of eq. 10 along û, without the joints' part; quantile: Φ⁻¹(P). standing (k,): what each object is.
-    early (k,): by how much its ways are to be shorter, as it comes towards the gripper.
-    The scene: see SceneColumns. near: room for an object's rows.
+    centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
+    encoder_variance (n,), direction: the unit û (3,). mean, variance: of eq. 10 along û, without the joints' part;
+    quantile: Φ⁻¹(P). standing (k,): what each object is. early (k,): by how much its ways are to be shorter, as it
+    comes towards the gripper. The bundles: of `scene_at` and `tables_at`.
     """
-    along, origin = load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
+    scene, tables = scene_at(scene_bundle), tables_at(tables_bundle)
+    sigma, blocks, meetings, near = tables.sigma, tables.blocks, tables.meetings, tables.near
+    spheres, along, origin = tables.spheres, load(direction.reshape(1, 3), 0), load(tool.reshape(1, 3), 0)
+    size = radii.size
+    for i in range(size):
+        for axis in range(3):
+            spheres[i, axis] = centers[i, axis]
+        spheres[i, 3] = radii[i]
+        tables.on_finger[i] = on_finger[i]
     # A maximum may hide what is no number.
-    check = 0.0
-    for i in range(spheres.shape[0]):
+    tables.largest[0] = 0.0
+    check, joints = 0.0, _joints_along(jacobian, encoder_variance, along)
+    for i in range(size):
         lever = subtract(load(spheres, i), origin)
-        spread = math.sqrt(_variance_along(lever, jacobian, encoder_variance, along) + variance)
+        spread = math.sqrt(_variance_along(lever, joints) + variance)
         sigma[i, 0], sigma[i, 1] = max(0.0, mean + quantile * spread), max(0.0, mean)
+        tables.largest[0] = max(tables.largest[0], sigma[i, 0])
         check += quantile * spread + mean + lever[0] + lever[1] + lever[2] + spheres[i, 3]
-    middle, around = _around(spheres, sigma, 0, spheres.shape[0])
-    if not math.isfinite(check + around + reach):
+    if not math.isfinite(check + reach):
         return -1
-    total = (spheres.shape[0] + BLOCK - 1) // BLOCK
+    total, middle, around = (size + BLOCK - 1) // BLOCK, (0.0, 0.0, 0.0), 0.0
     for block in range(total):
-        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0]))
+        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, size))
         blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
+        middle = add(middle, scale(1.0 / total, center))
+    for block in range(total):
+        around = max(around, norm(subtract(load(blocks, block), middle)) + blocks[block, 3])
     found = 0
     for thing in range(standing.size):
         farthest = reach + early[thing]
-        if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, object_bounds, thing, around):
+        if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, scene.object_bounds, thing, around):
             continue
         count = near_rows(scene, thing, middle, around, along, farthest, near)
         for block in range(total):
@@ -149,4 +163,5 @@ def find(
                     meeting.block, meeting.object, meeting.met = block, thing, 0
                     meeting.bound = least - early[thing]
                 found += 1
+    begin(tables, found)
     return found

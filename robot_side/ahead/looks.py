@@ -1,101 +1,121 @@
 """What was seen of what is ahead lately, along each side and from each place; the shortest ways hold."""
 
-import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray
-from robot_side.ahead.field import Field
+from common.arrays import FloatArray, IntArray
+from robot_side.ahead.sideways import MOST_PLACES
+from robot_side.ahead.tables import STRENGTHS
 from robot_side.arm.ability import Ability
+from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_indices, record_array
+from robot_side.compiled.vectors import dot, load
 
+R2, L2, STICK = 0, 1, 2
+SIDES: Final = 3
 STEADY_S: Final = 0.1
 """For so long a way that was found holds; as long as strength takes to fall in the trigger."""
 _SAME_DIRECTION: Final = 0.999
 """Cosine: 2.6° to either side."""
+ROOM: Final = 12 * (1 + MOST_PLACES)
+"""Looks of one side: a place is looked from a hundred times a second at most."""
+
+SEEN: Final = np.dtype(
+    [
+        ("place", np.int64),
+        ("at", np.float64),
+        ("direction", np.float64, (3,)),
+        ("began", np.float64),
+        ("ways", np.float64, (2, STRENGTHS)),
+    ]
+)
+"""One look: when, from which place, the ways that it found, fast and slow. began: where the tool was along it (m)."""
+NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
+"""Of the newest look from where the gripper is: how far it looked, what the arm can do there, D_σ, and Σ V_ij (m³)."""
 
 
-@dataclass(frozen=True)
-class Seen:
-    """One field as it was found, and what held then."""
-
-    field: Field
-    direction: FloatArray
-    tool_m: FloatArray
-    ability: Ability
-    reach_m: float
-    at_s: float
-    overlap_m3: float
-
-    def moved_m(self, tool_m: FloatArray) -> float:
-        """How far the tool has got along the field's direction since."""
-        return float(self.direction @ (tool_m - self.tool_m))
-
-
-class _Looks:
-    """What was seen along one side from one place lately, the newest last; there is always one."""
-
-    def __init__(self, first: Seen) -> None:
-        self._kept: list[Seen] = []
-        self.add(first)
-
-    @property
-    def newest(self) -> Seen:
-        """The field of the last look."""
-        return self._kept[-1]
-
-    def add(self, seen: Seen) -> None:
-        """Take one in, and forget those that hold no more: too old, or along another direction."""
-        self._kept = [
-            one
-            for one in self._kept
-            if seen.at_s - one.at_s < STEADY_S and one.direction @ seen.direction > _SAME_DIRECTION
-        ]
-        self._kept.append(seen)
-        # Put together here, as the ways are asked for in every tick.
-        self._ways_m = np.array([(one.field.fast_m, one.field.slow_m) for one in self._kept])
-        self._directions = np.array([one.direction for one in self._kept])
-        self._began_m = np.array([one.direction @ one.tool_m for one in self._kept])
-
-    def ways_m(self, tool_m: FloatArray) -> FloatArray:
-        """The shortest fast and slow ways (2, 8) from where the tool is now."""
-        moved_m = self._directions @ tool_m - self._began_m
-        shortest: FloatArray = (self._ways_m - moved_m[:, None, None]).min(axis=0)
-        return shortest
-
-
-class Places:
-    """What was seen along one side from all places: the first is where the gripper is."""
+class Looks:
+    """Tables of what was seen along the sides R2, L2 and STICK. Place 0 is where the gripper is."""
 
     def __init__(self) -> None:
-        self._looks: list[_Looks] = []
+        self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
+        """Those of one side together, from `ROOM` times the side on"""
+        self.counts: IntArray = np.zeros(SIDES, dtype=np.int64)
+        """How many there are of each side"""
+        self.newest: np.ndarray = np.zeros(SIDES, dtype=NEWEST)
+        self.looked_s: tuple[list[float], ...] = tuple([] for _ in range(SIDES))
+        """By side and place: when it was last looked from there, minus infinity where it never was."""
 
-    def age_s(self, place: int, now_s: float) -> float:
-        """How long ago it was last looked from there; infinite where it never was."""
-        return now_s - self._looks[place].newest.at_s if place < len(self._looks) else math.inf
+    def look_from(self, side: int, places: int) -> None:
+        """Look along one side from so many places from now on; what was seen from others is forgotten."""
+        looked_s = self.looked_s[side]
+        if places < len(looked_s):
+            del looked_s[places:]
+            first, count = ROOM * side, int(self.counts[side])
+            kept = self.seen[first : first + count]
+            kept = kept[kept["place"] < places]
+            self.seen[first : first + len(kept)] = kept
+            self.counts[side] = len(kept)
+        looked_s += [-np.inf] * (places - len(looked_s))
 
-    def add(self, place: int, seen: Seen) -> None:
-        """Take a look in, from a known place or the next one."""
-        if place < len(self._looks):
-            self._looks[place].add(seen)
-        else:
-            self._looks.append(_Looks(seen))
+    def add(
+        self,
+        side: int,
+        place: int,
+        now_s: float,
+        direction: FloatArray,
+        tool_m: FloatArray,
+        ways_m: FloatArray,
+        able: Ability,
+        reach_m: float,
+        sigma_m: float,
+        overlap_m3: float,
+    ) -> None:
+        """Take a look in; direction (3,), tool_m (3,): where the tool was; ways_m (2, 8), fast and slow.
 
-    def keep(self, places: int) -> None:
-        """Forget all places from this one on."""
-        del self._looks[places:]
+        What was seen from the same place is forgotten if it is too old or was along another direction.
+        """
+        self.looked_s[side][place] = now_s
+        _keep(self.seen, self.counts, side, place, now_s, direction, tool_m, ways_m)
+        if place == 0:
+            self.newest[side] = reach_m, able.full_speed_m_s, able.acceleration_m_s2, sigma_m, overlap_m3
 
-    @property
-    def newest(self) -> Seen:
-        """The newest look from where the gripper is."""
-        return self._looks[0].newest
 
-    def ways_m(self, tool_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The shortest fast and slow ways (8,) from where the tool is now."""
-        fast, slow = np.min([looks.ways_m(tool_m) for looks in self._looks], axis=0)
-        return fast, slow
-
-    def known_m(self, tool_m: FloatArray) -> float:
-        """How far ahead of the tool anything is known."""
-        return self.newest.reach_m - self.newest.moved_m(tool_m)
+@compiled(
+    *(record_array(SEEN), output_indices(), COUNT, COUNT, NUMBER, input_array(1), input_array(1), input_array(2)),
+)
+def _keep(
+    seen: np.ndarray,
+    counts: IntArray,
+    side: int,
+    place: int,
+    now: float,
+    direction: FloatArray,
+    tool: FloatArray,
+    ways: FloatArray,
+) -> None:
+    along, first, kept = load(direction.reshape(1, 3), 0), ROOM * side, 0
+    oldest = first
+    for k in range(first, first + counts[side]):
+        one = seen[k]
+        holds = now - one.at < STEADY_S and dot((one.direction[0], one.direction[1], one.direction[2]), along) > (
+            _SAME_DIRECTION
+        )
+        if one.place != place or holds:
+            seen[first + kept] = one
+            if one.at < seen[oldest].at:
+                oldest = first + kept
+            kept += 1
+    row = first + kept
+    if kept == ROOM:
+        row = oldest
+    else:
+        kept += 1
+    counts[side] = kept
+    new = seen[row]
+    new.place, new.at, new.began = place, now, dot(along, load(tool.reshape(1, 3), 0))
+    for axis in range(3):
+        new.direction[axis] = direction[axis]
+    for kind in range(2):
+        for strength in range(STRENGTHS):
+            new.ways[kind, strength] = ways[kind, strength]

@@ -1,62 +1,36 @@
 """From meetings to ramps: which spheres of a block meet an object, and at which way; the nearest meetings first."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.find import TARGET, TOUCHABLE, near_rows
 from robot_side.ahead.kinds.layout import HALF_SPACE, MESH
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns
-from robot_side.ahead.tables import BLOCK, DONE, MEETING, NEW, PAIR, RAMP, STRENGTHS, WINDOW, Record
+from robot_side.ahead.scene_table import SceneColumns
+from robot_side.ahead.tables import BLOCK, DONE, LIMITED, NEW, PAIRS, RAMPS, STRENGTHS, WINDOW, Record, TableColumns
 from robot_side.ahead.way import passes, way_to
-from robot_side.compiled.kernel import (
-    COUNT,
-    NUMBER,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    input_indices,
-    output_indices,
-    record_array,
-)
+from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, load
-
-PAIRS, RAMPS, LIMITED = 0, 1, 2
-"""What is counted in `found`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
-COUNTED = 3
-
-
-class _Search(NamedTuple):
-    """What a meeting adds to, and what it needs for that."""
-
-    sigma: FloatArray
-    blocks: FloatArray
-    ramps: np.ndarray
-    pairs: np.ndarray
-    near: IntArray
-    found: IntArray
 
 
 @building_block
 def _meet(
-    scene: SceneColumns, search: _Search, count: int, center: Vector, radius: float, along: Vector, reach: float
+    scene: SceneColumns, tables: TableColumns, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> bool:
     """Add the ramp of one sphere and the first `count` near rows of one object, if it meets any; whether it touches."""
-    found = search.found
+    found = tables.progress
     first = found[PAIRS]
     start, touching = math.inf, False
     for k in range(count):
-        row = search.near[k]
+        row = tables.near[k]
         kind = scene.kinds[row]
         if kind != HALF_SPACE and not passes(center, along, reach, scene.bounds, row, radius):
             continue
         way = way_to(kind, scene.shapes, row, center, radius, along, reach)
         if way > reach:
             continue
-        pair = search.pairs[found[PAIRS]]
+        pair = tables.pairs[found[PAIRS]]
         # A mesh's own way is found out afterwards.
         pair.row, pair.entry, pair.again = row, math.nan if kind == MESH else way, math.inf
         found[PAIRS] += 1
@@ -64,7 +38,7 @@ def _meet(
         touching |= way == 0.0
     if found[PAIRS] == first:
         return False
-    ramp = search.ramps[found[RAMPS]]
+    ramp = tables.ramps[found[RAMPS]]
     found[RAMPS] += 1
     ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
     ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
@@ -95,8 +69,7 @@ def _next_meeting(meetings: np.ndarray, count: int) -> float:
 @building_block
 def _meet_block(
     meeting: Record,
-    spheres: FloatArray,
-    on_finger: IntArray,
+    spheres: int,
     along: Vector,
     widest: float,
     reach: float,
@@ -104,30 +77,30 @@ def _meet_block(
     early: float,
     least_depth: float,
     scene: SceneColumns,
-    search: _Search,
+    tables: TableColumns,
 ) -> bool:
     """Add the ramps of one meeting; False where there is no room for them."""
-    block, thing, found = meeting.block, meeting.object, search.found
-    center, radius = load(search.blocks, block), search.blocks[block, 3]
-    count = near_rows(scene, thing, center, radius, along, reach, search.near)
-    if found[RAMPS] + 2 * BLOCK > search.ramps.size or found[PAIRS] + 2 * BLOCK * count > search.pairs.size:
+    block, thing, found = meeting.block, meeting.object, tables.progress
+    center, radius = load(tables.blocks, block), tables.blocks[block, 3]
+    count = near_rows(scene, thing, center, radius, along, reach, tables.near)
+    if found[RAMPS] + 2 * BLOCK > tables.ramps.size or found[PAIRS] + 2 * BLOCK * count > tables.pairs.size:
         return False
     meeting.met = 1
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, spheres.shape[0])):
-        inflated = search.sigma[i, 0]
-        if standing == TARGET and on_finger[i] and inflated > widest:
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, spheres)):
+        inflated = tables.sigma[i, 0]
+        if standing == TARGET and tables.on_finger[i] and inflated > widest:
             inflated = widest
             found[LIMITED] += 1
         for bare in range(2):
             place = found[RAMPS]
-            size = spheres[i, 3] + (0.0 if bare else inflated)
-            touching = _meet(scene, search, count, load(spheres, i), size, along, reach)
+            size = tables.spheres[i, 3] + (0.0 if bare else inflated)
+            touching = _meet(scene, tables, count, load(tables.spheres, i), size, along, reach)
             if found[RAMPS] > place:
-                ramp = search.ramps[place]
+                ramp = tables.ramps[place]
                 ramp.sphere, ramp.object = i, thing
                 ramp.least = min(math.pi * size * least_depth * least_depth, 0.5 * scene.object_volumes[thing])
                 ramp.touchable = standing in (TOUCHABLE, TARGET)
-                ramp.expected = inflated - min(search.sigma[i, 1], inflated)
+                ramp.expected = inflated - min(tables.sigma[i, 1], inflated)
                 ramp.bare, ramp.early, ramp.before = bare, early, early + (inflated if bare else 0.0)
             # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
             if not touching:
@@ -135,47 +108,27 @@ def _meet_block(
     return True
 
 
-@compiled(
-    *(input_array(2), input_indices(), input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, input_array(1)),
-    *(record_array(MEETING), COUNT, input_indices(), input_array(1)),
-    *SCENE_COLUMNS,
-    *(input_array(2), input_array(2), record_array(RAMP), record_array(PAIR), output_indices(), output_indices()),
-    returns=COUNT,
-)
+@building_block
 def meet(
-    spheres: FloatArray,
-    on_finger: IntArray,
-    direction: FloatArray,
+    scene: SceneColumns,
+    tables: TableColumns,
+    count: int,
+    standing: IntArray,
+    early: FloatArray,
+    along: Vector,
     widest: float,
     margin: float,
     reach: float,
     least_depth: float,
-    slow: FloatArray,
-    meetings: np.ndarray,
-    count: int,
-    standing: IntArray,
-    early: FloatArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    sigma: FloatArray,
-    blocks: FloatArray,
-    ramps: np.ndarray,
-    pairs: np.ndarray,
-    near: IntArray,
-    found: IntArray,
+    spheres: int,
 ) -> int:
     """Add the ramps of those of the first `count` meetings that come next; -1 where there is no room for them.
 
-    widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards the target (§3.4),
-    infinite without a gripper. slow (8,): the ways so far; a meeting beyond them cannot shorten any. The number left.
+    standing (k,): what each object is; early (k,): by how much its ways are shorter. widest: half the gap between the
+    fingers, the most by which a finger's sphere is inflated towards the target (§3.4), infinite without a gripper.
+    A meeting beyond the slow ways so far cannot shorten any. The number left.
     """
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
-    search = _Search(sigma, blocks, ramps, pairs, near, found)
-    along = load(direction.reshape(1, 3), 0)
+    meetings, ramps, found, slow = tables.meetings, tables.ramps, tables.progress, tables.ways[1]
     window = WINDOW * margin
     while True:
         nearest = min(_next_ramp(ramps, found[RAMPS]), _next_meeting(meetings, count))
@@ -191,7 +144,6 @@ def meet(
             elif not _meet_block(
                 meeting,
                 spheres,
-                on_finger,
                 along,
                 widest,
                 reach + early[meeting.object],
@@ -199,7 +151,7 @@ def meet(
                 early[meeting.object],
                 least_depth,
                 scene,
-                search,
+                tables,
             ):
                 return -1
         if left == 0 or _next_ramp(ramps, found[RAMPS]) < math.inf:

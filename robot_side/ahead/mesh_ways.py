@@ -40,19 +40,18 @@ _ARGUMENTS: Final = (
 
 
 class MeshWays:
-    """The kernels of this file for one look; spheres (m, 4), direction (3,), the margin over which strength grows."""
+    """The kernels of this file for one look along direction (3,); the margin over which strength grows."""
 
     def __init__(
         self,
         scene: SceneTable,
         tables: Tables,
-        spheres: FloatArray,
         direction: FloatArray,
         reach_m: float,
         margin_m: float,
     ) -> None:
         self._tables = tables
-        self._moving = spheres, direction, reach_m
+        self._moving = tables.spheres, direction, reach_m
         self._margin_m = margin_m
         self._meshes = scene.rows_of_kind, *scene.placed_meshes
 

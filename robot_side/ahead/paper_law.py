@@ -75,7 +75,7 @@ class PaperLaw:
             loop_age_s=situation.loop_age_s,
             displacement_m=displacement_m,
         )
-        spheres = moved_and_inflated(situation, np.zeros(3), enlargement_m)
+        spheres = moved_and_inflated(situation.pose, np.zeros(3), enlargement_m)
         table = scene_table(situation.objects)
         return TriggerExplained(terms, overlaps_by_object(spheres, table, _stands(situation), self._tables))
 

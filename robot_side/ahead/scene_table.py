@@ -9,14 +9,17 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds import box, half_space, sphere, tetrahedron
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
-from robot_side.compiled.kernel import input_array, input_indices
+from robot_side.ahead.kinds.next_frame import place, room
+from robot_side.compiled.bundle import addresses, indices, numbers
+from robot_side.compiled.bundle import rows as rows_at
+from robot_side.compiled.kernel import inlined
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.objects.validity import require_valid
 
 
 class SceneColumns(NamedTuple):
-    """A scene as kernels read it; the fields are those of SceneTable."""
+    """A scene as kernels read it, from `SceneTable.addresses`; the fields are those of SceneTable."""
 
     bounds: FloatArray
     shapes: FloatArray
@@ -26,11 +29,17 @@ class SceneColumns(NamedTuple):
     object_volumes: FloatArray
 
 
-SCENE_COLUMNS: Final = (
-    *(input_array(2), input_array(2), input_indices(), input_indices()),
-    *(input_array(2), input_array(1)),
-)
-"""Of a kernel's arguments, the fields of SceneColumns."""
+@inlined
+def scene_at(bundle: IntArray) -> SceneColumns:
+    """A scene by its addresses, in kernels."""
+    return SceneColumns(
+        rows_at(bundle, 0, 4),
+        rows_at(bundle, 1, SHAPE_NUMBERS),
+        indices(bundle, 2),
+        indices(bundle, 3),
+        rows_at(bundle, 4, 4),
+        numbers(bundle, 5),
+    )
 
 
 @dataclass(frozen=True)
@@ -56,11 +65,9 @@ class SceneTable:
     """How many primitives have no volume, and so nothing to overlap: they are left out."""
 
     @cached_property
-    def columns(self) -> SceneColumns:
-        """What kernels read of it."""
-        return SceneColumns(
-            self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes
-        )
+    def addresses(self) -> IntArray:
+        """What kernels read of it: a bundle for `scene_at`."""
+        return addresses(self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes)
 
     @cached_property
     def object_index(self) -> IntArray:
@@ -92,20 +99,55 @@ def scene_table(objects: PerceivedObjects) -> SceneTable:
     if known is not None:
         return known
     require_valid(objects)
-    table = _tables[id(objects)] = _make(objects)
+    last = next(reversed(_tables.values()), None)
+    moved = None if last is None else _moved(last, objects)
+    table = _tables[id(objects)] = _make(objects) if moved is None else moved
     if len(_tables) > _KEPT:
         del _tables[next(iter(_tables))]
     return table
 
 
-def _make(objects: PerceivedObjects) -> SceneTable:
-    owners = (
+def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
+    return (
         objects.sphere_object,
         objects.box_object,
         objects.tetrahedron_object,
         objects.half_space_object,
         objects.mesh_object,
     )
+
+
+def _moved(last: SceneTable, objects: PerceivedObjects) -> SceneTable | None:
+    """The table of the same objects where they are now; None where there are others, or some have no volume."""
+    same = last.flat == 0 and len(last.objects.names) == len(objects.names)
+    owners = zip(_owners(last.objects), _owners(objects), strict=True)
+    if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):
+        return None
+    filled = room(len(last.bounds), len(last.object_bounds))
+    if not place(
+        *(objects.sphere_centers_m, objects.sphere_radii_m),
+        *(objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m, objects.tetrahedron_vertices_m),
+        *(objects.half_space_normals, objects.half_space_offsets_m),
+        *(_mesh_boxes(objects), _mesh_spheres(objects), _mesh_volumes(objects)),
+        *(last.kinds, last.rows_of_kind, last.first_rows, *filled),
+    ):
+        return None
+    bounds, shapes, object_bounds, object_volumes = filled
+    return SceneTable(
+        objects=objects,
+        bounds=bounds,
+        shapes=shapes,
+        kinds=last.kinds,
+        rows_of_kind=last.rows_of_kind,
+        first_rows=last.first_rows,
+        object_bounds=object_bounds,
+        object_volumes=object_volumes,
+        flat=0,
+    )
+
+
+def _make(objects: PerceivedObjects) -> SceneTable:
+    owners = _owners(objects)
     counts = [len(owner) for owner in owners]
     owner = np.concatenate(owners)
     of_kinds = (sphere, box, tetrahedron, half_space)

@@ -4,13 +4,15 @@ A **ramp** is how the overlap of one gripper sphere with one object grows along 
 nodes (E, V, dV/dE), between which a cubic goes. A **job** is one overlap that a node needs, of one primitive.
 """
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import InitVar, dataclass, field
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import output_array, output_indices, record_array
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.bundle import addresses, flags, indices, matrices, numbers, records, rows
+from robot_side.compiled.kernel import inlined
 
 Record = Any
 """One record of a table, whose fields no type checker knows."""
@@ -100,11 +102,14 @@ class JobColumns(NamedTuple):
     """(r, 4, 3)"""
 
 
-JOB_COLUMNS: Final = (
-    *(output_indices(), record_array(JOB), output_array(2), output_array(1), output_array(1), output_array(2)),
-    *(output_array(2), output_array(3), output_array(2), output_array(3)),
-)
-"""Of a kernel's arguments, the fields of JobColumns."""
+class JobParts(NamedTuple):
+    """The first so many jobs of one kind, as the kernels of overlaps take them."""
+
+    given: tuple[np.ndarray, ...]
+    """Spheres' centres and radii, and the shapes"""
+    results: tuple[np.ndarray, ...]
+    """Volumes, gradients and areas"""
+    unsettled: IntArray
 
 
 class Jobs:
@@ -126,6 +131,83 @@ class Jobs:
         )
         self.areas: FloatArray = np.zeros(JOB_KINDS * room)
         self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
+        self._parts: dict[tuple[int, int], JobParts] = {}
+
+    def parts(self, kind: int, count: int, shapes: tuple[np.ndarray, ...]) -> JobParts:
+        """The first `count` of a kind with these shapes; kept, as to make the views takes as long as an overlap."""
+        known = self._parts.get((kind, count))
+        if known is None:
+            columns, part = self.columns, slice(kind * self.room, kind * self.room + count)
+            known = self._parts[kind, count] = JobParts(
+                (columns.centers[part], columns.radii[part], *(shape[:count] for shape in shapes)),
+                (columns.volumes[part], columns.gradients[part], self.areas[part]),
+                self.unsettled[: count + 1],
+            )
+        return known
+
+
+PAIRS, RAMPS, LIMITED = 0, 1, 2
+"""What is counted in `progress`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
+STEP, LEFT, ENTERED, ROUNDS = 3, 4, 5, 6
+"""And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun."""
+PROGRESS: Final = 7
+MEET, ASK, TAKE = 0, 1, 2
+"""Steps of a round."""
+
+
+class TableColumns(NamedTuple):
+    """The tables as kernels read and fill them, from `Tables.addresses`; the fields are those of Tables."""
+
+    spheres: FloatArray
+    on_finger: BoolArray
+    sigma: FloatArray
+    blocks: FloatArray
+    meetings: np.ndarray
+    ramps: np.ndarray
+    pairs: np.ndarray
+    near: IntArray
+    progress: IntArray
+    ways: FloatArray
+    largest: FloatArray
+    jobs: JobColumns
+
+
+@inlined
+def tables_at(bundle: IntArray) -> TableColumns:
+    """The tables by their addresses, in kernels."""
+    return TableColumns(
+        rows(bundle, 0, 4),
+        flags(bundle, 1),
+        rows(bundle, 2, 2),
+        rows(bundle, 3, 4),
+        records(bundle, 4, MEETING),
+        records(bundle, 5, RAMP),
+        records(bundle, 6, PAIR),
+        indices(bundle, 7),
+        indices(bundle, 8),
+        rows(bundle, 9, STRENGTHS),
+        numbers(bundle, 10),
+        JobColumns(
+            indices(bundle, 11),
+            records(bundle, 12, JOB),
+            rows(bundle, 13, 3),
+            numbers(bundle, 14),
+            numbers(bundle, 15),
+            rows(bundle, 16, 3),
+            rows(bundle, 17, 3),
+            matrices(bundle, 18, 3, 3),
+            rows(bundle, 19, 3),
+            matrices(bundle, 20, 4, 3),
+        ),
+    )
+
+
+@inlined
+def begin(tables: TableColumns, meetings: int) -> None:
+    """Forget the last look."""
+    tables.progress[:] = 0
+    tables.progress[STEP], tables.progress[LEFT] = MEET, meetings
+    tables.ways[:] = math.inf
 
 
 @dataclass
@@ -136,20 +218,54 @@ class Tables:
     ramps: np.ndarray = field(default_factory=lambda: np.zeros(512, dtype=RAMP))
     pairs: np.ndarray = field(default_factory=lambda: np.zeros(2048, dtype=PAIR))
     jobs: Jobs = field(default_factory=lambda: Jobs(1024))
-    sigma_m: FloatArray = field(default_factory=lambda: np.zeros((512, 2)))
-    """(m or more, 2) D_σ of each sphere along the direction: at P, and expected (P = 0.5)"""
-    blocks: FloatArray = field(default_factory=lambda: np.zeros((512 // BLOCK + 1, 4)))
-    """Centre and radius of a sphere around each block, inflated."""
     near: IntArray = field(default_factory=lambda: np.zeros(1024, dtype=np.int64))
+    most_spheres: InitVar[int] = 512
+
+    def __post_init__(self, most_spheres: int) -> None:
+        self.progress: IntArray = np.zeros(PROGRESS, dtype=np.int64)
+        self.ways_m: FloatArray = np.zeros((2, STRENGTHS))
+        """Fast and slow, of the last look"""
+        self.largest_m: FloatArray = np.zeros(1)
+        """D_σ, of all spheres"""
+        self._make_room(most_spheres)
+
+    def _make_room(self, spheres: int) -> None:
+        self.spheres: FloatArray = np.zeros((spheres, 4))
+        """(m or more, 4) centres and radii of the gripper's"""
+        self.on_finger: BoolArray = np.zeros(spheres, dtype=np.bool_)
+        self.sigma_m: FloatArray = np.zeros((spheres, 2))
+        """(m or more, 2) D_σ of each sphere along the direction: at P, and expected (P = 0.5)"""
+        self.blocks: FloatArray = np.zeros((spheres // BLOCK + 1, 4))
+        """Centre and radius of a sphere around each block, inflated."""
+        self._join()
+
+    def _join(self) -> None:
+        self.addresses: IntArray = addresses(
+            *(self.spheres, self.on_finger, self.sigma_m, self.blocks, self.meetings, self.ramps, self.pairs),
+            *(self.near, self.progress, self.ways_m, self.largest_m, *self.jobs.columns),
+        )
+        """What kernels read and fill of them: a bundle for `tables_at`."""
 
     def require(self, spheres: int, primitives: int) -> None:
         """Make room for so many spheres and primitives."""
         if spheres > len(self.sigma_m):
-            self.sigma_m, self.blocks = np.zeros((2 * spheres, 2)), np.zeros((2 * spheres // BLOCK + 1, 4))
+            self._make_room(2 * spheres)
         if primitives > len(self.near):
             self.near = np.zeros(2 * primitives, dtype=np.int64)
+            self._join()
 
-    def grow(self) -> None:
+    def grow_meetings(self, count: int) -> None:
+        """Make room for so many meetings."""
+        self.meetings = np.zeros(2 * count, dtype=MEETING)
+        self._join()
+
+    def grow_ramps(self) -> None:
         """Make room for as many ramps and pairs again."""
         self.ramps = np.concatenate([self.ramps, np.zeros_like(self.ramps)])
         self.pairs = np.concatenate([self.pairs, np.zeros_like(self.pairs)])
+        self._join()
+
+    def grow_jobs(self) -> None:
+        """Make room for as many jobs again, and forget those that there are."""
+        self.jobs = Jobs(2 * self.jobs.room)
+        self._join()

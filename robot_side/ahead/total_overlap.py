@@ -1,18 +1,54 @@
-"""How much of some spheres lies in the objects now, in all: Σ V_ij (eq. 11-12)."""
+"""Overlaps by the kernels of each kind (eq. 11-12): those that a round asks for, and how much there is in all."""
+
+import math
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray, require_finite
+from common.arrays import FloatArray, IntArray
 from robot_side.ahead.ask import room_of, write_job
 from robot_side.ahead.find import PASSED_OVER
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import HALF_SPACE, SPHERE
-from robot_side.ahead.overlaps import work_out
-from robot_side.ahead.scene_table import SCENE_COLUMNS, SceneColumns, SceneTable
-from robot_side.ahead.tables import JOB_COLUMNS, JobColumns, Tables
+from robot_side.ahead.scene_table import SceneTable, scene_at
+from robot_side.ahead.tables import BOX_JOBS, MESH_JOBS, TETRAHEDRON_JOBS, JobParts, Jobs, Tables, tables_at
 from robot_side.ahead.way import passes
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices
-from robot_side.compiled.vectors import load
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, NUMBER, Compiled, compiled, input_array, input_indices
+from robot_side.compiled.vectors import add, load
+from robot_side.overlap.lanes.box_batch import overlap_boxes
+from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
+
+
+def work_out(jobs: Jobs, scene: SceneTable) -> int:
+    """Fill in volumes and gradients of all jobs; how many there were."""
+    columns = jobs.columns
+    boxes, tetrahedra, meshes = columns.counts.tolist()
+    if boxes:
+        shapes = columns.box_centers, columns.box_rotations, columns.box_half_sizes
+        _exactly(overlap_boxes, precise_boxes, jobs.parts(BOX_JOBS, boxes, shapes))
+    if tetrahedra:
+        _exactly(overlap_tetrahedra, precise_tetrahedra, jobs.parts(TETRAHEDRON_JOBS, tetrahedra, (columns.vertices,)))
+    if meshes:
+        _meshes(jobs, scene, meshes)
+    return int(boxes + tetrahedra + meshes)
+
+
+def _exactly(overlap: Compiled, precise: Compiled, parts: JobParts) -> None:
+    """The lanes, and the precise forms for those for which doubles do not suffice."""
+    unsettled = overlap(*parts.given, *parts.results, parts.unsettled)
+    if unsettled:
+        precise(*parts.given, parts.unsettled[:unsettled], *parts.results)
+
+
+def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_kernels import overlap_loop  # noqa: PLC0415
+
+    columns, part = jobs.columns, slice(MESH_JOBS * jobs.room, MESH_JOBS * jobs.room + count)
+    placed = scene.rows_of_kind.take(columns.owners["row"][part])
+    results = columns.volumes[part], columns.gradients[part], jobs.areas[part], jobs.unsettled[:count]
+    overlap_loop(columns.centers[part], columns.radii[part], placed, *scene.placed_meshes, *results)
 
 
 def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray, tables: Tables) -> float:
@@ -20,17 +56,32 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
 
     ValueError for a sphere that is not finite, which would compare as far away from everything.
     """
-    require_finite("spheres", spheres)
+    return _total_m3(spheres, len(spheres), np.zeros_like(spheres), np.zeros(3), scene, standing, tables)
+
+
+def looked_overlap_m3(moved_m: FloatArray, count: int, scene: SceneTable, standing: IntArray, tables: Tables) -> float:
+    """The same for the `count` spheres of the last look, inflated by D_σ as it was found there, moved by (3,)."""
+    return _total_m3(tables.spheres, count, tables.sigma_m, moved_m, scene, standing, tables)
+
+
+def _total_m3(
+    spheres: FloatArray,
+    count: int,
+    inflated_m: FloatArray,
+    moved_m: FloatArray,
+    scene: SceneTable,
+    standing: IntArray,
+    tables: Tables,
+) -> float:
     total = 0.0
-    for first in range(0, len(spheres), _AT_A_TIME):
-        part = np.ascontiguousarray(spheres[first : first + _AT_A_TIME])
-        while True:
-            jobs = tables.jobs
-            at_once = _gather(part, standing, *scene.columns, *jobs.columns)
-            if at_once >= 0.0:
-                break
-            tables.jobs = type(jobs)(2 * jobs.room)
+    for first in range(0, count, _AT_A_TIME):
+        part = spheres, inflated_m, moved_m, first, min(first + _AT_A_TIME, count), standing
+        while (at_once := _gather(*part, scene.addresses, tables.addresses)) < 0.0:
+            tables.grow_jobs()
+        if math.isnan(at_once):
+            raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
         total += at_once
+        jobs = tables.jobs
         if work_out(jobs, scene):
             counts, volumes = jobs.columns.counts, jobs.columns.volumes
             total += sum(volumes[kind * jobs.room :][:count].sum() for kind, count in enumerate(counts))
@@ -40,39 +91,39 @@ def total_overlap_m3(spheres: FloatArray, scene: SceneTable, standing: IntArray,
 _AT_A_TIME = 256
 
 
-@compiled(input_array(2), input_indices(), *SCENE_COLUMNS, *JOB_COLUMNS, returns=NUMBER)
+@compiled(
+    *(input_array(2), input_array(2), input_array(1), COUNT, COUNT, input_indices(), BUNDLE, BUNDLE),
+    returns=NUMBER,
+)
 def _gather(
     spheres: FloatArray,
+    inflated: FloatArray,
+    moved: FloatArray,
+    begin: int,
+    end: int,
     standing: IntArray,
-    bounds: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-    counts: IntArray,
-    owners: np.ndarray,
-    centers: FloatArray,
-    radii: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    box_centers: FloatArray,
-    box_rotations: FloatArray,
-    box_half_sizes: FloatArray,
-    vertices: FloatArray,
+    scene_bundle: IntArray,
+    tables_bundle: IntArray,
 ) -> float:
-    """Write a job for each pair that bounds do not settle; the sum of the closed forms, -1 where there is no room."""
-    jobs = JobColumns(
-        counts, owners, centers, radii, volumes, gradients, box_centers, box_rotations, box_half_sizes, vertices
-    )
-    scene = SceneColumns(bounds, shapes, kinds, first_rows, object_bounds, object_volumes)
-    counts[:] = 0
+    """Write a job for each pair that bounds do not settle; the sum of the closed forms.
+
+    spheres (m, 4), of which those from `begin` to `end` count; inflated (m, 1 or more): by its first column. -1 where
+    there is no room, NaN for what is not finite.
+    """
+    scene, jobs = scene_at(scene_bundle), tables_at(tables_bundle).jobs
+    shift = load(moved.reshape(1, 3), 0)
+    check = 0.0
+    for i in range(begin, end):
+        check += spheres[i, 0] + spheres[i, 1] + spheres[i, 2] + spheres[i, 3] + inflated[i, 0]
+    if not math.isfinite(check + shift[0] + shift[1] + shift[2]):
+        return math.nan
+    jobs.counts[:] = 0
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
     for thing in range(standing.size):
         if standing[thing] == PASSED_OVER:
             continue
-        for i in range(spheres.shape[0]):
-            center, radius = load(spheres, i), spheres[i, 3]
+        for i in range(begin, end):
+            center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
             if not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
                 continue
             for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
@@ -83,7 +134,7 @@ def _gather(
                     if kind == SPHERE:
                         total += sphere.overlap(scene.shapes, row, center, radius)[0]
                         continue
-                    if counts.max() == room_of(jobs):
+                    if jobs.counts.max() == room_of(jobs):
                         return -1.0
                     write_job(kind, row, i, 0, center, radius, scene.shapes, jobs)
     return total

@@ -41,6 +41,11 @@ def input_indices() -> Any:
     return numba.types.Array(numba.types.int64, 1, "C", readonly=True)
 
 
+def input_flags() -> Any:
+    """The Numba type of a C-contiguous array (n,) of bools that the kernel only reads."""
+    return numba.types.Array(numba.types.boolean, 1, "C", readonly=True)
+
+
 def output_indices() -> Any:
     """The Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
     return numba.types.Array(numba.types.int64, 1, "C")

@@ -103,7 +103,7 @@ def _value(value: object) -> str | None:
     if isinstance(value, tuple):
         parts = [_value(part) for part in value]
         return None if None in parts else f"({', '.join(map(str, parts))})"
-    return repr(value) if isinstance(value, bool | int | float | complex | str | np.generic) else None
+    return repr(value) if isinstance(value, bool | int | float | complex | str | np.generic | np.dtype) else None
 
 
 def _file(part: Any) -> str | None:

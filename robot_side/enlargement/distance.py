@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import overload
 
 import numpy as np
@@ -93,14 +94,20 @@ class Uncertainty:
         except ValueError as error:
             raise ConfigurationError(str(error)) from None
 
-    @property
+    @cached_property
     def quantile(self) -> float:
         """Φ⁻¹(P)."""
         return float(standard_quantile(self.probability))
 
+    @cached_property
+    def _mean_m(self) -> FloatArray:
+        """μ_ee - μ_c (3,)."""
+        mean_m: FloatArray = np.asarray(self.kinematic_mean_m) - np.asarray(self.camera_mean_m)
+        return mean_m
+
     def mean_along_m(self, direction: FloatArray) -> float:
         """û·(μ_ee - μ_c) along unit vectors `direction` (3,): how much nearer than it seems a thing is on average."""
-        return float(direction @ (np.asarray(self.kinematic_mean_m) - np.asarray(self.camera_mean_m)))
+        return float(direction @ self._mean_m)
 
     def predicted_m(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
         """μ_δ and σ_δ at a loop age, for one kind of compensation."""

@@ -1,6 +1,7 @@
 """What the prediction of the delay's displacement misses: μ_δ and σ_δ of eq. 10, over loop age and who predicts."""
 
 import tomllib
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,9 +35,14 @@ class PredictionErrors:
         rows = self.rows.get(kind, ())
         if not rows:
             return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
-        ages, means, sds = np.array(rows).T
-        beyond = max(1.0, loop_age_s / ages[-1])
-        return beyond * float(np.interp(loop_age_s, ages, means)), beyond * float(np.interp(loop_age_s, ages, sds))
+        after = bisect_right(rows, loop_age_s, key=lambda row: row[0])
+        if after in (0, len(rows)):
+            age_s, mean_m, sd_m = rows[max(after - 1, 0)]
+            beyond = max(1.0, loop_age_s / age_s)
+            return beyond * mean_m, beyond * sd_m
+        (age_s, mean_m, sd_m), (next_age_s, next_mean_m, next_sd_m) = rows[after - 1 : after + 1]
+        share = (loop_age_s - age_s) / (next_age_s - age_s)
+        return mean_m + share * (next_mean_m - mean_m), sd_m + share * (next_sd_m - sd_m)
 
 
 def load_prediction_errors(path: Path) -> PredictionErrors:

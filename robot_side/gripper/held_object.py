@@ -1,12 +1,14 @@
 """An object between the fingers moves with them: it leaves the surroundings and joins the gripper as spheres."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import BoolArray, FloatArray
 from robot_side.ahead.distances import distance_to_object
 from robot_side.arm.port import GripperPose
+from robot_side.compiled.kernel import compiled, input_array, output_array
+from robot_side.compiled.vectors import dot, load
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.objects.perceived import PerceivedObjects, Role
 
@@ -22,6 +24,16 @@ class HeldObject:
     """(k, 3)"""
     radii_m: FloatArray
     """(k,)"""
+    _joined: list[tuple[FloatArray, FloatArray, BoolArray]] = field(default_factory=list, compare=False, repr=False)
+
+    def joined(self, pose: GripperPose) -> tuple[FloatArray, BoolArray]:
+        """Radii (m + k,) of the gripper's spheres and of these, and which are a finger's; made once for poses
+        that share their radii."""
+        own = pose.sphere_radii_m
+        if not self._joined or self._joined[0][0] is not own:
+            on_finger = np.concatenate([pose.sphere_on_finger, np.zeros(len(self.radii_m), dtype=np.bool_)])
+            self._joined[:] = [(own, np.concatenate([own, self.radii_m]), on_finger)]
+        return self._joined[0][1:]
 
 
 def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach_m: float) -> int | None:
@@ -57,12 +69,29 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldC
 
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
     """The gripper's spheres and after them the held object's, all moving with the tool."""
-    lever = held.centers_in_tool_m @ pose.tool_rotation.T
+    radii_m, on_finger = held.joined(pose)
+    centers_m = np.empty((len(radii_m), 3))
+    _join(
+        *(np.ascontiguousarray(pose.sphere_centers_m), np.ascontiguousarray(held.centers_in_tool_m)),
+        *(pose.tool_position_m, np.ascontiguousarray(pose.tool_rotation), centers_m),
+    )
     return GripperPose(
         tool_position_m=pose.tool_position_m,
         tool_rotation=pose.tool_rotation,
         tool_jacobian=pose.tool_jacobian,
-        sphere_centers_m=np.concatenate([pose.sphere_centers_m, pose.tool_position_m + lever]),
-        sphere_radii_m=np.concatenate([pose.sphere_radii_m, held.radii_m]),
-        sphere_on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(lever), dtype=np.bool_)]),
+        sphere_centers_m=centers_m,
+        sphere_radii_m=radii_m,
+        sphere_on_finger=on_finger,
     )
+
+
+@compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))
+def _join(own: FloatArray, held: FloatArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray) -> None:
+    """Fill centers (m + k, 3) by the gripper's own (m, 3) and those in the tool frame (k, 3): t + R c."""
+    first = own.shape[0]
+    for i in range(first):
+        for axis in range(3):
+            centers[i, axis] = own[i, axis]
+    for i in range(held.shape[0]):
+        for axis in range(3):
+            centers[first + i, axis] = tool[axis] + dot(load(rotation, axis), load(held, i))

@@ -47,7 +47,7 @@ ARROWS = """
     robot_side/ahead: common common/protocol robot_side/ahead/kinds robot_side/arm robot_side/compiled
         robot_side/enlargement robot_side/objects robot_side/overlap/lanes robot_side/overlap/meshes
         robot_side/overlap/precise
-    robot_side/gripper: common common/files robot_side/ahead robot_side/arm robot_side/objects
+    robot_side/gripper: common common/files robot_side/ahead robot_side/arm robot_side/compiled robot_side/objects
         robot_side/overlap/meshes
     robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/compiled
         robot_side/enlargement robot_side/gripper robot_side/objects robot_side/overlap/meshes

@@ -101,6 +101,54 @@ def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) ->
     assert tables[2].objects is second
 
 
+def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjects:
+    """Every primitive somewhere else and turned, and no larger or smaller."""
+    shift, turn = rng.normal(size=3), random_rotation(rng)
+    return dataclasses.replace(
+        objects,
+        sphere_centers_m=objects.sphere_centers_m @ turn.T + shift,
+        box_centers_m=objects.box_centers_m @ turn.T + shift,
+        box_rotations=turn @ objects.box_rotations,
+        tetrahedron_vertices_m=objects.tetrahedron_vertices_m @ turn.T + shift,
+        half_space_normals=objects.half_space_normals @ turn.T,
+        half_space_offsets_m=objects.half_space_offsets_m + 0.01,
+        mesh_positions_m=objects.mesh_positions_m @ turn.T + shift,
+        mesh_rotations=turn @ objects.mesh_rotations,
+    )
+
+
+NUMBERS = ("bounds", "shapes", "object_bounds", "object_volumes")
+ORDER = ("kinds", "rows_of_kind", "first_rows")
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), meshes=st.integers(0, 1))
+def test_the_next_frame_of_the_same_objects_has_the_table_that_would_be_made_anew(seed: int, meshes: int) -> None:
+    rng = np.random.default_rng(seed)
+    first = mixed() if seed % 3 == 0 else random_scene(rng, 3, meshes=meshes)
+    last, objects = scene_table(first), moved(first, rng)
+    found, anew = module._moved(last, objects), module._make(objects)
+    assert found is not None
+    assert found.objects is objects
+    for name in NUMBERS:
+        np.testing.assert_allclose(getattr(found, name), getattr(anew, name), rtol=1e-14, atol=1e-14)
+    for name in ORDER:
+        np.testing.assert_array_equal(getattr(found, name), getattr(anew, name))
+
+
+def test_other_objects_and_those_that_lose_their_volume_get_a_table_of_their_own() -> None:
+    objects = mixed()
+    last = scene_table(objects)
+    flat = dataclasses.replace(objects, box_half_sizes_m=objects.box_half_sizes_m * [0.0, 1.0, 1.0])
+    swapped = dataclasses.replace(objects, sphere_object=objects.sphere_object[::-1].copy())
+    for other in (flat, swapped, Scene().add().objects()):
+        assert module._moved(last, other) is None
+    assert scene_table(flat).flat == 2
+    # Whose table leaves rows out has none of the next frame's order, either.
+    assert module._moved(scene_table(flat), objects) is None
+    np.testing.assert_array_equal(scene_table(swapped).kinds, module._make(swapped).kinds)
+
+
 def test_frames_do_not_pile_up() -> None:
     frames = []
     for seed in range(100):

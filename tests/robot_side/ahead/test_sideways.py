@@ -4,18 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.ahead.sideways import SPACING_M, FingerMotion, Sideways
 from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.arm.port import GripperPose
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import RADIUS_M, ball_pose
 from tests.helpers.ahead.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
-from tests.helpers.perceived_scenes import Scene
+from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOP_S = 0.1
 STOPPING_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
@@ -204,3 +208,40 @@ def test_a_mesh_that_moves_is_felt_like_a_box_that_does(speed_m_s: float) -> Non
     )
     fast = replace(beyond, velocities_m_s=np.array([[0.0, 0.0, -0.4]]))
     assert first_ways(fast, [0.0] * 3, [0.0] * 3)[1][7] == pytest.approx(far_m - 0.4 * STOPPING_S, abs=0.012)
+
+
+def random_pose(rng: np.random.Generator, count: int) -> GripperPose:
+    pose = free_pose(rng.normal(size=(count, 3)), np.full(count, RADIUS_M))
+    return replace(pose, tool_position_m=rng.normal(size=3), tool_rotation=random_rotation(rng))
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 20), after_s=st.floats(0.0, 3.0))
+def test_drift_is_what_rotations_of_scipy_and_sums_of_vectors_make_it(seed: int, count: int, after_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    pose, turning = random_pose(rng, count), rng.normal(size=3) * (seed % 4 > 0)
+    sideways = Sideways(rng.normal(size=3), turning, rng.normal(size=(count, 3)))
+    moved, turn = sideways.moved(pose, after_s), Rotation.from_rotvec(turning * after_s).as_matrix()
+    tool_m = pose.tool_position_m + sideways.linear_m_s * after_s
+    lever = pose.sphere_centers_m - pose.tool_position_m
+    np.testing.assert_allclose(moved.tool_position_m, tool_m, atol=1e-12)
+    np.testing.assert_allclose(moved.tool_rotation, turn @ pose.tool_rotation, atol=1e-12)
+    centers_m = tool_m + (lever + sideways.own_m_s * after_s) @ turn.T
+    np.testing.assert_allclose(moved.sphere_centers_m, centers_m, atol=1e-12)
+    speeds = [
+        sideways.linear_m_s + np.cross(turning, one) + sideways.own_m_s
+        for one in (lever, lever + 0.3 * pose.tool_rotation[:, 2])
+    ]
+    farthest_m = after_s * np.linalg.norm(speeds, axis=2).max()
+    assert sideways.farthest_m(pose, after_s, 0.3) == pytest.approx(farthest_m, abs=1e-12)
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_fingers_move_by_the_difference_in_the_tool_frame(seed: int) -> None:
+    rng, fingers = np.random.default_rng(seed), FingerMotion()
+    then, now = random_pose(rng, 5), random_pose(rng, 5)
+    assert not fingers.see(then, 1.0).any()
+    in_tool = [(pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation for pose in (then, now)]
+    expected = (in_tool[1] - in_tool[0]) / 0.05 @ now.tool_rotation.T
+    np.testing.assert_allclose(fingers.see(now, 1.05), expected, atol=1e-11)

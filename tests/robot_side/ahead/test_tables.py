@@ -26,9 +26,8 @@ def smallest() -> Tables:
         ramps=np.zeros(2 * BLOCK, dtype=RAMP),
         pairs=np.zeros(8, dtype=PAIR),
         jobs=Jobs(1),
-        sigma_m=np.zeros((1, 2)),
-        blocks=np.zeros((1, 4)),
         near=np.zeros(1, dtype=np.int64),
+        most_spheres=1,
     )
 
 
@@ -38,9 +37,8 @@ def largest() -> Tables:
         ramps=np.zeros(20_000, dtype=RAMP),
         pairs=np.zeros(500_000, dtype=PAIR),
         jobs=Jobs(100_000),
-        sigma_m=np.zeros((2000, 2)),
-        blocks=np.zeros((1000, 4)),
         near=np.zeros(10_000, dtype=np.int64),
+        most_spheres=2000,
     )
 
 

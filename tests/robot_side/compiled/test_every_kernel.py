@@ -16,16 +16,19 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     assert all(kernel.ready for kernel in imported_kernels())
     modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
     assert {
-        "robot_side.ahead.ask",
         "robot_side.ahead.distances",
-        "robot_side.ahead.feel",
+        "robot_side.ahead.felt",
         "robot_side.ahead.find",
-        "robot_side.ahead.meet",
+        "robot_side.ahead.looks",
+        "robot_side.ahead.kinds.next_frame",
+        "robot_side.ahead.rounds",
+        "robot_side.ahead.sideways",
         "robot_side.ahead.total_overlap",
         "robot_side.arm.ability",
         "robot_side.arm.commanded",
         "robot_side.arm.forward_kinematics",
         "robot_side.arm.joint_estimate",
+        "robot_side.gripper.held_object",
         "robot_side.arm.resolved_rate",
         "robot_side.enlargement.kinematic_error",
         "robot_side.objects.validity",
