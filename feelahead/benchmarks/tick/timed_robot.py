@@ -23,6 +23,8 @@ from robot_side.outgoing_messages import Outgoing
 
 PROGRAM = "python -m feelahead.benchmarks.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")
+AWAY: Final = ("physics", "frame")
+"""No part of the way from look to message: a real arm has no physics, and a frame comes 30 times a second."""
 _PLACES: Final = (
     ("_arm", "state"),
     ("_kinematics", "pose"),
@@ -48,6 +50,8 @@ class TimedSettings:
     """Of them."""
     kind: str = "mixed"
     """spheres, boxes, tetrahedra or mixed."""
+    stages: bool = True
+    """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
     """Without the scene's own."""
 
@@ -86,7 +90,8 @@ def _timed(settings: TimedSettings, ticks: list[tuple[float, ...]]) -> object:
             core._camera = CrowdedCamera(core._camera, crowd, only=settings.only)
         took_s = np.zeros(len(STAGES))
         for stage, (part, name) in enumerate(_PLACES):
-            _time(getattr(core, part) if part else core, name, took_s, stage)
+            if settings.stages or STAGES[stage] in AWAY:
+                _time(getattr(core, part) if part else core, name, took_s, stage)
         noted, plain = core.tick, RobotSide.tick.__get__(core)
 
         def timed(now_s: float) -> list[Outgoing]:
