@@ -1,6 +1,5 @@
 """The file itself, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
 
-import errno
 import logging
 import os
 from collections.abc import Mapping
@@ -138,9 +137,11 @@ class _Output:
         return len(data)
 
     def _write(self, data: bytes | bytearray) -> None:
+        left = memoryview(data)
         try:
-            if self._file.write(data) != len(data):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            # A part may find room; what comes next says why the rest does not.
+            while left:
+                left = left[self._file.write(left) :]
         except OSError as error:
             self.error = error.strerror or str(error)
             # All of it comes again: a part that found room is not to stand before it.
