@@ -50,7 +50,7 @@ class TimedSettings:
     """Of them."""
     kind: str = "mixed"
     """spheres, boxes, tetrahedra or mixed."""
-    stages: bool = True
+    stages: tyro.conf.FlagConversionOff[bool] = True
     """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
     """Without the scene's own."""
