@@ -52,7 +52,7 @@ def _variance_along(lever: Vector, joints: FloatArray) -> float:
 
 
 @building_block
-def _around(spheres: FloatArray, sigma: FloatArray, first: int, end: int) -> tuple[Vector, float]:
+def around_spheres(spheres: FloatArray, sigma: FloatArray, first: int, end: int) -> tuple[Vector, float]:
     """A sphere around the inflated spheres from `first` to `end`."""
     middle = 0.0, 0.0, 0.0
     for i in range(first, end):
@@ -144,7 +144,7 @@ def find(
         return -1
     total, middle, around = (size + BLOCK - 1) // BLOCK, (0.0, 0.0, 0.0), 0.0
     for block in range(total):
-        center, radius = _around(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, size))
+        center, radius = around_spheres(spheres, sigma, block * BLOCK, min((block + 1) * BLOCK, size))
         blocks[block, 0], blocks[block, 1], blocks[block, 2], blocks[block, 3] = center[0], center[1], center[2], radius
         middle = add(middle, scale(1.0 / total, center))
     for block in range(total):

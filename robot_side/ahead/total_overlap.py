@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.ahead.ask import room_of, write_job
-from robot_side.ahead.find import PASSED_OVER
+from robot_side.ahead.find import PASSED_OVER, around_spheres
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import HALF_SPACE, SPHERE
 from robot_side.ahead.scene_table import SceneTable, scene_at
@@ -119,8 +119,10 @@ def _gather(
         return math.nan
     jobs.counts[:] = 0
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
+    middle, around = around_spheres(spheres, inflated, begin, end)
+    middle = add(middle, shift)
     for thing in range(standing.size):
-        if standing[thing] == PASSED_OVER:
+        if standing[thing] == PASSED_OVER or not passes(middle, nowhere, 0.0, scene.object_bounds, thing, around):
             continue
         for i in range(begin, end):
             center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
