@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from robot_side.ahead.find import around_spheres
 from robot_side.ahead.kinds.layout import MESH
 from robot_side.ahead.scene_table import SceneTable, scene_table
 from robot_side.ahead.way import nearest
@@ -98,8 +99,9 @@ def _least_gaps(
     gaps: FloatArray,
 ) -> None:
     """Lower `gaps` (k,) to the distances to all primitives but meshes that bounds do not show to be beyond `reach`."""
+    middle, around = around_spheres(spheres, np.zeros_like(spheres), 0, spheres.shape[0])
     for row in range(kinds.size):
-        if kinds[row] == MESH:
+        if kinds[row] == MESH or norm(subtract(load(bounds, row), middle)) - bounds[row, 3] - around > reach:
             continue
         for i in range(spheres.shape[0]):
             least = gaps[objects[row]]

@@ -15,16 +15,16 @@ def object_centers(objects: PerceivedObjects) -> FloatArray:
 
     A mesh's centre is that of its bounding box in its own frame.
     """
-    sums = np.zeros((len(objects.names), 3))
-    counts = np.zeros(len(objects.names))
-    for centers, owner in (
+    count = len(objects.names)
+    of_kinds = (
         (objects.sphere_centers_m, objects.sphere_object),
         (objects.box_centers_m, objects.box_object),
         (objects.tetrahedron_vertices_m.mean(axis=1), objects.tetrahedron_object),
         (placed_middles(objects), objects.mesh_object),
-    ):
-        np.add.at(sums, owner, centers)
-        np.add.at(counts, owner, 1.0)
+    )
+    centers, owners = (np.concatenate(parts) for parts in zip(*of_kinds, strict=True))
+    counts = np.bincount(owners, minlength=count)
+    sums = np.column_stack([np.bincount(owners, weights=centers[:, axis], minlength=count) for axis in range(3)])
     with np.errstate(invalid="ignore"):
         centers_m: FloatArray = sums / np.where(counts > 0.0, counts, np.nan)[:, None]
     return centers_m
