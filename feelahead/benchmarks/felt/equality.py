@@ -113,6 +113,8 @@ class _BesideLooks(Looks):
 class BesideLaw(SweptLaw):
     """The law, whose every tick is worked out plainly, too."""
 
+    _now: Situation
+
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.differences = Differences()
@@ -121,7 +123,6 @@ class BesideLaw(SweptLaw):
         self.ahead = self._beside
         self._kept = _BesideLooks(self._beside, self._plain_overlap_m3)
         self._looks = self._kept
-        self._now: Situation | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick."""
@@ -144,7 +145,6 @@ class BesideLaw(SweptLaw):
 
     def _plain_overlap_m3(self, side: int, place: int) -> float:
         """Of the gripper in the last look, moved by the robot side's δ; only along the side that leads."""
-        assert self._now is not None
         pose, scene, standing, along = self._beside.asked
         velocity = pose.tool_jacobian[:3] @ self._now.joint_velocities_rad_s
         speed_m_s = float(velocity @ self._now.pose.tool_rotation[:, 2])

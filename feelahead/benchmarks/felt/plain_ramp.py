@@ -127,8 +127,8 @@ class Ramp:
         near = (self.entries > max(self._free, last - margin)) & (self.entries < last + long)
         return short if near.any() else long
 
-    def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Between nodes: ways (k, 9) and V (k, 9) at eighths, and whether (k,) V may have a peak in between."""
+    def _pieces(self) -> tuple[FloatArray, FloatArray]:
+        """Between nodes: ways (k, 9) and V (k, 9) at eighths; where V does not turn, it stays between its ends."""
         way, volume, slope = (np.array(column) for column in zip(*self.nodes, strict=True))
         step, rest = np.diff(way)[:, None], 1.0 - _SHARES
         turns = slope[:-1] * slope[1:] < 0.0
@@ -139,7 +139,7 @@ class Ramp:
         )
         low, high = np.minimum(volume[:-1], volume[1:]), np.maximum(volume[:-1], volume[1:])
         within = np.clip(cubic, low[:, None], high[:, None])
-        return way[:-1, None] + _SHARES * step, np.where(turns[:, None], cubic, within), turns
+        return way[:-1, None] + _SHARES * step, np.where(turns[:, None], cubic, within)
 
     def _begins_to_rise(self) -> bool:
         """Look for d; whether it is among the nodes."""
@@ -149,7 +149,7 @@ class Ramp:
             return True
         if len(self.nodes) == 1:
             return False
-        ways, volumes, _ = self._pieces()
+        ways, volumes = self._pieces()
         for way, now in zip(ways[:, 1:].ravel(), volumes[:, 1:].ravel() - self._floor, strict=True):
             if now > self._nothing_m3:
                 self._free = float(before + (way - before) * max(0.0, -excess) / (now - min(excess, 0.0)))
@@ -177,7 +177,7 @@ class Ramp:
 
     def _strengths(self, margin: float) -> FloatArray:
         """The ways (8,) at which strengths begin, by the nodes so far."""
-        ways, volumes, turns = self._pieces()
+        ways, volumes = self._pieces()
         risen = volumes - self._floor
         end = (self._free + margin) * (1.0 + 1e-12)
         top = max(0.0, float(risen[ways <= end].max(initial=0.0)))

@@ -25,6 +25,8 @@ _CORNERS: Final = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
 _EDGES: Final = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """From points (m, 3) to distances (m,), negative or 0 inside, and unit directions (m, 3) in which they fall."""
+Overlaps = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
+"""Of spheres at (k, 3) of one radius: V (k,) and its gradients (k, 3)."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,7 @@ class Primitive:
     volume_m3: float
     ways: Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
     """From spheres, centers (m, 3), radii (m,), a direction (3,) and a reach to the ways (m,) to a touch."""
-    overlap: Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
-    """Of spheres at (k, 3) of one radius: V (k,) and its gradients (k, 3)."""
+    overlap: Overlaps
 
 
 def primitives(objects: PerceivedObjects) -> list[Primitive]:
@@ -48,7 +49,9 @@ def primitives(objects: PerceivedObjects) -> list[Primitive]:
         objects.sphere_object, objects.sphere_centers_m, objects.sphere_radii_m, strict=True
     ):
         volume = 4.0 / 3.0 * np.pi * float(radius) ** 3
-        found.append(Primitive(int(thing), volume, _ways_to_sphere(center, radius), _overlap(sphere_sphere, center, radius)))
+        found.append(
+            Primitive(int(thing), volume, _ways_to_sphere(center, radius), _overlap(sphere_sphere, center, radius))
+        )
     for thing, *box in zip(
         objects.box_object, objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m, strict=True
     ):
@@ -133,9 +136,11 @@ def plain_ways(
     return np.where(ways_m > along.reach_m, np.inf, ways_m)
 
 
-def _overlap(function: Callable[..., tuple[FloatArray, ...]], *shape: FloatArray) -> Callable[..., tuple[FloatArray, FloatArray]]:
+def _overlap(function: Callable[..., tuple[FloatArray, ...]], *shape: FloatArray) -> Overlaps:
+    rows = [np.asarray(one)[None] for one in shape]
+
     def overlap(centers: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-        volumes, gradients, _ = function(centers, np.full(len(centers), radius), *(np.asarray(one)[None] for one in shape), gradient=True)
+        volumes, gradients, _ = function(centers, np.full(len(centers), radius), *rows, gradient=True)
         return volumes, gradients
 
     return overlap
@@ -177,7 +182,9 @@ def _advance(nearest: Nearest) -> Callable[..., FloatArray]:
             gap, closing = distances - radii[going], towards @ along
             step = np.where(closing > CLOSING, gap / np.where(closing > CLOSING, closing, 1.0), np.inf)
             touches = gap <= TOUCHING_M
-            ended = np.where(closing <= CLOSING, np.inf, np.where(touches, np.maximum(moved[going], LEAST_WAY_M), np.nan))
+            ended = np.where(
+                closing <= CLOSING, np.inf, np.where(touches, np.maximum(moved[going], LEAST_WAY_M), np.nan)
+            )
             ended = np.where(gap < -TOUCHING_M, moved[going], ended)
             further = np.isnan(ended)
             moved[going[further]] += step[further]

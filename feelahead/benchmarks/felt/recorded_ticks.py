@@ -1,22 +1,21 @@
 """Ticks of real runs, noted once in virtual time: what a law was asked, so that any law can be asked the same again."""
 
 import functools
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from common.arrays import FloatArray
 from feelahead.approaches.arming import wait_for_pull
 from feelahead.approaches.frozen import SITE, frozen_scene
+from feelahead.benchmarks.felt.turning import exchanged
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
 from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.core import RobotSide
 from robot_side.settings import RobotSettings
@@ -44,7 +43,6 @@ class Recorded:
     """A run."""
 
     name: str
-    scene: Scene
     ticks: tuple[Tick, ...]
     law: tuple[Any, ...]
     """The arguments of SweptLaw that it had."""
@@ -79,22 +77,27 @@ def record(name: str, duration_s: float, seed: int = 0) -> Recorded:
     """The demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same seed gives the same."""
     model = None if name == DEMO else frozen_scene(name)
     robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed)
-    scene = load_scene(robot.model, robot.site, robot.roles, "table", seed)
     noting: list[_Noting] = []
+    laws: list[tuple[Any, ...]] = []
     device = SimulatedDualSense(strength_step_n=_STRONGEST_N / MAX_STRENGTH)
     hands = PullingHands(device, constant_force(FORCE_N))
-    run = Loopback(
-        LoopbackSettings(robot, OperatorSettings(seed=seed)),
-        scene=scene,
-        device=device,
-        person=None if model is None else lambda _: hands,
-        robot_side=functools.partial(_noted, noting),
-    )
+    with exchanged("robot_side.assembly", SweptLaw=functools.partial(_new_law, laws)):
+        run = Loopback(
+            LoopbackSettings(robot, OperatorSettings(seed=seed)),
+            scene=scene_of(name),
+            device=device,
+            person=None if model is None else lambda _: hands,
+            robot_side=functools.partial(_noted, noting),
+        )
     from_s = 0.0 if model is None else wait_for_pull(run, hands, "") - _BEFORE_S
     run.run_until(from_s + duration_s)
     kept = tuple(tick for tick in noting[0].ticks if tick.now_s >= from_s)
-    law = noting[0]._law
-    return Recorded(name, scene, kept, (law._uncertainty, law.ahead.encoder_sigma_rad, law._limits, law._motion))  # type: ignore[attr-defined]
+    return Recorded(name, kept, laws[0])
+
+
+def scene_of(name: str) -> Scene:
+    """Where the run of this name takes place, at its start."""
+    return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)
 
 
 def _noted(
@@ -104,9 +107,15 @@ def _noted(
     return RobotSide(arm, noting[0], camera, noting[0], *others, **named)
 
 
+def _new_law(laws: list[tuple[Any, ...]], *arguments: Any) -> SweptLaw:
+    laws.append(arguments)
+    return SweptLaw(*arguments)
+
+
 def with_cover(recorded: Recorded, cover_m: float) -> Recorded:
     """The same, had the gripper been covered by spheres that stand out so far; what it held stays as it was."""
-    own, other = MujocoKinematics(recorded.scene), MujocoKinematics(recorded.scene, cover_m)
+    scene = scene_of(recorded.name)
+    own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
     first = len(own.cover.radii_m)
     return replace(recorded, ticks=tuple(_covered(tick, other, first) for tick in recorded.ticks))
 

@@ -11,7 +11,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.messages import TriggerField
 from feelahead.benchmarks.felt.hulls import Hulls
-from feelahead.benchmarks.felt.recorded_ticks import Recorded, Tick, with_cover
+from feelahead.benchmarks.felt.recorded_ticks import Recorded, Tick, scene_of, with_cover
 from feelahead.benchmarks.felt.turning import COVER_M, Turned, turned
 from robot_side.ahead.law import Sensed
 from robot_side.ahead.scene_table import scene_table
@@ -82,7 +82,7 @@ def _seen_by(how: Turned, recorded: Recorded) -> tuple[Tick, ...]:
         recorded = with_cover(recorded, how.cover_m)
     if not how.hulls:
         return recorded.ticks
-    hulls = Hulls(recorded.scene, recorded.ticks[0].situation.objects)
+    hulls = Hulls(scene_of(recorded.name), recorded.ticks[0].situation.objects)
     # A frame stays the same object for as long as there is no newer one.
     frames = {id(tick.situation.objects): tick.situation.objects for tick in recorded.ticks}
     seen = {key: hulls.of(frame) for key, frame in frames.items()}

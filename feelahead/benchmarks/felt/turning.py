@@ -7,8 +7,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
-from unittest.mock import patch
 
+from feelahead.approaches.approach import Approach, robot_settings
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.looks import Looks
 from robot_side.ahead.nodes import NODES_PER_MARGIN
@@ -31,7 +31,7 @@ class Turned:
     cover_m: float = COVER_M
     """How far the gripper's spheres stand out: fewer of them for more"""
     nodes: int = NODES_PER_MARGIN
-    """So many overlaps over the margin make a ramp. Kernels have this compiled in: see `in_a_process_of_its_own`."""
+    """So many overlaps over the margin make a ramp. Kernels have this compiled in, each process one number."""
     hulls: bool = False
     """Meshes count as their convex hulls, each object's as one."""
 
@@ -86,21 +86,31 @@ class LateLaw(SweptLaw):
 
 
 @contextmanager
-def turned(how: Turned) -> Iterator[None]:
-    """Have whatever is built and run within it be so, in this process.
-
-    What has no parameter of its own is exchanged by its name: AttributeError where that is gone.
-    """
-    exchanged: list[tuple[str, str, Any]] = [("robot_side.ahead.swept_law", "FIELD_PERIOD_S", how.period_s)]
-    if how.late_ticks:
-        exchanged.append(("robot_side.assembly", "SweptLaw", partial(LateLaw, how.late_ticks)))
-    if how.nodes != NODES_PER_MARGIN:
-        exchanged += [(f"robot_side.ahead.{name}", "NODES_PER_MARGIN", how.nodes) for name in ("nodes", "ask")]
-    if how.cover_m != COVER_M:
-        module = "feelahead.approaches.approach"
-        plain: Callable[..., RobotSettings] = importlib.import_module(module).robot_settings
-        exchanged.append((module, "robot_settings", lambda approach: replace(plain(approach), cover_m=how.cover_m)))
+def exchanged(module_name: str, **by_name: Any) -> Iterator[None]:
+    """Have a module's names mean something else; AttributeError where one is gone."""
+    module = importlib.import_module(module_name)
     with ExitStack() as stack:
-        for module, name, value in exchanged:
-            stack.enter_context(patch(f"{module}.{name}", value))
+        for name, value in by_name.items():
+            stack.callback(setattr, module, name, getattr(module, name))
+            setattr(module, name, value)
         yield
+
+
+@contextmanager
+def turned(how: Turned) -> Iterator[None]:
+    """Have whatever is built and run within it be so, in this process; what has no parameter of its own by its name."""
+    with ExitStack() as stack:
+        stack.enter_context(exchanged("robot_side.ahead.swept_law", FIELD_PERIOD_S=how.period_s))
+        if how.late_ticks:
+            stack.enter_context(exchanged("robot_side.assembly", SweptLaw=partial(LateLaw, how.late_ticks)))
+        if how.nodes != NODES_PER_MARGIN:
+            for name in ("nodes", "ask"):
+                stack.enter_context(exchanged(f"robot_side.ahead.{name}", NODES_PER_MARGIN=how.nodes))
+        if how.cover_m != COVER_M:
+            settings = partial(_covered, robot_settings, how.cover_m)
+            stack.enter_context(exchanged("feelahead.approaches.approach", robot_settings=settings))
+        yield
+
+
+def _covered(plain: Callable[[Approach], RobotSettings], cover_m: float, approach: Approach) -> RobotSettings:
+    return replace(plain(approach), cover_m=cover_m)
