@@ -42,7 +42,5 @@ def approach_otherwise(how: Turned, scenes: Sequence[str], seed: int) -> list[Ap
             asked = Approach(frozen_scene(scene), force_n, SITE, seed=seed, stick=across, turn=turning)
             with turned(how):
                 outcome = run_approach(asked)
-            found.append(
-                Approached(how, scene, force_n, outcome.end, outcome.contact_speed_mm_s, outcome.least_gap_mm)
-            )
+            found.append(Approached(how, scene, force_n, outcome.end, outcome.contact_speed_mm_s, outcome.least_gap_mm))
     return found
