@@ -8,8 +8,8 @@ from feelahead.approaches.approach import Approach, run_approach
 from feelahead.approaches.frozen import ASIDE, SITE, frozen_scene
 from feelahead.benchmarks.felt.turning import Turned, turned
 
-SCENES: Final = ("wall", "mug", "post", "edge", "turn", "moving")
-"""Straight ahead; drifting across; turning; and towards what moves."""
+SCENES: Final = ("wall", "mug", "post", "edge", "moving")
+"""Straight ahead; drifting across; and towards what moves."""
 FORCES_N: Final = (3.0, 2.0)
 _RESTS: Final = (0.0, 0.0)
 

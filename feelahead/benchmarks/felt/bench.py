@@ -16,7 +16,7 @@ from feelahead.approaches.progress import progress
 from feelahead.benchmarks.felt.approaching import SCENES
 from feelahead.benchmarks.felt.equality import Differences, compare
 from feelahead.benchmarks.felt.ladders import ladders
-from feelahead.benchmarks.felt.measuring import RUNS, Found, Plan, measure, pieces
+from feelahead.benchmarks.felt.measuring import RUNS, Plan, measure, pieces
 from feelahead.benchmarks.felt.recorded_ticks import DEMO, record
 from feelahead.benchmarks.felt.tables import draw, report
 from feelahead.benchmarks.report import Report, Table, markdown, show, write_csv
@@ -109,11 +109,11 @@ def _compared(found: Differences) -> Table:
 
 def _page(settings: FeltSettings, made: Report, picture: str) -> str:
     quick = " --quick" if settings.quick else ""
-    shown = f" --seed {settings.seed}" if settings.seed else ""
+    seed = f" --seed {settings.seed}" if settings.seed else ""
     lines = [
         "# Run time against error of what is felt",
         "",
-        f"    {_PROGRAM}{quick}{shown} --write-docs docs/benchmarks/{settings.write_docs.name if settings.write_docs else ''}",
+        f"    {_PROGRAM}{quick}{seed} --write-docs docs/benchmarks/felt.md",
         "",
         f"On {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}. {_NOTE}",
         "",

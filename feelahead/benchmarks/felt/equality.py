@@ -140,7 +140,8 @@ class BesideLaw(SweptLaw):
         differences.take("horizon, m", sensed.horizon_m, plain.horizon_m)
         differences.take("rumble", sensed.rumble, plain.rumble)
         differences.take("enlargement, m", sensed.enlargement_m, plain.enlargement_m)
-        differences.take("overlap, mm³", 1e9 * sensed.overlap_m3, 1e9 * plain.overlap_m3)
+        share = 1.0 / float(4.0 / 3.0 * np.pi * (situation.pose.sphere_radii_m**3).sum())
+        differences.take("overlap, of the spheres' volume", share * sensed.overlap_m3, share * plain.overlap_m3)
         return sensed
 
     def _plain_overlap_m3(self, side: int, place: int) -> float:

@@ -24,7 +24,7 @@ def ladders(*, quick: bool) -> dict[str, list[Turned]]:
         Turned(COVER, f"{1e3 * cover_m:g} mm", cover_m=cover_m)
         for cover_m in (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)
     ]
-    nodes = [Turned(NODES, f"{count}", nodes=count) for count in (2, 3, NODES_PER_MARGIN, 12, 24)]
+    nodes = [Turned(NODES, f"{count}", nodes=count) for count in (3, NODES_PER_MARGIN, 12, 24)]
     found = {
         RATE: [*rates, Turned(RATE, "1000 Hz", period_s=_EVERY_TICK_S)],
         LATE: late,
