@@ -120,9 +120,9 @@ class PlainLooks:
 
 def plain_overlap_m3(spheres: FloatArray, parts: Sequence[Primitive], standing: IntArray) -> float:
     """Σ V_ij of spheres (m, 4) with all primitives but those passed over (eq. 11-12)."""
-    total = 0.0
-    for part in parts:
-        if standing[part.thing] != PASSED_OVER:
-            for radius in np.unique(spheres[:, 3]):
-                total += float(part.overlap(spheres[spheres[:, 3] == radius, :3], float(radius))[0].sum())
-    return total
+    volumes = [
+        part.overlap(spheres[:, :3], np.ascontiguousarray(spheres[:, 3]))[0].sum()
+        for part in parts
+        if standing[part.thing] != PASSED_OVER
+    ]
+    return float(sum(volumes))

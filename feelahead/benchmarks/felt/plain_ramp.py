@@ -30,8 +30,8 @@ class Ramp:
     center: FloatArray
     radius: float
     along: FloatArray
-    overlaps: Sequence[Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]]
-    """Of each primitive of the object that it meets: V (k,) and gradients (k, 3) of spheres at (k, 3)"""
+    overlaps: Sequence[Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]]
+    """Of each primitive of the object that it meets: V (k,) and gradients (k, 3) of spheres at (k, 3), radii (k,)"""
     entries: FloatArray
     """(p,) the ways at which it meets them"""
     least: float
@@ -89,7 +89,7 @@ class Ramp:
             met = np.flatnonzero(places >= entry)
             if not met.size:
                 continue
-            own, gradients = overlap(self.center + places[met, None] * self.along, self.radius)
+            own, gradients = overlap(self.center + places[met, None] * self.along, np.full(met.size, self.radius))
             volumes[met] += own
             slopes[met] += gradients @ self.along
             if met[-1] == len(places) - 1:

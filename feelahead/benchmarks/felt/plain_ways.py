@@ -25,8 +25,8 @@ _CORNERS: Final = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
 _EDGES: Final = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """From points (m, 3) to distances (m,), negative or 0 inside, and unit directions (m, 3) in which they fall."""
-Overlaps = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
-"""Of spheres at (k, 3) of one radius: V (k,) and its gradients (k, 3)."""
+Overlaps = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Of spheres at (k, 3) with radii (k,): V (k,) and its gradients (k, 3)."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,8 @@ def plain_ways(
 def _overlap(function: Callable[..., tuple[FloatArray, ...]], *shape: FloatArray) -> Overlaps:
     rows = [np.asarray(one)[None] for one in shape]
 
-    def overlap(centers: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-        volumes, gradients, _ = function(centers, np.full(len(centers), radius), *rows, gradient=True)
+    def overlap(centers: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
+        volumes, gradients, _ = function(centers, radii, *rows, gradient=True)
         return volumes, gradients
 
     return overlap
