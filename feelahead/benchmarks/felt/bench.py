@@ -16,9 +16,10 @@ from feelahead.approaches.progress import progress
 from feelahead.benchmarks.felt.approaching import SCENES
 from feelahead.benchmarks.felt.equality import Differences, compare
 from feelahead.benchmarks.felt.ladders import ladders
-from feelahead.benchmarks.felt.measuring import RUNS, Plan, measure, pieces
+from feelahead.benchmarks.felt.measuring import RUNS, Found, Plan, measure, pieces
 from feelahead.benchmarks.felt.recorded_ticks import DEMO, record
 from feelahead.benchmarks.felt.tables import draw, report
+from feelahead.benchmarks.felt.turning import Turned
 from feelahead.benchmarks.report import Report, Table, markdown, show, write_csv
 
 _PROGRAM: Final = "feelahead bench felt"
@@ -81,10 +82,7 @@ def bench_felt(arguments: Sequence[str]) -> int:
     if settings.csv is not None:
         write_csv(settings.csv, made.figures)
     if settings.write_docs is not None:
-        picture = settings.write_docs.with_suffix(".png")
-        draw(found, rungs, picture)
-        with output_file("--write-docs", settings.write_docs) as file:
-            file.write(_page(settings, made, picture.name))
+        write_page(settings, settings.write_docs, found, rungs, made)
     for table in made.tables:
         show(console, table)
     console.print(_NOTE)
@@ -107,7 +105,10 @@ def _compared(found: Differences) -> Table:
     )
 
 
-def _page(settings: FeltSettings, made: Report, picture: str) -> str:
+def write_page(settings: FeltSettings, path: Path, found: Found, rungs: dict[str, list[Turned]], made: Report) -> None:
+    """The tables as Markdown, and a picture beside them."""
+    picture = path.with_suffix(".png")
+    draw(found, rungs, picture)
     quick = " --quick" if settings.quick else ""
     seed = f" --seed {settings.seed}" if settings.seed else ""
     lines = [
@@ -117,8 +118,9 @@ def _page(settings: FeltSettings, made: Report, picture: str) -> str:
         "",
         f"On {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}. {_NOTE}",
         "",
-        f"![run time against error]({picture})",
+        f"![run time against error]({picture.name})",
         "",
         *(markdown(table) for table in made.tables),
     ]
-    return "\n".join(lines)
+    with output_file("--write-docs", path) as file:
+        file.write("\n".join(lines))
