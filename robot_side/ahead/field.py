@@ -105,7 +105,7 @@ class Ahead:
         """
         tables, counts, size = self.tables, self.counts, len(pose.sphere_radii_m)
         tables.require(size, len(scene.bounds))
-        early_m = np.zeros(len(standing)) if along.early_m is None else along.early_m
+        early_m = scene.still_m if along.early_m is None else along.early_m
         meetings = self._find(pose, scene, standing, along, early_m)
         counts.fields += 1
         counts.flat = scene.flat
@@ -133,6 +133,7 @@ class Ahead:
                 along.reach_m + self.margin_m,
                 standing,
                 early_m,
+                0.0 if along.early_m is None else float(early_m.max(initial=0.0)),
                 scene.addresses,
                 self.tables.addresses,
             )

@@ -9,7 +9,7 @@ from robot_side.ahead.ask import room_of, write_job
 from robot_side.ahead.find import PASSED_OVER, around_spheres
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import HALF_SPACE, SPHERE
-from robot_side.ahead.scene_table import SceneTable, scene_at
+from robot_side.ahead.scene_table import SceneTable, next_place, scene_at
 from robot_side.ahead.tables import BOX_JOBS, MESH_JOBS, TETRAHEDRON_JOBS, JobParts, Jobs, Tables, tables_at
 from robot_side.ahead.way import passes
 from robot_side.compiled.bundle import BUNDLE
@@ -121,7 +121,12 @@ def _gather(
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
     middle, around = around_spheres(spheres, inflated, begin, end)
     middle = add(middle, shift)
-    for thing in range(standing.size):
+    place = -1
+    while True:
+        place = next_place(scene.there, place + 1, middle, nowhere, 0.0, around)
+        if place >= scene.there.order.size:
+            break
+        thing = scene.there.order[place]
         if standing[thing] == PASSED_OVER or not passes(middle, nowhere, 0.0, scene.object_bounds, thing, around):
             continue
         for i in range(begin, end):
