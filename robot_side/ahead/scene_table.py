@@ -25,6 +25,7 @@ class BlockColumns(NamedTuple):
     """Blocks as kernels read them; the fields are those of Blocks."""
 
     order: IntArray
+    bounds: FloatArray
     blocks: FloatArray
     groups: FloatArray
 
@@ -51,22 +52,26 @@ def scene_at(bundle: IntArray) -> SceneColumns:
         indices(bundle, 3),
         rows_at(bundle, 4, 4),
         numbers(bundle, 5),
-        BlockColumns(indices(bundle, 6), rows_at(bundle, 7, 4), rows_at(bundle, 8, 4)),
+        BlockColumns(indices(bundle, 6), rows_at(bundle, 7, 4), rows_at(bundle, 8, 4), rows_at(bundle, 9, 4)),
     )
 
 
 @inlined
 def next_place(there: BlockColumns, place: int, center: Vector, along: Vector, reach: float, radius: float) -> int:
-    """The first place in the order, from `place` on, in a block that a swept sphere may meet (see `passes`)."""
+    """The first place in the order, from `place` on, of an object that a swept sphere may meet (see `passes`)."""
     size = there.order.size
-    while place < size and place % TOGETHER == 0:
+    while place < size:
         block = place // TOGETHER
-        if block % TOGETHER == 0 and not passes(center, along, reach, there.groups, block // TOGETHER, radius):
+        if place % (TOGETHER * TOGETHER) == 0 and not passes(
+            center, along, reach, there.groups, block // TOGETHER, radius
+        ):
             place += TOGETHER * TOGETHER
-        elif not passes(center, along, reach, there.blocks, block, radius):
+        elif place % TOGETHER == 0 and not passes(center, along, reach, there.blocks, block, radius):
             place += TOGETHER
-        else:
+        elif passes(center, along, reach, there.bounds, place, radius):
             break
+        else:
+            place += 1
     return place
 
 
@@ -126,7 +131,7 @@ class SceneTable:
         """What kernels read of it: a bundle for `scene_at`."""
         return addresses(
             *(self.bounds, self.shapes, self.kinds, self.first_rows, self.object_bounds, self.object_volumes),
-            *(self.blocks.order, self.blocks.blocks, self.blocks.groups),
+            *(self.blocks.order, self.blocks.bounds, self.blocks.blocks, self.blocks.groups),
         )
 
     @cached_property

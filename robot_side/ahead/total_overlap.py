@@ -127,7 +127,7 @@ def _gather(
         if place >= scene.there.order.size:
             break
         thing = scene.there.order[place]
-        if standing[thing] == PASSED_OVER or not passes(middle, nowhere, 0.0, scene.object_bounds, thing, around):
+        if standing[thing] == PASSED_OVER:
             continue
         for i in range(begin, end):
             center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]

@@ -47,11 +47,11 @@ def _spread(numbers: np.ndarray) -> np.ndarray:
 
 
 @compiled(input_array(2), input_indices(), output_array(2), output_array(2))
-def _bound(in_order: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
+def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
     """Bound the blocks `which`, rising, of objects with bounds (o, 4) in their order, and the blocks around them."""
     for k in range(which.size):
         first = which[k] * TOGETHER
-        write_around(in_order, first, min(first + TOGETHER, in_order.shape[0]), blocks[which[k]])
+        write_around(bounds, first, min(first + TOGETHER, bounds.shape[0]), blocks[which[k]])
     done = -1
     for k in range(which.size):
         group = which[k] // TOGETHER
@@ -68,12 +68,13 @@ class Blocks:
         self.order = in_blocks(object_bounds) if order is None else order
         """(o,) those that have bounds"""
         self._object_bounds = object_bounds
-        self._in_order: FloatArray = object_bounds[self.order]
+        self.bounds: FloatArray = object_bounds[self.order]
+        """(o, 4) of each, in the order"""
         self.blocks: FloatArray = np.empty((-(-len(self.order) // TOGETHER), 4))
         """(b, 4) around each block"""
         self.groups: FloatArray = np.empty((-(-len(self.blocks) // TOGETHER), 4))
         """(c, 4) around each block of blocks"""
-        _bound(self._in_order, np.arange(len(self.blocks)), self.blocks, self.groups)
+        _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
 
     def places(self, things: IntArray) -> IntArray:
         """Where these objects are in the order, rising."""
@@ -81,6 +82,6 @@ class Blocks:
 
     def follow(self, places: IntArray) -> None:
         """Bound the blocks of the objects at these places, rising, where they are now."""
-        self._in_order[places] = self._object_bounds[self.order[places]]
+        self.bounds[places] = self._object_bounds[self.order[places]]
         blocks = places // TOGETHER
-        _bound(self._in_order, blocks[np.flatnonzero(np.diff(blocks, prepend=-1))], self.blocks, self.groups)
+        _bound(self.bounds, blocks[np.flatnonzero(np.diff(blocks, prepend=-1))], self.blocks, self.groups)
