@@ -16,8 +16,7 @@ from robot_side.compiled.bundle import addresses, indices, numbers
 from robot_side.compiled.bundle import rows as rows_at
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector
-from robot_side.objects.movers import Movers
-from robot_side.objects.perceived import KINDS, PerceivedObjects
+from robot_side.objects.perceived import KINDS, PerceivedObjects, SomeObjects
 from robot_side.objects.validity import require_valid
 
 
@@ -78,7 +77,7 @@ def next_place(there: BlockColumns, place: int, center: Vector, along: Vector, r
 class Moving:
     """The movers' part of a table: where it is, and room to work it out before anything there is overwritten."""
 
-    def __init__(self, movers: Movers, table: "SceneTable") -> None:
+    def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
         self.movers = movers
         self.rows = np.flatnonzero(np.isin(table.object_index, movers.things))
         """(m,) of the table"""

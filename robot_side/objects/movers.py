@@ -4,20 +4,20 @@ A camera makes a `Movers` of the objects that may move, and a small frame of the
 others are, and where, is said once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
 from common.arrays import IntArray
-from robot_side.objects.perceived import KINDS, PerceivedObjects, Role
+from robot_side.objects.perceived import KINDS, PerceivedObjects, Role, SomeObjects
 
 OF_OBJECTS: Final = ("positions_m", "rotations", "velocities_m_s")
 """The arrays of a frame with a row for each object."""
 
 
-class Movers:
+class Movers(SomeObjects):
     """The objects of one frame that may be elsewhere in the next ones."""
 
     def __init__(self, first: PerceivedObjects, things: IntArray) -> None:
@@ -30,7 +30,7 @@ class Movers:
             raise ValueError(f"things holds {things}; valid: rising places among {len(first.names)} objects")
         self.first = first
         self.things = things
-        self.rows: dict[str, IntArray] = {
+        self.rows: Mapping[str, IntArray] = {
             kind.owner: np.flatnonzero(np.isin(getattr(first, kind.owner), things)) for kind in KINDS
         }
         """By the name of a kind's owners the rows (r,) of the primitives of these objects."""

@@ -1,5 +1,6 @@
 """What the camera reports: objects as spheres, boxes, tetrahedra, meshes and half-spaces, each with a role."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
@@ -9,8 +10,6 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from robot_side.objects.movers import Movers
-
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
@@ -89,8 +88,25 @@ class PerceivedObjects:
     """(k, 3, 3) object to world, with `positions_m`"""
     velocities_m_s: FloatArray | None = None
     """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
-    since: "tuple[Movers, PerceivedObjects] | None" = field(default=None, init=False, repr=False)
+    since: "tuple[SomeObjects, PerceivedObjects] | None" = field(default=None, init=False, repr=False)
     """Which objects may be elsewhere than in an earlier frame, and the frame of these alone; None: any may be."""
+
+
+class SomeObjects(Protocol):
+    """Objects of a frame that may be elsewhere in the next ones (see `movers`)."""
+
+    first: PerceivedObjects
+    things: IntArray
+    rows: Mapping[str, IntArray]
+
+    @property
+    def at_first(self) -> PerceivedObjects:
+        """These alone, as they are in `first`."""
+        ...
+
+    def place_of(self, thing: int) -> int | None:
+        """Which of these an object is; None for another one."""
+        ...
 
 
 class ObjectSource(Protocol):

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.objects.movers import OF_OBJECTS, Movers
-from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role
+from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """Of the built-in table's things."""
@@ -86,7 +86,7 @@ class CrowdedCamera:
         self._camera, self._crowd, self._only = camera, crowd, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
-        self._own_movers: Movers | None = None
+        self._own_movers: SomeObjects | None = None
         self._movers: Movers | None = None
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
