@@ -130,9 +130,7 @@ def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:
 
 
 def _without_objects(own: PerceivedObjects) -> PerceivedObjects:
-    none: dict[str, Any] = {
-        name: value[:0]
-        for name, value in vars(own).items()
-        if isinstance(value, np.ndarray) and name not in ("positions_m", "rotations", "velocities_m_s")
-    }
+    none: dict[str, Any] = dict.fromkeys(OF_OBJECTS) | {"mesh_index": own.mesh_index[:0]}
+    for kind in KINDS:
+        none |= {name: getattr(own, name)[:0] for name in (kind.owner, *kind.fields)}
     return replace(own, names=(), roles=(), **none)

@@ -71,6 +71,14 @@ def test_of_a_crowd_around_what_a_camera_sees_a_frame_says_what_moves() -> None:
     assert camera.perceive(1.5).roles[second.names.index(own[0])] is Role.TARGET
 
 
+def test_alone_a_crowd_is_all_there_is() -> None:
+    camera = CrowdedCamera(MujocoCamera(load_scene()), Crowd(30, 3), only=True)
+    for now_s in (0.0, 0.5):
+        frame = camera.perceive(now_s)
+        require_valid(frame)
+        assert frame.names == tuple(f"crowd {k}" for k in range(30))
+
+
 def test_what_is_asked_of_the_way_from_look_to_message_leaves_out_physics_and_frames() -> None:
     row = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 100e-6, "physics": 30e-6, "frame": 20e-6, STAGES[3]: 40e-6}
     ticks = Ticks("one", np.array([[row[column] for column in COLUMNS]] * 3), {}, 0.5)
