@@ -2,6 +2,7 @@
 
 import math
 import zlib
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,8 +46,9 @@ class CameraError:
         self.variance_m2 = standard_deviation_m**2 + frame_standard_deviation_m**2
         """σ_c² of eq. 2 for a single frame: both parts together."""
         self._frame_standard_deviation_m = frame_standard_deviation_m
-        self._generators = [np.random.default_rng([seed, zlib.crc32(name.encode())]) for name in names]
-        self._lasting = self.mean_m + standard_deviation_m * self._draw()
+        generators = [np.random.default_rng([seed, zlib.crc32(name.encode())]) for name in names]
+        self._lasting = self.mean_m + standard_deviation_m * _draw(generators)
+        self._generators = [] if self.lasts else generators
         self._offsets = -self._lasting
 
     @property
@@ -58,12 +60,13 @@ class CameraError:
         """Offsets -e_c (k, 3) to add to the true positions in the next frame, metres, in the order of the names."""
         if self.lasts:
             return self._offsets
-        offsets: FloatArray = -(self._lasting + self._frame_standard_deviation_m * self._draw())
+        offsets: FloatArray = -(self._lasting + self._frame_standard_deviation_m * _draw(self._generators))
         return offsets
 
-    def _draw(self) -> FloatArray:
-        draws: FloatArray = np.array([generator.standard_normal(3) for generator in self._generators])
-        return draws.reshape(-1, 3)
+
+def _draw(generators: Sequence[np.random.Generator]) -> FloatArray:
+    draws: FloatArray = np.array([generator.standard_normal(3) for generator in generators])
+    return draws.reshape(-1, 3)
 
 
 class MujocoCamera:
