@@ -8,8 +8,8 @@ from common.arrays import FloatArray, IntArray
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
 from robot_side.compiled.kernel import (
     TRUTH,
-    building_block,
     compiled,
+    inlined,
     input_array,
     input_indices,
     output_array,
@@ -19,7 +19,7 @@ from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.objects.perceived import PerceivedObjects
 
 
-@building_block
+@inlined
 def _place_sphere(centers: FloatArray, radii: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     """Write one sphere's numbers and bounds; its volume, as all of these do."""
     for axis in range(3):
@@ -28,7 +28,7 @@ def _place_sphere(centers: FloatArray, radii: FloatArray, k: int, shape: FloatAr
     return 4.0 / 3.0 * math.pi * float(radii[k] ** 3)
 
 
-@building_block
+@inlined
 def _place_box(
     centers: FloatArray, rotations: FloatArray, half_sizes: FloatArray, k: int, shape: FloatArray, bound: FloatArray
 ) -> float:
@@ -42,7 +42,7 @@ def _place_box(
     return 8.0 * (half[0] * half[1] * half[2])
 
 
-@building_block
+@inlined
 def _place_tetrahedron(vertices: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     for corner in range(4):
         for axis in range(3):
@@ -63,7 +63,7 @@ def _place_tetrahedron(vertices: FloatArray, k: int, shape: FloatArray, bound: F
     return abs(dot(cross(a, b), c)) / 6.0
 
 
-@building_block
+@inlined
 def _place_half_space(normals: FloatArray, offsets: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     for axis in range(3):
         shape[axis], bound[axis] = normals[k, axis], 0.0
@@ -71,7 +71,7 @@ def _place_half_space(normals: FloatArray, offsets: FloatArray, k: int, shape: F
     return math.inf
 
 
-@building_block
+@inlined
 def write_around(bounds: FloatArray, first: int, end: int, around: FloatArray) -> None:
     """Write a sphere around the bounds from `first` to `end`; of radius -inf where there are none."""
     around[:3], around[3] = 0.0, -math.inf
