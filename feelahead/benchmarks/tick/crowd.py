@@ -84,6 +84,7 @@ class CrowdedCamera:
     def __init__(self, camera: ObjectSource, crowd: Crowd, *, only: bool = False) -> None:
         """only: the crowd alone is seen."""
         self._camera, self._crowd, self._only = camera, crowd, only
+        self._before: PerceivedObjects | None = None
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
         self._own_movers: SomeObjects | None = None
@@ -94,7 +95,8 @@ class CrowdedCamera:
         """The camera's frame and the crowd as it was then; the same until there is a newer one."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
-            self._own, self._shown = own, self._with_crowd(own)
+            self._before, self._own = self._own, own
+            self._shown = self._with_crowd(own)
         return self._shown
 
     def set_role(self, name: str, role: Role) -> None:
@@ -107,7 +109,9 @@ class CrowdedCamera:
             return self._whole(_without_objects(own) if self._only else own)
         movers, moved = own.since
         if self._movers is None or self._own_movers is not movers:
-            first, moving = self._whole(movers.first), len(movers.first.names) + np.arange(crowd.moving)
+            # The frame that was shown whole is the one that has a table, and whose roles are known.
+            shown = self._shown if self._before is movers.first else None
+            first, moving = shown or self._whole(movers.first), len(movers.first.names) + np.arange(crowd.moving)
             self._own_movers, self._movers = movers, Movers(first, np.concatenate([movers.things, moving]))
             self._roles = movers.first.roles, first.roles
         if self._roles[0] is not own.roles:

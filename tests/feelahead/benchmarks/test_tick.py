@@ -57,6 +57,8 @@ def test_of_a_crowd_around_what_a_camera_sees_a_frame_says_what_moves() -> None:
     first, second = camera.perceive(0.0), camera.perceive(0.5)
     require_valid(first)
     assert second.since is not None
+    assert second.since[0].first is first
+    assert second.roles is first.roles
     moved = second.since[1]
     own = [thing.name for thing in scene.objects if thing.name not in scene.fixed]
     assert list(moved.names) == own + [f"crowd {k}" for k in range(9)]
