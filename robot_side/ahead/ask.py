@@ -75,7 +75,7 @@ def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) ->
     return in_slow_zones or bool(begins < fast[strength - 1])
 
 
-@building_block
+@inlined
 def write_job(
     kind: int, row: int, ramp: int, node: int, center: Vector, radius: float, shapes: FloatArray, jobs: JobColumns
 ) -> None:
@@ -107,7 +107,7 @@ def room_of(jobs: JobColumns) -> int:
     return jobs.owners.size // JOB_KINDS
 
 
-@building_block
+@inlined
 def _ask_node(
     ramp: Record,
     k: int,
@@ -135,7 +135,7 @@ def _ask_node(
             write_job(kind, row, k, node, center, ramp.radius, scene.shapes, jobs)
 
 
-@building_block
+@inlined
 def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float) -> int:
     """Write the jobs of the next round of the ramps there are; the number of nodes asked for, -1 without room.
 

@@ -190,7 +190,7 @@ def _take_first(ramp: Record) -> None:
     ramp.state = GOING
 
 
-@building_block
+@inlined
 def take(tables: TableColumns, along: Vector, margin: float, reach: float) -> None:
     """Put the results of the jobs into the ramps, and shorten the ways."""
     ramps, jobs, fast, slow = tables.ramps, tables.jobs, tables.ways[0], tables.ways[1]

@@ -14,7 +14,7 @@ from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, load
 
 
-@building_block
+@inlined
 def _meet(
     scene: SceneColumns, tables: TableColumns, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> bool:
@@ -66,7 +66,7 @@ def _next_meeting(meetings: np.ndarray, count: int) -> float:
     return nearest
 
 
-@building_block
+@inlined
 def _meet_block(
     meeting: Record,
     spheres: int,
@@ -108,7 +108,7 @@ def _meet_block(
     return True
 
 
-@building_block
+@inlined
 def meet(
     scene: SceneColumns,
     tables: TableColumns,
