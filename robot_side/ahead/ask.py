@@ -64,11 +64,11 @@ def most_strength(ramp: Record, margin: float) -> int:
 
 @inlined
 def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) -> bool:
-    """Whether a ramp could still shorten a way: nothing of it is felt before it begins, less the margin."""
+    """Whether a ramp could still shorten a way: nothing more of it is felt before it begins, less the margin."""
     strength = most_strength(ramp, margin)
     if strength == 0:
         return False
-    begins: float = ramp.start - margin - ramp.before
+    begins: float = max(ramp.start, ramp.begins) - margin - ramp.before
     in_slow_zones: bool = begins < slow[strength - 1]
     if ramp.touchable:
         in_slow_zones = begins + ramp.expected < slow[min(strength, TOUCH_STRENGTH) - 1]

@@ -42,7 +42,7 @@ def _meet(
     found[RAMPS] += 1
     ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
     ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
-    ramp.most, ramp.lean = math.inf, 0.0
+    ramp.most, ramp.lean, ramp.begins, ramp.walked, ramp.level = math.inf, 0.0, start, -1, 0
     return touching
 
 

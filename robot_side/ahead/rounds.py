@@ -87,7 +87,7 @@ def go_on(
             if has_meshes or tables.jobs.counts.sum() > 0:
                 return OVERLAPS
         else:
-            take(tables, along, margin, farthest)
+            take(scene, tables, along, margin, farthest)
             progress[STEP] = MEET
             progress[ROUNDS] += 1
     _forget_beyond(tables.ways, reach)

@@ -46,6 +46,12 @@ RAMP: Final = np.dtype(
         ("least", np.float64),
         ("rising", np.float64),
         ("most", np.float64),
+        ("begins", np.float64),
+        ("walked", np.int64),
+        ("level", np.int64),
+        ("along", np.float64),
+        ("reached", np.float64),
+        ("reference", np.float64),
         ("way", np.float64, (NODES,)),
         ("volume", np.float64, (NODES,)),
         ("slope", np.float64, (NODES,)),
@@ -56,7 +62,9 @@ RAMP: Final = np.dtype(
 nearer; before: by that, and by D_σ for a bare sphere. expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this
 way. free: d; NaN while not known. floor: V(0). lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise
 add to the slope at the last node. most: by so much the overlap rises at most; infinite where nobody has worked that
-out."""
+out. begins: no strength that is to come begins before this way, less the margin. walked: up to this node it has
+shortened the ways, -1 for not at all; level: by so many strengths; along, reached: the way until which that was, and
+the strength there, as a share of the reference, what makes full strength."""
 
 PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("again", np.float64)])
 """A primitive's row in the scene, and the way at which the ramp's sphere begins to enter it: NaN for a mesh until that
