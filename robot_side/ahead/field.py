@@ -9,7 +9,7 @@ from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.ahead.find import find
 from robot_side.ahead.rounds import ENDED, MORE_JOBS, MORE_RAMPS, OVERLAPS, go_on
 from robot_side.ahead.scene_table import SceneTable
-from robot_side.ahead.tables import ENTERED, LIMITED, RAMPS, Tables
+from robot_side.ahead.tables import ENTERED, LIMITED, OVERLAPPED, RAMPS, Tables
 from robot_side.ahead.total_overlap import work_out
 from robot_side.arm.port import GripperPose
 
@@ -112,6 +112,7 @@ class Ahead:
         if meetings:
             self._shorten(size, meetings, scene, standing, along, early_m, widest_m)
             counts.ramps += int(tables.progress[RAMPS])
+            counts.overlaps += int(tables.progress[OVERLAPPED])
             counts.limited += int(tables.progress[LIMITED])
         else:
             counts.with_nothing_near += 1
@@ -158,7 +159,7 @@ class Ahead:
         meshes = _mesh_ways(scene, tables, along.direction, along.reach_m + self.margin_m, self.margin_m)
         while (what := go_on(spheres, meetings, *looked, *around, tables.addresses)) != ENDED:
             if what == OVERLAPS:
-                self.counts.overlaps += work_out(tables.jobs, scene)
+                work_out(tables.jobs, scene)
                 if meshes is not None:
                     meshes.look_again(int(progress[RAMPS]))
             elif what == MORE_RAMPS:

@@ -10,7 +10,7 @@ from robot_side.ahead.kinds.layout import HALF_SPACE, MESH
 from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import BLOCK, DONE, LIMITED, NEW, PAIRS, RAMPS, STRENGTHS, WINDOW, Record, TableColumns
 from robot_side.ahead.way import passes, way_to
-from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, load
 
 

@@ -1,7 +1,7 @@
-"""Round after round, the nearest first, until nothing could shorten a way any more: in one call, but for overlaps.
+"""Round after round, the nearest first, until nothing could shorten a way any more: in one call, but for meshes.
 
 `meet` adds the ramps that come next, `ask` writes the overlaps to be worked out at their nodes, `take` takes the
-results in. Boxes, tetrahedra and meshes have kernels of their own, which the caller runs in between.
+results in. Meshes have kernels of their own, which the caller runs in between.
 """
 
 import math
@@ -12,7 +12,20 @@ from robot_side.ahead.ask import ask
 from robot_side.ahead.feel import take
 from robot_side.ahead.meet import meet
 from robot_side.ahead.scene_table import scene_at
-from robot_side.ahead.tables import ASK, ENTERED, LEFT, MEET, RAMPS, ROUNDS, STEP, STRENGTHS, TAKE, tables_at
+from robot_side.ahead.tables import (
+    ASK,
+    ENTERED,
+    LEFT,
+    MEET,
+    OVERLAPPED,
+    RAMPS,
+    ROUNDS,
+    STEP,
+    STRENGTHS,
+    TAKE,
+    tables_at,
+)
+from robot_side.ahead.total_overlap import worked_out
 from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.kernel import (
     COUNT,
@@ -84,7 +97,8 @@ def go_on(
                 return MORE_JOBS
             if asked == 0 and progress[LEFT] == 0:
                 break
-            if has_meshes or tables.jobs.counts.sum() > 0:
+            progress[OVERLAPPED] += tables.jobs.counts.sum()
+            if has_meshes or not worked_out(tables.jobs):
                 return OVERLAPS
         else:
             take(scene, tables, along, margin, farthest)

@@ -108,6 +108,13 @@ class JobColumns(NamedTuple):
     """(r, 3)"""
     vertices: FloatArray
     """(r, 4, 3)"""
+    areas: FloatArray
+    """(j,) worked out"""
+    unsettled: IntArray
+    """(r + 1,) which of one kind need the precise forms"""
+    kernels: IntArray
+    """(4,) addresses of the kernels that work out boxes and tetrahedra: the lanes, then the precise forms; 0 for one
+    that has not been needed yet"""
 
 
 class JobParts(NamedTuple):
@@ -136,9 +143,10 @@ class Jobs:
             box_rotations=np.zeros((room, 3, 3)),
             box_half_sizes=np.zeros((room, 3)),
             vertices=np.zeros((room, 4, 3)),
+            areas=np.zeros(JOB_KINDS * room),
+            unsettled=np.zeros(room + 1, dtype=np.int64),
+            kernels=np.zeros(4, dtype=np.int64),
         )
-        self.areas: FloatArray = np.zeros(JOB_KINDS * room)
-        self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
         self._parts: dict[tuple[int, int], JobParts] = {}
 
     def parts(self, kind: int, count: int, shapes: tuple[np.ndarray, ...]) -> JobParts:
@@ -148,17 +156,18 @@ class Jobs:
             columns, part = self.columns, slice(kind * self.room, kind * self.room + count)
             known = self._parts[kind, count] = JobParts(
                 (columns.centers[part], columns.radii[part], *(shape[:count] for shape in shapes)),
-                (columns.volumes[part], columns.gradients[part], self.areas[part]),
-                self.unsettled[: count + 1],
+                (columns.volumes[part], columns.gradients[part], columns.areas[part]),
+                columns.unsettled[: count + 1],
             )
         return known
 
 
 PAIRS, RAMPS, LIMITED = 0, 1, 2
 """What is counted in `progress`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
-STEP, LEFT, ENTERED, ROUNDS = 3, 4, 5, 6
-"""And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun."""
-PROGRESS: Final = 7
+STEP, LEFT, ENTERED, ROUNDS, OVERLAPPED = 3, 4, 5, 6, 7
+"""And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun, overlaps
+worked out."""
+PROGRESS: Final = 8
 MEET, ASK, TAKE = 0, 1, 2
 """Steps of a round."""
 
@@ -206,6 +215,9 @@ def tables_at(bundle: IntArray) -> TableColumns:
             matrices(bundle, 18, 3, 3),
             rows(bundle, 19, 3),
             matrices(bundle, 20, 4, 3),
+            numbers(bundle, 21),
+            indices(bundle, 22),
+            indices(bundle, 23),
         ),
     )
 
