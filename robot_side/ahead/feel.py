@@ -13,9 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.ask import NOTHING, add_to_node, most_strength, room_of
+from robot_side.ahead.ask import NOTHING, add_to_node, ends, most_strength, room_of
 from robot_side.ahead.kinds.layout import MESH
-from robot_side.ahead.nodes import ends
 from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import (
     DONE,

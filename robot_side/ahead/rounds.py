@@ -17,12 +17,14 @@ from robot_side.ahead.tables import (
     ENTERED,
     LEFT,
     MEET,
+    MESH_JOBS,
     OVERLAPPED,
     RAMPS,
     ROUNDS,
     STEP,
     STRENGTHS,
     TAKE,
+    WORK,
     tables_at,
 )
 from robot_side.ahead.total_overlap import worked_out
@@ -38,9 +40,12 @@ from robot_side.compiled.kernel import (
 )
 from robot_side.compiled.vectors import load
 
-ENDED, OVERLAPS, MESHES_MET, MORE_RAMPS, MORE_JOBS = 0, 1, 2, 3, 4
-"""What the caller has to do: nothing more; work out the jobs; fill in where ramps enter meshes; make room."""
+ENDED, PAUSED, OVERLAPS, MESHES_MET, MORE_RAMPS, MORE_JOBS = 0, 1, 2, 3, 4, 5
+"""What the caller has to do: nothing more; call again, at leisure; work out the jobs; fill in where ramps enter meshes;
+make room."""
 _MOST_ROUNDS: Final = 1000
+_OF_A_MESH: Final = 10
+"""A mesh costs as much as so many boxes, about."""
 
 
 @inlined
@@ -53,11 +58,12 @@ def _forget_beyond(ways: FloatArray, reach: float) -> None:
 
 
 @compiled(
-    *(COUNT, COUNT, input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, TRUTH),
+    *(COUNT, COUNT, COUNT, input_array(1), NUMBER, NUMBER, NUMBER, NUMBER, TRUTH),
     *(input_indices(), input_array(1), BUNDLE, BUNDLE),
     returns=COUNT,
 )
 def go_on(
+    most: int,
     spheres: int,
     meetings: int,
     direction: FloatArray,
@@ -73,17 +79,21 @@ def go_on(
 ) -> int:
     """Go on with a look that `find` has begun, until the caller has to do something: what that is.
 
-    The first `spheres` and `meetings` of the tables count. For the other arguments see `find` and `meet`.
+    It pauses between two rounds as soon as `most` has been done in all, as `progress[WORK]` counts it. The first
+    `spheres` and `meetings` of the tables count. For the other arguments see `find` and `meet`.
     """
     scene, tables = scene_at(scene_bundle), tables_at(tables_bundle)
     along, farthest, progress = load(direction.reshape(1, 3), 0), reach + margin, tables.progress
     while progress[ROUNDS] < _MOST_ROUNDS:
         if progress[STEP] == MEET:
+            if progress[WORK] >= most:
+                return PAUSED
             progress[ENTERED] = progress[RAMPS]
             if progress[LEFT] != 0:
                 progress[LEFT] = meet(
                     scene, tables, meetings, standing, early, along, widest, margin, farthest, least_depth, spheres
                 )
+            progress[WORK] += progress[RAMPS] - progress[ENTERED]
             if progress[LEFT] >= 0:
                 progress[STEP] = ASK
             if has_meshes and progress[RAMPS] > progress[ENTERED]:
@@ -91,13 +101,14 @@ def go_on(
             if progress[LEFT] < 0:
                 return MORE_RAMPS
         elif progress[STEP] == ASK:
-            asked = ask(scene, tables, along, margin, farthest)
+            asked = ask(scene, tables, along, margin, farthest, most - progress[WORK])
             progress[STEP] = MEET if asked < 0 else TAKE
             if asked < 0:
                 return MORE_JOBS
             if asked == 0 and progress[LEFT] == 0:
                 break
             progress[OVERLAPPED] += tables.jobs.counts.sum()
+            progress[WORK] += asked + _OF_A_MESH * tables.jobs.counts[MESH_JOBS]
             if has_meshes or not worked_out(tables.jobs):
                 return OVERLAPS
         else:

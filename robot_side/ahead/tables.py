@@ -164,10 +164,10 @@ class Jobs:
 
 PAIRS, RAMPS, LIMITED = 0, 1, 2
 """What is counted in `progress`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
-STEP, LEFT, ENTERED, ROUNDS, OVERLAPPED = 3, 4, 5, 6, 7
+STEP, LEFT, ENTERED, ROUNDS, OVERLAPPED, WORK = 3, 4, 5, 6, 7, 8
 """And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun, overlaps
-worked out."""
-PROGRESS: Final = 8
+worked out, and how much has been done: ramps met and nodes asked for."""
+PROGRESS: Final = 9
 MEET, ASK, TAKE = 0, 1, 2
 """Steps of a round."""
 
