@@ -200,7 +200,8 @@ def _ask_node(
 def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float, most: int) -> int:
     """Write the jobs of the next round of the ramps there are; the number of nodes asked for, -1 without room.
 
-    Once there are `most` nodes the other ramps wait for another round. Spheres and half-spaces are worked out here, by their closed forms.
+    Once there are `most` nodes the other ramps wait for another round. Spheres and half-spaces are worked out here, by
+    their closed forms.
     """
     ramps, pairs, jobs, count = tables.ramps, tables.pairs, tables.jobs, tables.progress[RAMPS]
     fast, slow = tables.ways[0], tables.ways[1]

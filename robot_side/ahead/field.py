@@ -128,11 +128,16 @@ class Ahead:
         self._looking = scene, meetings > 0
         self._meshes = _mesh_ways(scene, tables, along.direction, along.reach_m + self.margin_m, self.margin_m)
 
+    @property
+    def work(self) -> int:
+        """How much this look has taken so far: ramps and nodes."""
+        return int(self.tables.progress[WORK])
+
     def go_on(self, most: int = ALL) -> Field | None:
         """Go on with the look for so many ramps and nodes, or a few more; the field once it is known."""
         tables, progress, meshes = self.tables, self.tables.progress, self._meshes
         scene, meets = self._looking
-        most += int(progress[WORK])
+        most += self.work
         while meets and (what := go_on(most, *self._given, tables.addresses)) != ENDED:
             if what == PAUSED:
                 return None

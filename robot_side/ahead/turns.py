@@ -27,10 +27,15 @@ from robot_side.arm.port import GripperPose
 FIELD_PERIOD_S: Final = 0.01
 """A controller is written to no more often."""
 _DUE_S: Final = FIELD_PERIOD_S - 1e-9
-_OVERDUE_S: Final = 2.0 * FIELD_PERIOD_S - 1e-9
-"""What is so old is looked at anew at once, however long that takes."""
-MOST_WORK: Final = 250
-"""In a tick, in ramps and nodes (see `Ahead.go_on`)."""
+_OVERDUE_S: Final = 1.5 * FIELD_PERIOD_S
+"""While something is so old, twice as much is done in a tick,"""
+_FAR_BEHIND_S: Final = 5.0 * FIELD_PERIOD_S
+"""and while something is so old, or was never looked at, all that is due, however long that takes; so it is, too, where
+each tick has other objects, so that no look would come to its end."""
+MOST_WORK: Final = 400
+"""In a tick, in ramps and nodes (see `Ahead.go_on`): 50 microseconds, about."""
+TO_BEGIN: Final = 150
+"""To begin a look, or to measure what moves the gripper, takes as long as so many."""
 
 
 class Prospect(NamedTuple):
@@ -72,6 +77,8 @@ class Turns:
         self._trigger_speed_m_s = trigger_speed_m_s
         self._looks = Looks()
         self._going: _Look | None = None
+        self._given_up = 0
+        """Looks since the last that came to its end"""
         self._fingers = FingerMotion()
         self._sideways: Sideways | None = None
         self._moments: tuple[float, ...] = ()
@@ -88,12 +95,14 @@ class Turns:
         if now_s >= self._next_s or changed or deflected != bool(looks.looked_s[STICK]):
             velocity = situation.pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
             speed_m_s = float(velocity @ situation.pose.tool_rotation[:, 2])
+            left = MOST_WORK
             if changed or now_s - self._measured_s >= _DUE_S:
                 self._measure(situation, velocity, speed_m_s, now_s)
+                left -= TO_BEGIN
             for side in (R2, L2):
                 looks.look_from(side, 1 + len(self._moments))
             looks.look_from(STICK, 1 if deflected else 0)
-            self._look(situation, speed_m_s, now_s, changed=changed)
+            self._look(situation, speed_m_s, now_s, left, changed=changed)
             due_s = min(self._measured_s, *map(min, filter(None, looks.looked_s))) + _DUE_S
             self._next_s = due_s if self._going is None else now_s
         return looks
@@ -111,21 +120,27 @@ class Turns:
         until_s = stopping_s(situation, able)
         self._moments = sideways.moments(pose, until_s, until_s * able.full_speed_m_s)
 
-    def _look(self, situation: Situation, speed_m_s: float, now_s: float, *, changed: bool) -> None:
-        """Go on with the look under way, or begin the one that is due longest; end all that are overdue."""
-        going, due = self._going, self._looks.due(now_s)
-        if going is not None and (changed or self._is_gone(going, situation)):
-            going = self._going = None
-        overdue = [one for one in due if one[0] >= _OVERDUE_S]
+    def _look(self, situation: Situation, speed_m_s: float, now_s: float, left: int, *, changed: bool) -> None:
+        """Go on with the look under way, then with what is due longest; left: so much may be done."""
+        if self._going is not None and (changed or self._is_gone(self._going, situation)):
+            self._going = None
+            self._given_up += 1
+        due = self._looks.due(now_s)
+        if due[0][0] >= _FAR_BEHIND_S or self._given_up > 1:
+            left = ALL
+        elif due[0][0] >= _OVERDUE_S:
+            left *= 2
+        going = self._going
         if going is not None:
-            self._go_on(ALL if overdue else MOST_WORK)
-            overdue = [one for one in overdue if one[1:] != (going.side, going.place)]
-        elif not overdue and due[0][0] >= _DUE_S:
-            self._begin(due[0], situation, speed_m_s, now_s)
-            self._go_on(MOST_WORK)
-        for one in overdue:
-            self._begin(one, situation, speed_m_s, now_s)
-            self._go_on(ALL)
+            left -= self._go_on(left)
+        for ago_s, side, place in due:
+            if self._going is not None or left < TO_BEGIN or ago_s < _DUE_S:
+                break
+            if going is None or (going.side, going.place) != (side, place):
+                self._begin(side, place, situation, speed_m_s, now_s)
+                left -= TO_BEGIN + self._go_on(max(left - TO_BEGIN, 1))
+                if due[0][0] < _OVERDUE_S:
+                    break
 
     def _is_gone(self, going: _Look, situation: Situation) -> bool:
         """Whether a look under way is at what is no longer there."""
@@ -133,8 +148,7 @@ class Turns:
         places = len(self._looks.looked_s[going.side])
         return then.objects is not situation.objects or then.held != situation.held or going.place >= places
 
-    def _begin(self, one: tuple[float, int, int], situation: Situation, speed_m_s: float, now_s: float) -> None:
-        _, side, place = one
+    def _begin(self, side: int, place: int, situation: Situation, speed_m_s: float, now_s: float) -> None:
         pose, sideways = situation.pose, self._sideways
         if place > 0 and sideways is not None:
             pose = sideways.moved(pose, self._moments[place - 1])
@@ -150,11 +164,13 @@ class Turns:
         self._going = _Look(side, place, situation, pose, scene, prospect, moved_m, now_s)
         self._ahead.begin(pose, scene, standing, along, math.inf if situation.gap_m is None else 0.5 * situation.gap_m)
 
-    def _go_on(self, most: int) -> None:
-        going, found = self._going, self._ahead.go_on(most)
+    def _go_on(self, most: int) -> int:
+        """How much has been done."""
+        going, ahead = self._going, self._ahead
+        before, found = ahead.work, ahead.go_on(most)
         if going is None or found is None:
-            return
-        self._going = None
+            return ahead.work - before
+        self._going, self._given_up = None, 0
         overlap_m3, (along, able, standing) = 0.0, going.prospect
         if going.moved_m is not None:
             spheres = len(going.pose.sphere_radii_m)
@@ -163,6 +179,7 @@ class Turns:
         self._looks.add(
             *(going.side, going.place, going.began_s), *where, able, along.reach_m, found.sigma_m, overlap_m3
         )
+        return ahead.work - before
 
 
 def stopping_s(situation: Situation, able: Ability) -> float:
