@@ -64,7 +64,7 @@ def around_spheres(spheres: FloatArray, sigma: FloatArray, first: int, end: int)
     return middle, radius
 
 
-@building_block
+@inlined
 def near_rows(
     scene: SceneColumns, thing: int, center: Vector, radius: float, along: Vector, reach: float, near: IntArray
 ) -> int:
@@ -77,7 +77,7 @@ def near_rows(
     return count
 
 
-@building_block
+@inlined
 def _least_way(
     scene: SceneColumns, near: IntArray, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> float:

@@ -13,7 +13,7 @@ import numba
 import numba.extending
 import numpy as np
 
-from robot_side.compiled.numba_inside import WithoutMachineCode, keep_on_disk
+from robot_side.compiled.numba_inside import WithoutMachineCode, entry_point, keep_on_disk
 from robot_side.compiled.sources import digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -120,7 +120,7 @@ class Compiled:
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         self.function = function
         """What it is compiled from."""
-        self._signature = (returns or numba.types.void)(*arguments)
+        self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
         """Whether it is compiled, so that the next call takes no longer than any other."""
@@ -134,7 +134,7 @@ class Compiled:
                 # say) the kernel works uncached.
                 with contextlib.suppress(RuntimeError):
                     keep_on_disk(self._dispatcher, self.function, digest)
-                self._dispatcher.compile(self._signature)
+                self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
                 self.ready = True
 
@@ -143,6 +143,13 @@ class Compiled:
         if not self.ready:
             self.prepare()
         return self._dispatcher(*arguments)
+
+    @property
+    def address(self) -> int:
+        """Where its machine code is, for `calls.call_of`; compiles it if need be."""
+        if not self.ready:
+            self.prepare()
+        return entry_point(self._dispatcher, self.signature)
 
     @property
     def cache_hits(self) -> int:

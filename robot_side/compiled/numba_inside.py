@@ -84,3 +84,19 @@ def keep_on_disk(dispatcher: Any, function: Callable[..., Any], digest: Callable
     RuntimeError where there is no writable place for it.
     """
     dispatcher._cache = cast(Any, _CacheByDigest)(function, digest)
+
+
+def entry_point(dispatcher: Any, signature: Any) -> int:
+    """The address of a compiled kernel's machine code, as kernels call each other."""
+    result = dispatcher.overloads[signature.args]
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+
+
+def call_at(context: Any, builder: Any, signature: Any, address: Any, given: list[Any]) -> Any:
+    """Build the call of a kernel of this signature at an address; what it returns."""
+    convention = context.call_conv
+    callee = builder.inttoptr(address, convention.get_function_type(signature.return_type, signature.args).as_pointer())
+    status, result = convention.call_function(builder, callee, signature.return_type, signature.args, given)
+    with cast(Any, builder).if_then(status.is_error):
+        convention.return_status_propagate(builder, status)
+    return result
