@@ -109,9 +109,7 @@ class SocketShell:
         """Close at once, whatever has not left yet; closing twice does no harm."""
         self._context.destroy(linger=0)
 
-    def wait_for(
-        self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None
-    ) -> bool:
+    def wait_for(self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None) -> bool:
         """Whether one of `awaited` has something before the time is up; `served` gets its answers meanwhile.
 
         zmq's own poll counts whole milliseconds, hence select on the descriptors.

@@ -4,12 +4,12 @@ The robot side's: sockets, admission, session, permission, loop age, header, cod
 The operator side's: sockets, its core's receiving and commanding, and the same. Nothing is felt or rendered.
 """
 
+import math
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, Final, Literal, Protocol
+from typing import Final, Protocol
 
-from common.clock import Clock, MonotonicClock, clock_domain
+from common.clock import MonotonicClock, clock_domain
 from common.emulation.delay_line import DelayLine
 from common.emulation.spec import LinkSpec
 from common.protocol.link_end import LinkEnd
@@ -19,7 +19,7 @@ from common.sockets.admission import Admission
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
-from feelahead.benchmarks.link.peers import BareZeroMQLink, DatagramLink, Link
+from feelahead.benchmarks.link.peers import Link
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
@@ -28,10 +28,8 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.outgoing_messages import Outgoing, stiffness_message
 
-Ends = Literal["both ends", "bare ZeroMQ", "bare UDP"]
-ENDS: Final[tuple[Ends, ...]] = ("both ends", "bare ZeroMQ", "bare UDP")
-BARE_BYTES: Final = {"robot": 420, "operator": 90}
-"""Of what a bare end sends: as many as the stiffness and the command that the sides exchange."""
+BYTES: Final = {"robot": 460, "operator": 138}
+"""Of what an end sends that has no protocol: as many as a stiffness update and a motion command."""
 _REPORT_PERIOD_S: Final = 0.05
 """A controller that rests is read so often here: commands are made of what was read last."""
 
@@ -39,8 +37,11 @@ _REPORT_PERIOD_S: Final = 0.05
 class End(Protocol):
     """One of two processes that exchange messages."""
 
-    def run(self, end_s: float, period_s: float) -> Iterator[float]:
-        """Send each `period_s` and take what comes, until `end_s`; each turn's time, by the monotonic clock."""
+    sent: int
+    """Messages that left at once."""
+
+    def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
+        """Send at start_s + k period_s and take what comes, until `end_s`; the time of each turn, as it begins."""
         ...
 
 
@@ -48,6 +49,7 @@ class RobotEnd:
     """The robot side without arm, law and scene."""
 
     def __init__(self, sockets: RobotSockets) -> None:
+        self.sent = 0
         self._sockets, self._clock = sockets, MonotonicClock()
         epoch = secrets.randbits(53)
         self._session = OperatorSession(lambda: LinkEnd("robot", epoch, clock_domain()), Safety(SafetySettings()))
@@ -55,12 +57,11 @@ class RobotEnd:
         self._line: DelayLine[Outgoing] = DelayLine(LinkSpec().profile("to_operator"))
         near, far = uniform_field(3), uniform_field(0)
         self._sensed = Sensed(near, far, 0.01, FAR_M, 0.0, 0.01, 1e-9)
-        self.sent = 0
 
-    def run(self, end_s: float, period_s: float) -> Iterator[float]:
+    def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
         """As End."""
         sockets, session, line, clock = self._sockets, self._session, self._line, self._clock
-        pacer = Pacer(period_s, clock.now())
+        pacer = Pacer(period_s, start_s)
         while True:
             received = sockets.receive()
             now_s = clock.now()
@@ -97,17 +98,17 @@ class OperatorEnd:
     """The operator side without a controller and without people who look."""
 
     def __init__(self, sockets: OperatorSockets) -> None:
+        self.sent = 0
         self._sockets, self._clock = sockets, MonotonicClock()
         self._core = OperatorSide(secrets.randbits(53), clock_domain())
         self._line: DelayLine[bytes] = DelayLine(LinkSpec().profile("to_robot"))
         self._report = build_input_report(ControllerState())
         self._report_s = 0.0
-        self.sent = 0
 
-    def run(self, end_s: float, period_s: float) -> Iterator[float]:
+    def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
         """As End."""
         sockets, core, line, clock = self._sockets, self._core, self._line, self._clock
-        pacer = Pacer(period_s, clock.now())
+        pacer = Pacer(period_s, start_s)
         while True:
             received, seen = sockets.receive(), sockets.receive_view()
             now_s = clock.now()
@@ -134,19 +135,18 @@ class BareEnd:
     """Who sends bytes, waits for bytes, and does nothing with them."""
 
     def __init__(self, link: Link, size_bytes: int) -> None:
-        self._link, self._payload = link, bytes(size_bytes)
-        self._clock: Clock = MonotonicClock()
         self.sent = 0
+        self._link, self._payload, self._clock = link, bytes(size_bytes), MonotonicClock()
 
-    def run(self, end_s: float, period_s: float) -> Iterator[float]:
+    def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
         """As End."""
-        link, clock = self._link, self._clock
-        due_s = clock.now()
+        link, clock, due_s = self._link, self._clock, start_s
         while (now_s := clock.now()) < end_s:
             yield now_s
             if now_s >= due_s:
                 self.sent += link.send(self._payload)
-                due_s = max(due_s + period_s, now_s)
+                # One that is late makes up for nothing, as the sides do.
+                due_s += period_s * max(1, math.floor((now_s - due_s) / period_s))
             if link.wait(max(0.0, due_s - clock.now())):
                 link.receive()
         yield now_s

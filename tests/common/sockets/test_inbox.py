@@ -8,18 +8,18 @@ import pytest
 import zmq
 
 from common.sockets import inbox as inbox_module
-from common.sockets import shell
 from common.sockets.inbox import Inbox
 from common.sockets.operator import OperatorSockets
+from common.sockets.readable import readable as readable_now
 from common.sockets.robot import RobotSockets
-from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, greet
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, greet, publish_until_seen
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Who was asked for EVENTS, in turn."""
     those: list[Any] = []
-    really = inbox_module.readable
+    really = readable_now
 
     def readable(part: Any) -> bool:
         those.append(part)
@@ -50,15 +50,13 @@ def settle(inbox: Inbox) -> None:
         list(inbox.read())
 
 
-def test_who_has_nothing_is_asked_once(
-    pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]
-) -> None:
+def test_who_has_nothing_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
     inbox = Inbox(pair[0], frames=1)
     pair[1].send(b"hello")
     assert signal_of(inbox)
     while not inbox.has_some():
         assert signal_of(inbox)
-    assert [[bytes(frame) for frame in message] for message in inbox.read()] == [[b"hello"]]
+    assert [[frame.bytes for frame in message] for message in inbox.read()] == [[b"hello"]]
     asked.clear()
     assert not any(inbox.has_some() for _ in range(100))
     assert asked == []
@@ -71,7 +69,7 @@ def test_the_descriptor_tells_of_what_comes_later(pair: tuple["zmq.Socket[bytes]
         pair[1].send(b"%d" % number)
         while not inbox.has_some():
             assert signal_of(inbox)
-        assert [bytes(frame) for message in inbox.read() for frame in message] == [b"%d" % number]
+        assert [frame.bytes for message in inbox.read() for frame in message] == [b"%d" % number]
 
 
 def test_a_signal_that_another_use_took_is_no_message_lost(
@@ -90,7 +88,7 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     assert not inbox.has_some(), "nothing signals any more: without `used` it is overlooked"
     inbox.used()
     assert inbox.has_some()
-    assert [bytes(frame) for message in inbox.read() for frame in message] == [b"second"]
+    assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
 
 
 @pytest.fixture
@@ -117,8 +115,9 @@ def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
         selects.append(1)
         return really(*arguments)
 
-    monkeypatch.setattr(shell.select, "select", counted)
-    operator.receive_view()
+    monkeypatch.setattr(select, "select", counted)
+    publish_until_seen(robot, operator, b"topic")
+    assert operator.receive_view()
     most, waits = 0, 0
     for turn in range(50):
         asked.clear()
@@ -131,7 +130,7 @@ def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
         assert operator.receive_view() == []
         waits += 2
         most = max(most, *(asked.count(part) for part in (robot._control, operator._control)))
-        assert operator._view not in asked
+        assert operator._view not in asked, "whose descriptor says nothing"
     # ZeroMQ may signal for its own affairs, such as a pipe that has room again: then one is asked once more.
     assert most <= 4
     assert len(selects) <= 2 * waits
