@@ -29,13 +29,16 @@ class Inbox:
         self._signals = select.poll()
         self._signals.register(self.descriptor, select.POLLIN)
         self._settled = False
+        self._waiting = False
+        """Whether EVENTS said yes, and nothing has been read since."""
 
     def has_some(self) -> bool:
         """Whether something can be received at once."""
-        if self._settled and not self._signals.poll(0):
-            return False
-        self._settled = not readable(self._part)
-        return not self._settled
+        if self._waiting or (self._settled and not self._signals.poll(0)):
+            return self._waiting
+        self._waiting = readable(self._part)
+        self._settled = not self._waiting
+        return self._waiting
 
     def used(self) -> None:
         """Somebody else has used the socket: sending may have taken the signal of what came meanwhile."""
@@ -51,6 +54,7 @@ class Inbox:
             # Asked first: an exception takes four times as long.
             if not more and not self.has_some():
                 return
+            self._waiting = False
             try:
                 frame = self._part.recv(_NOBLOCK, copy=False)
             except zmq.Again:

@@ -116,21 +116,25 @@ class SocketShell:
         """
         if timeout_s is not None and not timeout_s >= 0.0:
             raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
-        deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
+        remaining_s, deadline_s = timeout_s, None
         while True:
             pending = served is not None and served.serve()
             for inbox in awaited:
                 if inbox.has_some():
                     return True
-            remaining_s = None
-            if deadline_s is not None and (remaining_s := deadline_s - self._clock.now()) <= 0.0:
-                return False
+            if remaining_s is not None:
+                if remaining_s <= 0.0:
+                    return False
+                if deadline_s is None:
+                    deadline_s = self._clock.now() + remaining_s
             descriptors = [inbox.descriptor for inbox in awaited]
             if served is not None:
                 descriptors.append(served.fileno())
             signalled, _, _ = select.select(descriptors, [], [], 0.0 if pending else remaining_s)
             if not signalled and not pending:
                 return False
+            if deadline_s is not None:
+                remaining_s = deadline_s - self._clock.now()
 
     def send_frames(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
         """Send without waiting; False, and counted in `dropped`, when it cannot leave; ValueError when too long."""
