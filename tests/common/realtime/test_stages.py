@@ -3,7 +3,7 @@
 import pytest
 
 from common.clock import VirtualClock
-from common.realtime.stages import Stages, microseconds
+from common.realtime.stages import EVERY, Stages, microseconds
 from common.statistics import BLOCK, RunningStatistics
 
 
@@ -20,7 +20,7 @@ class Both:
 
 def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
     clocks = Both()
-    stages = Stages(("sockets", "law"), clocks.wall, clocks.processor)
+    stages = Stages(("sockets", "law"), clocks.wall, clocks.processor, every=1)
     send, think = stages.timed("sockets", clocks.pass_), stages.timed("law", clocks.pass_)
     for _ in range(3):
         send(2e-6, 1e-6)
@@ -38,7 +38,7 @@ def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
 
 def test_what_is_timed_returns_what_it_would_and_an_unknown_stage_is_refused() -> None:
     clocks = Both()
-    stages = Stages(("law",), clocks.wall, clocks.processor)
+    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
     assert stages.timed("law", lambda one, *, other: (one, other))(1, other=2) == (1, 2)
     with pytest.raises(ValueError, match="not in"):
         stages.timed("physics", clocks.pass_)
@@ -46,7 +46,7 @@ def test_what_is_timed_returns_what_it_would_and_an_unknown_stage_is_refused() -
 
 def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
     clocks = Both()
-    stages = Stages(("law",), clocks.wall, clocks.processor)
+    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
     think = stages.timed("law", clocks.pass_)
     for _ in range(2 * BLOCK + 1):
         think(1e-6, 1e-6)
@@ -54,6 +54,17 @@ def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
         assert len(stages._turns_s) < BLOCK
     stages.take_in()
     assert stages.spent_s[0] == pytest.approx((2 * BLOCK + 1) * 1e-6)
+
+
+def test_one_turn_in_so_many_is_looked_at_and_stands_for_them_all() -> None:
+    clocks = Both()
+    stages = Stages(("law",), clocks.wall, clocks.processor)
+    think = stages.timed("law", clocks.pass_)
+    for turn in range(4 * EVERY):
+        think(1e-6 * turn, 2e-6)
+        stages.end_turn()
+    assert stages.summary()["law"]["wall_us"]["max"] == pytest.approx(3.0 * EVERY)
+    assert stages.spent_s == pytest.approx([EVERY * EVERY * 6e-6, 4 * EVERY * 2e-6])
 
 
 def test_nothing_yet_is_unknown_and_times_are_in_microseconds() -> None:
