@@ -203,9 +203,9 @@ def _real(
     resting = dataclasses.replace(plan, count=min(plan.count, _BASELINE), spin_s=0.0)
     without = dataclasses.replace(resting, link=LinkSpec())
     costs = {"without spinning": resting, "without a link either": without}
-    turn_s = min(_TURN_S, plan.count * plan.period_s)
+    turn_s, turns_count = min(_TURN_S, plan.count * plan.period_s), min(_TURNS, 1 + plan.count // 1000)
     bar = progress.add_task(
-        "messages", total=(plan.count + len(costs) * resting.count) * plan.period_s + _TURNS * len(KINDS) * turn_s
+        "messages", total=(plan.count + len(costs) * resting.count) * plan.period_s + turns_count * len(KINDS) * turn_s
     )
     try:
         run = run_real(plan, lambda passed_s: progress.advance(bar, passed_s))
@@ -213,7 +213,7 @@ def _real(
             name: run_real(one, lambda passed_s: progress.advance(bar, passed_s)).cpu_share
             for name, one in costs.items()
         }
-        turns = take_turns(turn_s, _TURNS, plan.period_s, lambda passed_s: progress.advance(bar, passed_s))
+        turns = take_turns(turn_s, turns_count, plan.period_s, lambda passed_s: progress.advance(bar, passed_s))
     except TimeoutError as error:
         raise FeelaheadError(f"{error}; is the machine too busy?") from error
     except PermissionError as error:
