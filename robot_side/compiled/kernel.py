@@ -152,6 +152,12 @@ class Compiled:
                 self.ready = True
 
     @property
+    def is_ours(self) -> bool:
+        """Whether another process finds it by its name."""
+        top_level = self.function.__qualname__ == self.function.__name__
+        return top_level and self.name.startswith("robot_side.")
+
+    @property
     def is_kept(self) -> bool:
         """Whether its machine code for this processor is on disk."""
         return kept(self.name, self._key()) is not None

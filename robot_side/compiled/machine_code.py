@@ -22,11 +22,10 @@ def machine_code_folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def can_keep() -> bool:
-    """Whether the folder can be written to; it is made if it is not there."""
-    folder = machine_code_folder()
-    with contextlib.suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-    return os.access(folder, os.W_OK | os.X_OK)
+    """Whether the folder can be written to, or made."""
+    folder = machine_code_folder().absolute()
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    return os.access(there, os.W_OK | os.X_OK)
 
 
 def kept(name: str, key: str) -> bytes | None:

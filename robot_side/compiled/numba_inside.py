@@ -90,7 +90,8 @@ class _OnDisk(_Cache):
         del sig
         target_context.refresh()
         code = kept(*self._names)
-        return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))
+        # Numba's own way to keep it; whoever can write there can run programs as this user anyway.
+        return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))  # noqa: S301
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep it."""
