@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-import robot_side.assembly  # noqa: F401  (brings the kernels)
 from common.companion.process import Companion
 from robot_side.compiled import beside
 from robot_side.compiled import warm_up as warm_up_module
@@ -18,17 +17,11 @@ from robot_side.compiled.beside import compile_beside, shares
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
-
-_QUICK = ("encoders._read", "array_searches.first_short", "held_object._join")
-"""Kernels that compile in a moment."""
+from tests.helpers.fresh_kernels import NAMES, fresh_kernels
 
 
 def ours() -> list[Compiled]:
     return [kernel for kernel in imported_kernels() if kernel.is_ours]
-
-
-def quick() -> list[Compiled]:
-    return [kernel for kernel in ours() if kernel.name.endswith(_QUICK)]
 
 
 def size(share: list[Compiled]) -> int:
@@ -57,7 +50,7 @@ def test_kernels_of_the_same_blocks_are_in_one_share() -> None:
 
 
 def test_more_processes_than_kernels_leave_no_empty_share() -> None:
-    assert [len(share) for share in shares(quick(), 8)] == [1, 1, 1]
+    assert [len(share) for share in shares(fresh_kernels(), 8)] == [1, 1, 1]
 
 
 @pytest.mark.processes
@@ -66,9 +59,12 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     told: list[str] = []
-    compile_beside(quick(), 2, told.append)
-    assert sorted(told) == sorted(kernel.name for kernel in quick())
-    assert all(kernel.is_kept for kernel in quick())
+    fresh = fresh_kernels()
+    compile_beside(fresh, 2, told.append)
+    assert sorted(told) == sorted(NAMES)
+    for kernel in fresh:
+        kernel.prepare()
+    assert [kernel.cache_hits for kernel in fresh] == [1, 1, 1]
 
 
 @pytest.mark.processes
@@ -82,7 +78,7 @@ def test_a_process_that_is_killed_leaves_its_share_to_us(tmp_path: Path, monkeyp
 
     monkeypatch.setattr(beside, "Companion", Killed)
     monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
-    fresh = [_again(kernel) for kernel in quick()]
+    fresh = fresh_kernels()
     warm_up(kernels=fresh)
     assert [kernel.cache_hits for kernel in fresh] == [0, 0, 0]
     assert all(kernel.is_kept for kernel in fresh)
@@ -123,13 +119,8 @@ def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkey
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
     monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
     monkeypatch.setattr(warm_up_module, "compile_beside", None)
-    fresh = [_again(kernel) for kernel in quick()]
+    fresh = fresh_kernels()
     told: list[str] = []
     warm_up(kernels=fresh, done=told.append)
     assert all(kernel.ready for kernel in fresh)
     assert told == [kernel.name for kernel in fresh]
-
-
-def _again(kernel: Compiled) -> Compiled:
-    """The same kernel, not yet compiled here."""
-    return Compiled(kernel.function, tuple(kernel._signature.args), kernel._signature.return_type)
