@@ -41,6 +41,10 @@ TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2
 """How often the allow-list is looked at, so that a revoked operator is out within a second."""
 
+_COMPILING = (
+    "compiling for this processor, about half a minute; the next start is quick (to do it beforehand: feelahead doctor"
+    " --compile)"
+)
 SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry", "video", "scene")
 
 
@@ -78,7 +82,7 @@ def command(arguments: Sequence[str]) -> int:
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
-        warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
+        warm_up(lambda: status.note(_COMPILING), assembled.kernels)
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": core.notes})
             status.also = recording.note

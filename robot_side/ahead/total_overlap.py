@@ -178,11 +178,10 @@ def _gather(
         if place >= scene.there.order.size:
             break
         thing = scene.there.order[place]
-        if standing[thing] == PASSED_OVER:
-            continue
         for i in range(begin, end):
             center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
-            if not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
+            passed_over = standing[thing] == PASSED_OVER
+            if passed_over or not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
                 continue
             for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
                 kind = scene.kinds[row]
