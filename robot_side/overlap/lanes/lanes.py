@@ -27,6 +27,9 @@ NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
 SOME_PARTIAL = 1 << 32
 """The sum of `weight` over a block is at least this if a lane is `PARTIAL`, and 0 if there is no contact in any."""
 
+SOME_DOUBTFUL = 1 << 48
+"""The sum of `doubt` over a block is at least this if a lane is doubtful, and else 0."""
+
 
 @inlined
 def column(lanes: FloatArray, index: int, lane: int) -> float:
@@ -49,6 +52,18 @@ def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
 def weight(verdict: float) -> int:
     """What one lane's bounds add to the block's sum: whole numbers, because LLVM adds no others in vectors."""
     return 0 if verdict == NOTHING else (SOME_PARTIAL if verdict == PARTIAL else 1)
+
+
+@inlined
+def doubt(sure: bool) -> int:
+    """What one lane adds to its block's sum, whose numbers are `sure` to be in range or not."""
+    return 0 if sure else SOME_DOUBTFUL
+
+
+@inlined
+def reach(vector: Vector) -> float:
+    """The sum of the magnitudes, NaN if there is one: no part is larger."""
+    return abs(vector[0]) + abs(vector[1]) + abs(vector[2])
 
 
 @inlined

@@ -14,21 +14,25 @@ from robot_side.compiled.kernel import (
     power_of_two_below,
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.checks.arguments import LARGEST
 from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
 from robot_side.overlap.lanes.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
+    SOME_DOUBTFUL,
     SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
     column,
     copy_lane,
+    doubt,
     lane_groups,
     load_rows,
     load_vectors,
+    reach,
     scatter,
     store_result,
     vector_column,
@@ -70,16 +74,19 @@ def overlap_tetrahedra(
     """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3); the results must hold zeros.
 
     Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms.
+    worked out to its last entry, and returns how many need precise forms. That number n is given as ~n, below 0, where
+    any of the arguments may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
     pairs = np.empty(LANES, dtype=np.int64)
-    waiting_count = unsettled = partial = 0
+    waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, vertices, first, count, block)
         left = _bound_by_corners(block, lane_groups(count))
+        doubtful += left // SOME_DOUBTFUL
+        left %= SOME_DOUBTFUL
         if left == 0:
             continue
         if left % SOME_PARTIAL > 0:
@@ -110,7 +117,7 @@ def overlap_tetrahedra(
         _work_out(waiting, lane_groups(waiting_count))
         partial += waiting_count
         unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
-    rows[total] = partial
+    rows[total] = ~partial if doubtful > 0 else partial
     return unsettled
 
 
@@ -137,7 +144,7 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
 
 @building_block
 def _bound_by_corners(block: FloatArray, groups: int) -> int:
-    """Fill in what the corners and their bounding box tell; the sum of the weights."""
+    """Fill in what the corners and their bounding box tell; the sum of the weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -152,7 +159,8 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
         away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
         verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
         verdict = NOTHING if away else verdict
-        total += weight(verdict)
+        farthest = reach(center) + reach(first) + reach(second) + reach(third) + reach(fourth) + radius
+        total += weight(verdict) + doubt((farthest <= LARGEST) & (radius >= 0.0))
         block[np.uint64(_BOUNDS * LANES + lane)] = verdict
     return total
 
