@@ -23,6 +23,7 @@ from robot_side.overlap.meshes.triangle_lanes import (
     REAL,
     ROW,
     TURN,
+    WIDTH,
     Complex,
     reduce_lanes,
     times,
@@ -112,12 +113,13 @@ def _sum_triangles(
     for first in range(0, count, LANES):
         size = min(count - first, LANES)
         _load_lanes(tables, near, first, size, scratch)
-        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
+        groups = (size + (WIDTH - 1)) // WIDTH
+        triangle_geometry(scratch, groups, highs(precise_center), _lows(precise_center), radius)
         for lane in range(size):
             triangle = near[first + lane]
             if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
                 refine_lane(scratch, lane, tables, triangle, precise_center, radius)
-        triangle_terms(scratch, size)
+        triangle_terms(scratch, groups)
         reduce_lanes(scratch, size)
         product = times(product, (scratch[REAL], scratch[IMAGINARY]))
         rescale = 1.0 / (abs(product[0]) + abs(product[1]))
@@ -159,8 +161,9 @@ def _lows(vector: PreciseVector) -> Vector:
 
 @inlined
 def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
-    for lane in range(size):
-        triangle = near[first + lane]
+    for lane in range((size + (WIDTH - 1)) // WIDTH * WIDTH):
+        # Whole groups spare the loops a remainder; the last triangle fills up the last group.
+        triangle = near[first + min(lane, size - 1)]
         for field in range(15):
             scratch[CORNERS + field * ROW + lane] = tables.triangles[triangle, field]
 
