@@ -22,6 +22,7 @@ from robot_side.overlap.lanes.lanes import (
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
+    SOME_PARTIAL,
     SOME_DOUBTFUL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
@@ -84,7 +85,7 @@ def overlap_boxes(
     any of the arguments may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs = np.empty(LANES, dtype=np.int64)
+    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
     waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):
@@ -92,7 +93,17 @@ def overlap_boxes(
         _load(centers, radii, box_centers, box_rotations, box_half_sizes, first, count, block)
         left = _bound(block, lane_groups(count))
         doubtful += left // SOME_DOUBTFUL
-        if left % SOME_DOUBTFUL == 0:
+        left %= SOME_DOUBTFUL
+        if left == 0:
+            continue
+        groups = lane_groups(count)
+        if left == groups * WIDTH * SOME_PARTIAL:
+            # Nothing to sort out: worked out where they are.
+            _work_out(block, groups)
+            partial += count
+            for lane in range(count):
+                own[lane] = first + lane
+            unsettled = scatter(block, _RESULT, own, count, volumes, gradients, areas, rows, unsettled)
             continue
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)

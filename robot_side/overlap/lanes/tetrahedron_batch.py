@@ -78,7 +78,7 @@ def overlap_tetrahedra(
     any of the arguments may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs = np.empty(LANES, dtype=np.int64)
+    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
     waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):
@@ -92,7 +92,16 @@ def overlap_tetrahedra(
         if left % SOME_PARTIAL > 0:
             left = _measure_within(block, lane_groups(count))
         if left >= SOME_PARTIAL:
-            _bound_by_planes(block, lane_groups(count))
+            left = _bound_by_planes(block, lane_groups(count))
+        groups = lane_groups(count)
+        if left == groups * WIDTH * SOME_PARTIAL:
+            # Nothing to sort out: worked out where they are.
+            _work_out(block, groups)
+            partial += count
+            for lane in range(count):
+                own[lane] = first + lane
+            unsettled = scatter(block, _RESULT, own, count, volumes, gradients, areas, rows, unsettled)
+            continue
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)
             if verdict == NOTHING:
@@ -185,8 +194,9 @@ def _measure_within(block: FloatArray, groups: int) -> int:
 
 
 @building_block
-def _bound_by_planes(block: FloatArray, groups: int) -> None:
-    """Settle more of the pairs that the corners left undecided, by the planes of the faces."""
+def _bound_by_planes(block: FloatArray, groups: int) -> int:
+    """Settle more of the pairs that the corners left undecided, by the planes of the faces; the sum of the weights."""
+    total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
         center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
@@ -203,9 +213,10 @@ def _bound_by_planes(block: FloatArray, groups: int) -> None:
         verdict = column(block, _BOUNDS, lane)
         partial = verdict == PARTIAL
         verdict = WHOLE_SPHERE if partial & (below_a & below_b & below_c & below_d) else verdict
-        block[np.uint64(_BOUNDS * LANES + lane)] = (
-            NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
-        )
+        verdict = NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+    return total
 
 
 @inlined
