@@ -22,8 +22,8 @@ from robot_side.overlap.lanes.lanes import (
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
-    SOME_PARTIAL,
     SOME_DOUBTFUL,
+    SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
@@ -81,8 +81,8 @@ def overlap_boxes(
     The boxes are given by `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world and `box_half_sizes` (p, 3).
 
     Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms. That number n is given as ~n, below 0, where
-    any of the arguments may be NaN or out of range.
+    worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
+    where a number may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
     pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
@@ -91,12 +91,12 @@ def overlap_boxes(
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, box_centers, box_rotations, box_half_sizes, first, count, block)
-        left = _bound(block, lane_groups(count))
+        groups = lane_groups(count)
+        left = _bound(block, groups)
         doubtful += left // SOME_DOUBTFUL
         left %= SOME_DOUBTFUL
         if left == 0:
             continue
-        groups = lane_groups(count)
         if left == groups * WIDTH * SOME_PARTIAL:
             # Nothing to sort out: worked out where they are.
             _work_out(block, groups)

@@ -74,8 +74,8 @@ def overlap_tetrahedra(
     """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3); the results must hold zeros.
 
     Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms. That number n is given as ~n, below 0, where
-    any of the arguments may be NaN or out of range.
+    worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
+    where a number may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
     pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
@@ -84,16 +84,12 @@ def overlap_tetrahedra(
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, vertices, first, count, block)
-        left = _bound_by_corners(block, lane_groups(count))
+        groups = lane_groups(count)
+        left = _bound(block, groups)
         doubtful += left // SOME_DOUBTFUL
         left %= SOME_DOUBTFUL
         if left == 0:
             continue
-        if left % SOME_PARTIAL > 0:
-            left = _measure_within(block, lane_groups(count))
-        if left >= SOME_PARTIAL:
-            left = _bound_by_planes(block, lane_groups(count))
-        groups = lane_groups(count)
         if left == groups * WIDTH * SOME_PARTIAL:
             # Nothing to sort out: worked out where they are.
             _work_out(block, groups)
@@ -149,6 +145,19 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
         vector_column(block, _CORNERS + 6, lane),
         vector_column(block, _CORNERS + 9, lane),
     )
+
+
+@inlined
+def _bound(block: FloatArray, groups: int) -> int:
+    """Fill in what bounds tell of the first groups of lanes; the sum of the weights and doubts."""
+    left = _bound_by_corners(block, groups)
+    doubts = left // SOME_DOUBTFUL * SOME_DOUBTFUL
+    left -= doubts
+    if left % SOME_PARTIAL > 0:
+        left = _measure_within(block, groups)
+    if left >= SOME_PARTIAL:
+        left = _bound_by_planes(block, groups)
+    return doubts + left
 
 
 @building_block
