@@ -86,7 +86,8 @@ def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: Float
         for lane in range(0, LANES, 4):
             for part in range(width // 4):
                 start, end = (first + lane) * width + 4 * part, (index + 4 * part) * LANES + lane
-                transpose_four(rows, start, width, lanes, end, LANES)
+                second, third, fourth = start + width, start + 2 * width, start + 3 * width
+                transpose_four(rows, start, second, third, fourth, lanes, end, LANES)
         for number in range(width // 4 * 4, width):
             for lane in range(LANES):
                 lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]

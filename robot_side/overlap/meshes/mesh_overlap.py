@@ -4,12 +4,13 @@ import math
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.transpose import transpose_four
 from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
 from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
-from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.small_mesh_overlap import beyond_face
 from robot_side.overlap.meshes.tree_queries import gather_near, nearest_triangle, squared_distance, winding_number
 from robot_side.overlap.meshes.triangle_lanes import (
@@ -161,11 +162,16 @@ def _lows(vector: PreciseVector) -> Vector:
 
 @inlined
 def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
-    for lane in range((size + (WIDTH - 1)) // WIDTH * WIDTH):
-        # Whole groups spare the loops a remainder; the last triangle fills up the last group.
-        triangle = near[first + min(lane, size - 1)]
-        for field in range(15):
-            scratch[CORNERS + field * ROW + lane] = tables.triangles[triangle, field]
+    triangles, last = tables.triangles.reshape(-1), first + size - 1
+    # Whole groups spare the loops a remainder; the last triangle fills up the last group.
+    for lane in range(0, (size + (WIDTH - 1)) // WIDTH * WIDTH, 4):
+        place = first + lane
+        row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
+        row_2, row_3 = FIELDS * near[min(place + 2, last)], FIELDS * near[min(place + 3, last)]
+        # The last of the fields goes to where heights come next.
+        for field in range(0, FIELDS, 4):
+            end = CORNERS + field * ROW + lane
+            transpose_four(triangles, row_0 + field, row_1 + field, row_2 + field, row_3 + field, scratch, end, ROW)
 
 
 @building_block
