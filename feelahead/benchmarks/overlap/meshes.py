@@ -18,7 +18,7 @@ TORUS = (1.0, 0.35)
 """Radii (m) of the ring and of its tube."""
 FEW_TRIANGLES = 50
 """Up to so many triangles a query is to cost less than 20 boxes."""
-_AT_ONCE = 100
+_AT_ONCE = 250
 """Queries of a call."""
 _RADII = (0.004, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.12, 0.15, 0.25, 0.4, 0.6)
 
