@@ -17,6 +17,7 @@ from robot_side.overlap.meshes.triangle_lanes import (
     CORNERS,
     IMAGINARY,
     LANES,
+    LONGEST,
     MOMENT,
     PUSH,
     PUSH_Y,
@@ -113,13 +114,17 @@ def _sum_triangles(
     product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
     for first in range(0, count, LANES):
         size = min(count - first, LANES)
-        _load_lanes(tables, near, first, size, scratch)
         groups = (size + (WIDTH - 1)) // WIDTH
+        _load_lanes(tables, near, first, size, groups, scratch)
+        large = 0
+        for lane in range(groups * WIDTH):
+            large += 1 if scratch[LONGEST + lane] > FAR * radius else 0
         triangle_geometry(scratch, groups, highs(precise_center), _lows(precise_center), radius)
-        for lane in range(size):
-            triangle = near[first + lane]
-            if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
-                refine_lane(scratch, lane, tables, triangle, precise_center, radius)
+        if large > 0:
+            for lane in range(size):
+                triangle = near[first + lane]
+                if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
+                    refine_lane(scratch, lane, tables, triangle, precise_center, radius)
         triangle_terms(scratch, groups)
         reduce_lanes(scratch, size)
         product = times(product, (scratch[REAL], scratch[IMAGINARY]))
@@ -161,14 +166,13 @@ def _lows(vector: PreciseVector) -> Vector:
 
 
 @inlined
-def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
+def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, groups: int, scratch: FloatArray) -> None:
     triangles, last = tables.triangles.reshape(-1), first + size - 1
     # Whole groups spare the loops a remainder; the last triangle fills up the last group.
-    for lane in range(0, (size + (WIDTH - 1)) // WIDTH * WIDTH, 4):
+    for lane in range(0, groups * WIDTH, 4):
         place = first + lane
         row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
         row_2, row_3 = FIELDS * near[min(place + 2, last)], FIELDS * near[min(place + 3, last)]
-        # The last of the fields goes to where heights come next.
         for field in range(0, FIELDS, 4):
             end = CORNERS + field * ROW + lane
             transpose_four(triangles, row_0 + field, row_1 + field, row_2 + field, row_3 + field, scratch, end, ROW)

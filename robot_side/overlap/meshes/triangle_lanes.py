@@ -38,6 +38,7 @@ ROW = LANES + 8
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
 CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * ROW, 6 * ROW, 9 * ROW, 12 * ROW
+LONGEST = 15 * ROW  # until the heights take its place
 HEIGHTS, DISTANCES, BASES = 15 * ROW, 18 * ROW, 21 * ROW
 STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * ROW, 27 * ROW, 30 * ROW, 33 * ROW
 REAL, IMAGINARY, TURN, MOMENT = 34 * ROW, 35 * ROW, 36 * ROW, 37 * ROW
