@@ -32,7 +32,8 @@ ARROWS = """
     robot_side/overlap/checks: common robot_side/compiled
     robot_side/overlap/digits: common robot_side/compiled
     robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
-    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
+    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
+        robot_side/overlap/closed_forms
     robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
     robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
         robot_side/overlap/closed_forms
