@@ -109,6 +109,12 @@ bench = Menu(
             "what a tick of the robot side costs in the real process, stage by stage and by objects",
             _BOTH_SIDES,
         ),
+        "felt": Entry(
+            "feelahead.benchmarks.felt.bench",
+            "bench_felt",
+            "run time against error of what is felt, as the look ahead is set otherwise",
+            "pip install 'feelahead[robot,operator,bench]'",
+        ),
         "viewing": Entry(
             "feelahead.benchmarks.viewing.bench",
             "bench_viewing",
