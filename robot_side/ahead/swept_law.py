@@ -71,12 +71,12 @@ class SweptLaw:
         self._touch_speed_m_s = touch_speed_m_s(motion.trigger_speed_m_s)
         self._felt = room_to_feel()
         self._standing: tuple[object, IntArray] | None = None
-        self._turns = Turns(self.ahead, self._prospect, limits, motion.trigger_speed_m_s)
+        self.turns = Turns(self.ahead, self._prospect, limits, motion.trigger_speed_m_s)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick."""
         pose, stick = situation.pose, math.hypot(*situation.lateral)
-        looks = self._turns.take(situation, now_s)
+        looks = self.turns.take(situation, now_s)
         feel(
             *(looks.seen, looks.counts, looks.newest),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_rotation), np.ascontiguousarray(pose.tool_jacobian)),

@@ -26,10 +26,10 @@ from robot_side.arm.port import GripperPose
 
 FIELD_PERIOD_S: Final = 0.01
 """A controller is written to no more often."""
-_DUE_S: Final = FIELD_PERIOD_S - 1e-9
-_OVERDUE_S: Final = 1.5 * FIELD_PERIOD_S
-"""While something is so old, twice as much is done in a tick,"""
-_FAR_BEHIND_S: Final = 5.0 * FIELD_PERIOD_S
+_ROUNDING_S: Final = 1e-9
+_OVERDUE: Final = 1.5
+"""While something is so many periods old, twice as much is done in a tick,"""
+_FAR_BEHIND: Final = 5.0
 """and while something is so old, or was never looked at, all that is due, however long that takes; so it is, too, where
 each tick has other objects, so that no look would come to its end."""
 MOST_WORK: Final = 400
@@ -71,11 +71,11 @@ class Turns:
         limits: JointLimits,
         trigger_speed_m_s: float,
     ) -> None:
-        self._ahead = ahead
+        self.ahead = ahead
         self._prospect = prospect
         self._limits = limits
         self._trigger_speed_m_s = trigger_speed_m_s
-        self._looks = Looks()
+        self.looks = Looks()
         self._going: _Look | None = None
         self._given_up = 0
         """Looks since the last that came to its end"""
@@ -91,19 +91,19 @@ class Turns:
         """Do what is to be done in this tick; what has been seen so far. The first tick looks at everything."""
         # What is gripped or let go changes which spheres there are.
         changed = self._sideways is None or len(self._sideways.own_m_s) != len(situation.pose.sphere_radii_m)
-        looks, deflected = self._looks, situation.lateral != (0.0, 0.0)
+        looks, deflected = self.looks, situation.lateral != (0.0, 0.0)
         if now_s >= self._next_s or changed or deflected != bool(looks.looked_s[STICK]):
             velocity = situation.pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
             speed_m_s = float(velocity @ situation.pose.tool_rotation[:, 2])
             left = MOST_WORK
-            if changed or now_s - self._measured_s >= _DUE_S:
+            if changed or now_s - self._measured_s >= FIELD_PERIOD_S - _ROUNDING_S:
                 self._measure(situation, velocity, speed_m_s, now_s)
                 left -= TO_BEGIN
             for side in (R2, L2):
                 looks.look_from(side, 1 + len(self._moments))
             looks.look_from(STICK, 1 if deflected else 0)
             self._look(situation, speed_m_s, now_s, left, changed=changed)
-            due_s = min(self._measured_s, *map(min, filter(None, looks.looked_s))) + _DUE_S
+            due_s = min(self._measured_s, *map(min, filter(None, looks.looked_s))) + FIELD_PERIOD_S - _ROUNDING_S
             self._next_s = due_s if self._going is None else now_s
         return looks
 
@@ -125,27 +125,27 @@ class Turns:
         if self._going is not None and (changed or self._is_gone(self._going, situation)):
             self._going = None
             self._given_up += 1
-        due = self._looks.due(now_s)
-        if due[0][0] >= _FAR_BEHIND_S or self._given_up > 1:
+        due = self.looks.due(now_s)
+        if due[0][0] >= _FAR_BEHIND * FIELD_PERIOD_S or self._given_up > 1:
             left = ALL
-        elif due[0][0] >= _OVERDUE_S:
+        elif due[0][0] >= _OVERDUE * FIELD_PERIOD_S:
             left *= 2
         going = self._going
         if going is not None:
             left -= self._go_on(left)
         for ago_s, side, place in due:
-            if self._going is not None or left < TO_BEGIN or ago_s < _DUE_S:
+            if self._going is not None or left < TO_BEGIN or ago_s < FIELD_PERIOD_S - _ROUNDING_S:
                 break
             if going is None or (going.side, going.place) != (side, place):
                 self._begin(side, place, situation, speed_m_s, now_s)
                 left -= TO_BEGIN + self._go_on(max(left - TO_BEGIN, 1))
-                if due[0][0] < _OVERDUE_S:
+                if due[0][0] < _OVERDUE * FIELD_PERIOD_S:
                     break
 
     def _is_gone(self, going: _Look, situation: Situation) -> bool:
         """Whether a look under way is at what is no longer there."""
         then = going.situation
-        places = len(self._looks.looked_s[going.side])
+        places = len(self.looks.looked_s[going.side])
         return then.objects is not situation.objects or then.held != situation.held or going.place >= places
 
     def _begin(self, side: int, place: int, situation: Situation, speed_m_s: float, now_s: float) -> None:
@@ -162,11 +162,11 @@ class Turns:
         if place == 0 and side == (R2 if speed_m_s >= 0.0 else L2):
             moved_m = abs(speed_m_s) * situation.loop_age_s * along.direction
         self._going = _Look(side, place, situation, pose, scene, prospect, moved_m, now_s)
-        self._ahead.begin(pose, scene, standing, along, math.inf if situation.gap_m is None else 0.5 * situation.gap_m)
+        self.ahead.begin(pose, scene, standing, along, math.inf if situation.gap_m is None else 0.5 * situation.gap_m)
 
     def _go_on(self, most: int) -> int:
         """How much has been done."""
-        going, ahead = self._going, self._ahead
+        going, ahead = self._going, self.ahead
         before, found = ahead.work, ahead.go_on(most)
         if going is None or found is None:
             return ahead.work - before
@@ -174,9 +174,9 @@ class Turns:
         overlap_m3, (along, able, standing) = 0.0, going.prospect
         if going.moved_m is not None:
             spheres = len(going.pose.sphere_radii_m)
-            overlap_m3 = looked_overlap_m3(going.moved_m, spheres, going.scene, standing, self._ahead.tables)
+            overlap_m3 = looked_overlap_m3(going.moved_m, spheres, going.scene, standing, self.ahead.tables)
         where = along.direction, going.pose.tool_position_m, found.ways_m
-        self._looks.add(
+        self.looks.add(
             *(going.side, going.place, going.began_s), *where, able, along.reach_m, found.sigma_m, overlap_m3
         )
         return ahead.work - before

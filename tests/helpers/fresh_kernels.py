@@ -14,7 +14,7 @@ NAMES = (
 def fresh_kernels() -> tuple[Compiled, ...]:
     """Those of `NAMES`, not yet compiled, and known to nobody else."""
     fresh = tuple(
-        Compiled(kernel.function, tuple(kernel._signature.args), kernel._signature.return_type)
+        Compiled(kernel.function, tuple(kernel.signature.args), kernel.signature.return_type)
         for kernel in imported_kernels()
         if kernel.name in NAMES
     )

@@ -58,7 +58,9 @@ def report(found: Found, rungs: dict[str, list[Turned]]) -> Report:
 def _by_rung(replayed: Sequence[Replayed], rungs: dict[str, list[Turned]]) -> list[tuple[Replayed, Replayed]]:
     """In the order of the ladders, each with the finest of its own."""
     by_how = {one.how: one for one in replayed}
-    return [(by_how[how], by_how[rung[-1]]) for rung in rungs.values() for how in rung if how in by_how]
+    return [
+        (by_how[how], by_how[rung[-1]]) for rung in rungs.values() for how in rung if {how, rung[-1]} <= by_how.keys()
+    ]
 
 
 def _name(how: Turned) -> str:
