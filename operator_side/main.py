@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
-from common.clock import MonotonicClock
+from common.clock import MonotonicClock, ThreadClock
 from common.command.command_line import given_fields, parse_settings, run_command
 from common.command.live_view import Value
 from common.command.status import Status
@@ -16,15 +16,15 @@ from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
 from common.emulation.tuned import tuned_link
-from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
+from common.realtime.keeping_up import KeepingUp
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
+from common.realtime.stages import Stages
 from common.recording.side import SideRecording, recording_to
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side.calibration.store import calibration_path, load_calibration
 from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
@@ -36,15 +36,24 @@ from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
-from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
 from operator_side.settings import OperatorSettings
+from operator_side.stored_travel import StoredTravel
 from operator_side.terminal_view.status import TerminalStatus
 from operator_side.viewing import Viewing, view_topics
 
 MOTION_PERIOD_S = 1 / 250
+_HELPS = {
+    "sockets": "a slower link",
+    "messages": "a slower link",
+    "feeling": "--no-haptics",
+    "hands": "another controller",
+    "": "a page of the console fewer, or a faster machine,",
+}
+"""The stages of a turn, and what makes each of them shorter: sending and receiving; taking in what arrived; what the
+controller is told; what is read from it, and commands. "": all else, such as what is shown."""
 _GUARD_PERIOD_S = 0.5
 """How often the watchdog is looked after."""
 
@@ -97,7 +106,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 status.note(text)
             given = "calibration" in given_fields(arguments, OperatorSettings)
             people = _People(person, pages, viewing)
-            loop = _Loop(settings, core, line, sockets, connection, guard, people, status, stored_travel=not given)
+            travel = None if given else StoredTravel(connection, core, viewing.note)
+            loop = _Loop(settings, core, line, sockets, connection, guard, people, status, travel)
             loop.recording = recording
             failure: Exception | None = None
             try:
@@ -153,15 +163,12 @@ class _Loop:
         guard: ReleaseGuard | None,
         people: "_People",
         status: Status,
-        *,
-        stored_travel: bool,
+        travel: StoredTravel | None,
     ) -> None:
-        """`stored_travel`: take on the calibration that is stored for a controller, as none was given."""
+        """`travel`: takes on the calibration that is stored for a controller; None where one was given."""
         self.recording: SideRecording | None = None
         """Who keeps what happens"""
-        self._stored_travel = stored_travel
-        self._calibrated = 0
-        self._told_travel: set[str] = set()
+        self._travel = travel
         self._duration_s = settings.duration
         self._core = core
         self._line = line
@@ -176,39 +183,60 @@ class _Loop:
         self._collection = IdleCollection(self._clock)
         self._start_s = self._clock.now()
         self._pacer = Pacer(MOTION_PERIOD_S, self._start_s, settings.seed)
+        computed = ThreadClock()
+        self._stages = Stages(tuple(filter(None, _HELPS)), self._clock, computed, settings.seed)
+        self._keeping_up = KeepingUp(self._pacer, self._stages, self._clock, computed, _HELPS)
 
     def run(self, stop: StopSignal) -> None:
         """Go on until `stop` or --duration."""
         with self._collection:
             self._start_s = self._clock.now()
             self._pacer.restart(self._start_s)
+            timed = self._stages.timed
+            receive, see = timed("sockets", self._sockets.receive), timed("sockets", self._sockets.receive_view)
+            take, send, move = timed("messages", self._take), timed("sockets", self._send), timed("hands", self._move)
+            feel = timed("feeling", self._feel)
             while not stop.is_set:
-                received, seen = self._sockets.receive(), self._sockets.receive_view()
+                self._keeping_up.begin()
+                received, seen = receive(), see()
                 # Read after receiving: what waited while this process was stopped is as old as it is.
                 now_s = self._clock.now()
                 if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
                     break
-                for payload in received:
-                    self._core.receive(payload, now_s)
-                for topic, payload in seen:
-                    if not self._viewing.take(topic, payload):
-                        self._core.receive_view(payload, now_s)
-                self._connection.beat(now_s)
-                if (output := self._core.output_report(now_s)) is not None:
-                    self._connection.write(output, now_s)
+                take(received, seen, now_s)
+                feel(now_s)
                 moved = self._pacer.due(now_s)
                 if moved:
-                    self._move(now_s)
-                for payload in self._line.pop(self._clock.now()):
-                    self._sockets.send(payload)
+                    move(now_s)
+                send()
                 if moved:
                     self._use_idle_time(self._clock.now())
+                if (said := self._keeping_up.end(turned=moved)) is not None:
+                    self._viewing.note(said)
                 wait_for_turn(self._pacer, self._clock, self._sockets.wait, self._line.next_due())
+
+    def _take(self, received: Sequence[bytes], seen: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
+        for payload in received:
+            self._core.receive(payload, now_s)
+        for topic, payload in seen:
+            if not self._viewing.take(topic, payload):
+                self._core.receive_view(payload, now_s)
+
+    def _feel(self, now_s: float) -> None:
+        self._connection.beat(now_s)
+        if (output := self._core.output_report(now_s)) is not None:
+            self._connection.write(output, now_s)
+
+    def _send(self) -> None:
+        for payload in self._line.pop(self._clock.now()):
+            self._sockets.send(payload)
 
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
         return {
             "controller": {"found": self._connection.found, "state": str(self._connection.state)},
+            "stages": {"operator": self._stages.summary()},
+            "machine": {"operator": self._keeping_up.summary()},
             "pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}},
             "link": link_summary("to_robot", {"haptics": self._line}),
             "pages": {"rejected": self._pages.rejected, "stale": self._pages.stale, "silences": self._pages.silences},
@@ -224,41 +252,13 @@ class _Loop:
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
         self._connection.update(now_s)
-        self._calibrate()
+        self._say_what_is_new()
+        if self._travel is not None:
+            self._travel.follow()
         if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
         for payload in [*self._core.motion(now_s), *self._viewing.requests(now_s)]:
             self._line.push(now_s, payload)
-
-    def _calibrate(self) -> None:
-        """Once for each time that a controller is found.
-
-        ConfigurationError when the run's first has a stored calibration that is broken; later it is only said.
-        """
-        controller = self._connection.controller
-        if controller is None or self._calibrated == self._connection.found:
-            return
-        first, self._calibrated = self._calibrated == 0, self._connection.found
-        self._say_what_is_new()
-        if not self._stored_travel or controller.address is None:
-            return
-        try:
-            stored = load_calibration(controller.address)
-        except ConfigurationError as error:
-            if first:
-                raise
-            self._core.calibrate(TravelCalibration())
-            self._told_travel.discard(controller.address)
-            self._viewing.note(f"{error}; its travel is read by the defaults")
-            return
-        self._core.calibrate(stored or TravelCalibration())
-        if controller.address in self._told_travel:
-            return
-        self._told_travel.add(controller.address)
-        if stored is None:
-            self._viewing.note("its travel has not been calibrated: feelahead calibrate does that")
-        else:
-            self._viewing.note(f"its travel calibration: {calibration_path(controller.address)}")
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():

@@ -14,6 +14,7 @@ from robot_side.ahead.law import Law
 from robot_side.ahead.paper_law import PaperLaw
 from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.port import Arm
+from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotSide
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.figures import RunFigures
@@ -36,6 +37,9 @@ from robot_side.simulation.true_contact import TrueContact
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
+_FOR_BOXES = frozenset({"overlap_boxes", "precise_boxes"})
+_FOR_TETRAHEDRA = frozenset({"overlap_tetrahedra", "precise_tetrahedra"})
+"""Kernels that run for such primitives alone; those for meshes are not even imported without them."""
 
 
 class SimulationObserver:
@@ -66,6 +70,20 @@ class Assembled:
     law: SweptLaw | PaperLaw
     """The settings' own"""
     arm: MujocoArm
+
+    @property
+    def kernels(self) -> list[Compiled]:
+        """What ticks may run: a scene without boxes, or without tetrahedra, needs no kernels for them.
+
+        Its primitives are the same throughout, and counted here with those of the objects that are ignored now.
+        """
+        seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
+        unneeded: set[str] = set()
+        if not len(seen.box_object):
+            unneeded |= _FOR_BOXES
+        if not len(seen.tetrahedron_object):
+            unneeded |= _FOR_TETRAHEDRA
+        return [kernel for kernel in imported_kernels() if kernel.name.rpartition(".")[2] not in unneeded]
 
 
 def build_robot_side(
@@ -119,7 +137,7 @@ def assemble(
         ),
     )
     # Before the first tick, as a search for spheres takes far longer than one.
-    held_covers = HeldCovers(_as_loaded(scene), settings.cover_m, scene.fixed, searching)
+    held_covers = HeldCovers(_as_loaded(scene, scene.roles), settings.cover_m, scene.fixed, searching)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     prediction, prediction_note = _prediction_errors(settings, scene)
     law = (SweptLaw if settings.law == "swept" else PaperLaw)(
@@ -177,10 +195,10 @@ def _notes(scene: Scene) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _as_loaded(scene: Scene) -> PerceivedObjects:
-    """The objects where the scene has them at its start."""
+def _as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
+    """The objects where the scene has them at its start, but the primitives of those that are ignored."""
     nowhere = np.zeros((len(scene.objects), 3))
-    return scene.primitives.place(0.0, scene.roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
+    return scene.primitives.place(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
 
 
 def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[str]:

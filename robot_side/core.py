@@ -25,7 +25,7 @@ from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.gripper.perceived_distances import perceived_distances
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
-from robot_side.objects.target import next_target, object_centers, target_index
+from robot_side.objects.target import next_target, object_center, object_centers, target_index
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
@@ -93,8 +93,8 @@ class RobotSide:
         self._held: HeldObject | None = None
         self._held_s = -np.inf
         self._frame: PerceivedObjects | None = None
-        self._centers_m: FloatArray = np.empty((0, 3))
         self._target: int | None = None
+        self._target_m: FloatArray | None = None
         self.newest: tuple[Sensed, Situation] | None = None
         """What the last tick found out, and where."""
         self._loop_age_s = RunningStatistics(seed)
@@ -158,14 +158,15 @@ class RobotSide:
         objects = self._camera.perceive(now_s)
         if objects is not self._frame:
             self._frame = objects
-            self._centers_m, self._target = object_centers(objects), target_index(objects)
+            self._target = target_index(objects)
+            self._target_m = None if self._target is None else object_center(objects, self._target)
         return objects
 
     def _follow_target(self, objects: PerceivedObjects, pose: GripperPose) -> None:
         """Make the next object the target, once for each press of the button."""
         if not self.session.take_next_target():
             return
-        chosen = next_target(objects, self._centers_m, pose.tool_position_m, pose.tool_rotation[:, 2])
+        chosen = next_target(objects, object_centers(objects), pose.tool_position_m, pose.tool_rotation[:, 2])
         if chosen is None or self._held is not None:
             return
         if self._target is not None:
@@ -202,7 +203,7 @@ class RobotSide:
         self.figures.tick(sensed, speed_m_s, armed=armed)
         target = self._target
         held = self._held is not None and self._held.index == target
-        self.figures.task(armed, held, None if target is None else self._centers_m[target], now_s)
+        self.figures.task(armed, held, self._target_m, now_s)
 
     def observe(self, now_s: float) -> None:
         """After the messages of the tick at `now_s` have left: note what was true, where somebody sees it."""
@@ -233,7 +234,7 @@ class RobotSide:
             outgoing += [stiffness_message(one, sensed, self._told_m_s, permission.state) for one in observers]
         if now_s >= self._next_telemetry_s:
             self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
-            target = self._target
+            target, target_m = self._target, self._target_m
             outgoing.append(
                 telemetry_message(
                     self.session.view_header(now_s),
@@ -242,7 +243,7 @@ class RobotSide:
                     sensed,
                     speed_m_s=speed_m_s,
                     gripper_opening_m=state.gripper_opening_m,
-                    target=None if target is None else (objects.names[target], self._centers_m[target]),
+                    target=None if target is None or target_m is None else (objects.names[target], target_m),
                     holding=self._held is not None,
                 )
             )

@@ -151,15 +151,6 @@ class RunFigures:
         }
 
 
-def tick_microseconds(tick_time_s: RunningStatistics) -> dict[str, float | None]:
-    """`p50`, `p99` and `max` of the ticks' computing time, from samples in seconds."""
-    return {
-        "p50": _scaled(tick_time_s.quantile(0.50), 1e6),
-        "p99": _scaled(tick_time_s.quantile(0.99), 1e6),
-        "max": _scaled(tick_time_s.maximum, 1e6),
-    }
-
-
 def _smaller(one: float | None, other: float | None) -> float | None:
     if one is None or other is None:
         return one if other is None else other

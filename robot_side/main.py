@@ -3,6 +3,7 @@
 import secrets
 from collections import deque
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from common.clock import MonotonicClock, ThreadClock, clock_domain
@@ -16,29 +17,34 @@ from common.emulation.tuned import tuned_link
 from common.files.output_file import write_json
 from common.protocol.view_messages import VIEW_NAMES
 from common.realtime.garbage import IdleCollection
+from common.realtime.keeping_up import KeepingUp
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_descriptor_limit, raise_priority
+from common.realtime.stages import Stages, microseconds
 from common.recording.side import SideRecording, recording_to
 from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
-from common.sockets.keys import passed_over_note
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.pictures import Cameras
 from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
-from robot_side.figures import tick_microseconds
 from robot_side.looking import Looking
 from robot_side.outgoing_messages import TOPICS, Outgoing
 from robot_side.recorded import RobotEncoder, recorded_by, recorded_status, robot_header
 from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
+from robot_side.timed import HELPS, STAGES, TimedArm, TimedLaw
 
 TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2
 """How often the allow-list is looked at, so that a revoked operator is out within a second."""
 
+_COMPILING = (
+    "compiling for this processor, about half a minute; the next start is quick (to do it beforehand: feelahead doctor"
+    " --compile)"
+)
 SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry", "video", "scene")
 
 
@@ -62,24 +68,34 @@ def command(arguments: Sequence[str]) -> int:
         recording_to(settings.record, "robot", RobotEncoder()) as recording,
     ):
         epoch = secrets.randbits(53)
-        assembled = assemble(settings, epoch, clock_domain(), announce=status.note, side=recorded_by(recording))
+        stages = Stages(STAGES, MonotonicClock(), ThreadClock(), settings.seed)
+        assembled = assemble(
+            settings,
+            epoch,
+            clock_domain(),
+            watch=partial(TimedArm, stages=stages),
+            other_law=partial(TimedLaw, stages=stages),
+            announce=status.note,
+            side=recorded_by(recording),
+        )
         core = assembled.core
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
-        warm_up(lambda: status.note("compiling the overlap kernels, up to a minute; the next start is quick"))
+        warm_up(lambda: status.note(_COMPILING), assembled.kernels)
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": core.notes})
             status.also = recording.note
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
-            for text in _admission_notes(settings, keys):
+            open_to_all = ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
+            for text in open_to_all if keys is None else keys.notes():
                 status.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, assembled, link, sockets, status, recording)
+            loop = _Loop(settings, assembled, link, sockets, status, recording, stages)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -101,16 +117,6 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _admission_notes(settings: RobotSettings, keys: RobotKeys | None) -> list[str]:
-    """What a person should know about who may come in."""
-    if keys is None:
-        return ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
-    folder = keys.allowed.folder
-    names = ", ".join(sorted(keys.allowed.names.values()))
-    who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {folder.command('allow NAME KEY')}"
-    return [f"keys: {text}" for text in (who, *passed_over_note(folder))]
-
-
 def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
     return message._replace(payload=flip(message.payload))
 
@@ -126,6 +132,7 @@ class _Loop:
         sockets: RobotSockets,
         status: Status,
         recording: SideRecording | None,
+        stages: Stages,
     ) -> None:
         self._recording = recording
         self._duration_s = settings.duration
@@ -156,6 +163,8 @@ class _Loop:
         self._collection = IdleCollection(self._clock)
         self._start_s = self._clock.now()
         self._pacer = Pacer(TICK_PERIOD_S, self._start_s, settings.seed)
+        self._keeping_up = KeepingUp(self._pacer, stages, self._clock, self._computed, HELPS)
+        self._stages = stages
         self._next_keys_s = self._start_s
 
     def run(self, stop: StopSignal) -> None:
@@ -163,32 +172,43 @@ class _Loop:
         with self._collection:
             self._start_s = self._clock.now()
             self._pacer.restart(self._start_s)
+            receive, send = (
+                self._stages.timed("sockets", self._sockets.receive),
+                self._stages.timed("sockets", self._send),
+            )
+            hear = self._stages.timed("messages", self._core.receive)
             while not stop.is_set:
-                received = self._sockets.receive()
+                self._keeping_up.begin()
+                received = receive()
                 # Read after receiving: a process that was stopped in between must not take old commands for new.
                 now_s = self._clock.now()
                 if self._duration_s is not None and now_s - self._start_s >= self._duration_s:
                     break
                 for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
-                    self._core.receive(peer, payload, now_s)
+                    hear(peer, payload, now_s)
                 ticked = self._pacer.due(now_s)
                 if ticked:
                     self._tick(now_s)
-                self._send()
+                send()
                 if ticked:
                     self._core.observe(now_s)
                     self._use_idle_time(self._clock.now(), now_s)
+                if (said := self._keeping_up.end(turned=ticked)) is not None:
+                    self._status.note(said)
                 dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
                 wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))
 
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
-        sockets = self._sockets
+        sockets, stages = self._sockets, self._stages.summary()
         paced = self._pacer.summary()
         return {
             "duration_s": self._clock.now() - self._start_s,
-            "tick_us": tick_microseconds(self._tick_time),
-            "tick_cpu_us": tick_microseconds(self._tick_cpu_time),
+            "tick_us": microseconds(self._tick_time),
+            "tick_cpu_us": microseconds(self._tick_cpu_time),
+            "physics_us": stages["physics"]["wall_us"],
+            "stages": {"robot": stages},
+            "machine": {"robot": self._keeping_up.summary()},
             **paced,
             "link": link_summary(
                 "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}

@@ -8,7 +8,8 @@ import zmq
 
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
 from common.sockets.endpoints import Endpoint, following, parse_connect
-from common.sockets.shell import CONTROL_LIMIT_BYTES, Reader, SocketShell, connect_socket
+from common.sockets.inbox import Inbox
+from common.sockets.shell import CONTROL_LIMIT_BYTES, SocketShell, connect_socket
 
 _RETRY_S = 0.5
 _ATTEMPT_LIMIT_S = 3.0
@@ -51,7 +52,7 @@ class OperatorSockets(SocketShell):
             self._control.setsockopt(zmq.IMMEDIATE, 1)
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)
-            self._reader, self._view_reader = Reader(frames=1), Reader(frames=2)
+            self._inbox, self._view_inbox = Inbox(self._control, frames=1), Inbox(self._view, frames=2)
             self._next_look_s = 0.0
             for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
                 part.setsockopt(zmq.CONNECT_TIMEOUT, round(1e3 * _ATTEMPT_LIMIT_S))
@@ -76,11 +77,11 @@ class OperatorSockets(SocketShell):
     def receive(self) -> list[bytes]:
         """Every control message that has arrived, oldest first."""
         self._look_after_handshakes()
-        return [payload.bytes for (payload,) in self._whole(self._reader.read(self._control), 1)]
+        return [payload.bytes for (payload,) in self._whole(self._inbox.read(), 1)]
 
     def receive_view(self) -> list[tuple[bytes, bytes]]:
         """(topic, payload) of every view message that has arrived, oldest first."""
-        messages = self._whole(self._view_reader.read(self._view), 2)
+        messages = self._whole(self._view_inbox.read(), 2)
         return [(topic.bytes, payload.bytes) for topic, payload in messages]
 
     def send(self, payload: bytes) -> bool:
@@ -88,11 +89,12 @@ class OperatorSockets(SocketShell):
 
         ValueError for more than CONTROL_LIMIT_BYTES.
         """
+        self._inbox.used()
         return self.send_frames(self._control, [payload], CONTROL_LIMIT_BYTES)
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control or view message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self.wait_for(timeout_s, [self._control, self._view])
+        return self.wait_for(timeout_s, [self._inbox, self._view_inbox])
 
     def close(self) -> None:
         """Close at once, whatever has not left yet; closing twice does no harm."""
@@ -126,6 +128,8 @@ class OperatorSockets(SocketShell):
             watch.look()
             if watch.failed:
                 watch.failed = False
+                self._inbox.used()
+                self._view_inbox.used()
                 with contextlib.suppress(zmq.ZMQError):
                     part.disconnect(endpoint.address)
                 part.connect(endpoint.address)

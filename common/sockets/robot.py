@@ -11,8 +11,9 @@ from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
 from common.sockets.gate import Gate
+from common.sockets.inbox import Inbox
 from common.sockets.readable import EVENTS
-from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, Reader, SocketShell, bind_socket
+from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, SocketShell, bind_socket
 
 PEER_LIMIT_PER_S = 5000
 """A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
@@ -75,10 +76,10 @@ class RobotSockets(SocketShell):
         self._all_seen = False
         """Whether what the gates know of the connections was all there was to know."""
         self._second = 0
-        self._reader = Reader(frames=2)
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
         super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
+        self._inbox = Inbox(self._control, frames=2)
         try:
             self._gates = [self._watch(part) for part in (self._control, self._view)]
             self._listen()
@@ -145,7 +146,7 @@ class RobotSockets(SocketShell):
                 peer.received = 0
         self._watch_connections()
         received: list[tuple[bytes, bytes]] = []
-        for name, *frames in self._reader.read(self._control):
+        for name, *frames in self._inbox.read():
             if not self._admits(name.bytes, frames[-1] if frames else name):
                 continue
             if len(frames) == 1:
@@ -162,6 +163,7 @@ class RobotSockets(SocketShell):
         if self._keys is not None and (peer not in self._peers or not self._allows(self._peers[peer].key)):
             self.dropped += 1
             return False
+        self._inbox.used()
         return self.send_frames(self._control, [peer, payload], CONTROL_LIMIT_BYTES)
 
     def publish(self, topic: bytes, payload: bytes) -> None:
@@ -174,7 +176,7 @@ class RobotSockets(SocketShell):
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self.wait_for(timeout_s, [self._control], self._authenticator)
+        return self.wait_for(timeout_s, [self._inbox], self._authenticator)
 
     def _watch(self, part: "zmq.Socket[bytes]") -> Gate:
         return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S)

@@ -1,8 +1,8 @@
-"""What both processes' sockets have in common: their options, waiting, reading without being held up, closing."""
+"""What both processes' sockets have in common: their options, waiting, sending, closing."""
 
 import os
 import select
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -12,7 +12,8 @@ from common.clock import MonotonicClock
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator
 from common.sockets.endpoints import Endpoint
-from common.sockets.readable import EVENTS, readable
+from common.sockets.inbox import Inbox
+from common.sockets.readable import EVENTS
 
 CONTROL_HIGH_WATER_MARK = 16
 """Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.
@@ -35,8 +36,6 @@ VIEW_LIMIT_BYTES = 4 * 1024 * 1024
 _CONTROL_THREAD, _VIEW_THREAD = 0b01, 0b10
 """Masks of ZeroMQ's own threads."""
 _NOBLOCK, _NOBLOCK_AND_MORE = int(zmq.NOBLOCK), int(zmq.NOBLOCK | zmq.SNDMORE)
-MESSAGES_PER_RECEIVE = 64
-"""At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
 
 
 class SocketShell:
@@ -56,7 +55,6 @@ class SocketShell:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
         self._handshake_ms = round(1e3 * handshake_limit_s)
-        self._descriptors: dict[zmq.Socket[bytes], int] = {}
         self._control = self._open_control(control_type)
         self._view = self._open_view(view_type)
 
@@ -111,44 +109,32 @@ class SocketShell:
         """Close at once, whatever has not left yet; closing twice does no harm."""
         self._context.destroy(linger=0)
 
-    def wait_for(
-        self,
-        timeout_s: float | None,
-        awaited: Sequence["zmq.Socket[bytes]"],
-        served: Authenticator | None = None,
-    ) -> bool:
+    def wait_for(self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None) -> bool:
         """Whether one of `awaited` has something before the time is up; `served` gets its answers meanwhile.
 
-        zmq's own poll counts whole milliseconds, hence select on the sockets' descriptors. These signal only
-        changes, and only until EVENTS is read: it has the last word before and after each select.
+        zmq's own poll counts whole milliseconds, hence select on the descriptors.
         """
         if timeout_s is not None and not timeout_s >= 0.0:
             raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
-        if timeout_s == 0.0:  # asked again and again by whoever spins
-            if served is not None:
-                served.serve()
-            return any(map(readable, awaited))
-        descriptors = [self._descriptor(part) for part in awaited]
-        if served is not None:
-            descriptors.append(served.fileno())
-        deadline_s = None if timeout_s is None else self._clock.now() + timeout_s
+        remaining_s, deadline_s = timeout_s, None
         while True:
             pending = served is not None and served.serve()
-            if any(map(readable, awaited)):
-                return True
-            remaining_s = None
-            if deadline_s is not None:
-                remaining_s = deadline_s - self._clock.now()
+            for inbox in awaited:
+                if inbox.has_some():
+                    return True
+            if remaining_s is not None:
                 if remaining_s <= 0.0:
                     return False
-            select.select(descriptors, [], [], 0.0 if pending else remaining_s)
-
-    def _descriptor(self, part: "zmq.Socket[bytes]") -> int:
-        """The one to wait for, a socket's for life; the sockets that are waited for live as long as we do."""
-        descriptor = self._descriptors.get(part)
-        if descriptor is None:
-            descriptor = self._descriptors[part] = part.fileno()
-        return descriptor
+                if deadline_s is None:
+                    deadline_s = self._clock.now() + remaining_s
+            descriptors = [inbox.descriptor for inbox in awaited]
+            if served is not None:
+                descriptors.append(served.fileno())
+            signalled, _, _ = select.select(descriptors, [], [], 0.0 if pending else remaining_s)
+            if not signalled and not pending:
+                return False
+            if deadline_s is not None:
+                remaining_s = deadline_s - self._clock.now()
 
     def send_frames(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
         """Send without waiting; False, and counted in `dropped`, when it cannot leave; ValueError when too long."""
@@ -170,32 +156,6 @@ class SocketShell:
                 return True
         self.dropped += 1
         return False
-
-
-class Reader:
-    """The messages of one socket, read frame by frame: one of a million frames must not hold the caller either."""
-
-    def __init__(self, frames: int) -> None:
-        self._frames = frames
-        self._begun: list[zmq.Frame] = []
-
-    def read(self, part: "zmq.Socket[bytes]") -> Iterator[list[zmq.Frame]]:
-        """What has arrived, oldest first, each at most one frame longer than it should be."""
-        more = bool(self._begun)
-        for _ in range(MESSAGES_PER_RECEIVE * self._frames):
-            # Asked first: an exception takes four times as long.
-            if not more and not readable(part):
-                return
-            try:
-                frame = part.recv(_NOBLOCK, copy=False)
-            except zmq.Again:
-                return
-            if len(self._begun) <= self._frames:
-                self._begun.append(frame)
-            more = frame.more
-            if not more:
-                message, self._begun = self._begun, []
-                yield message
 
 
 def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:

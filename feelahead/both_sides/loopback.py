@@ -13,6 +13,7 @@ from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
 from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
+from common.realtime.stages import microseconds
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
 from operator_side.assembly import build_operator_side
@@ -30,7 +31,6 @@ from robot_side.ahead.law import Law
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
-from robot_side.figures import tick_microseconds
 from robot_side.main import TICK_PERIOD_S
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
@@ -137,7 +137,7 @@ class Loopback:
         """As the demo's, but for the tick times, which are real and differ from run to run."""
         merged = merge_summaries(self.robot.summary(), self.operator.summary(), [])
         merged["duration_s"] = self.clock.now()
-        merged["tick_us"] = tick_microseconds(self.tick_time)
+        merged["tick_us"] = microseconds(self.tick_time)
         merged["link"] = link_summary("to_robot", {"haptics": self._to_robot}) | link_summary(
             "to_operator", self._to_operator
         )

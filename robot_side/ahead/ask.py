@@ -8,15 +8,16 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
-from robot_side.ahead.nodes import NODES_PER_MARGIN, is_spent, plan
 from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import (
     BOX_JOBS,
     DONE,
     FIRST,
+    GOING,
     JOB_KINDS,
     MESH_JOBS,
     NEW,
+    NODES,
     RAMPS,
     STRENGTHS,
     TETRAHEDRON_JOBS,
@@ -34,7 +35,9 @@ _PLACES: Final = np.array([0, BOX_JOBS, TETRAHEDRON_JOBS, 0, MESH_JOBS])
 NOTHING: Final = 1e-9
 """Shares of the sphere's volume, and of its disc per metre of way, below which a change is rounding."""
 
-
+NODES_PER_MARGIN: Final = 6
+_NODES_FOR_MORE: Final = 30
+"""From so many nodes on, a graze goes on in steps as long as it takes to have enough of them for its whole way."""
 _ENLARGED: Final = 1.0 + 1e-6
 """What bounds a rise is enlarged by this, so that rounding never hides a strength."""
 
@@ -64,18 +67,76 @@ def most_strength(ramp: Record, margin: float) -> int:
 
 @inlined
 def _matters(ramp: Record, fast: FloatArray, slow: FloatArray, margin: float) -> bool:
-    """Whether a ramp could still shorten a way: nothing of it is felt before it begins, less the margin."""
+    """Whether a ramp could still shorten a way: nothing more of it is felt before it begins, less the margin."""
     strength = most_strength(ramp, margin)
     if strength == 0:
         return False
-    begins: float = ramp.start - margin - ramp.before
+    begins: float = max(ramp.start, ramp.begins) - margin - ramp.before
     in_slow_zones: bool = begins < slow[strength - 1]
     if ramp.touchable:
         in_slow_zones = begins + ramp.expected < slow[min(strength, TOUCH_STRENGTH) - 1]
     return in_slow_zones or bool(begins < fast[strength - 1])
 
 
+@inlined
+def ends(ramp: Record, margin: float, reach: float) -> float:
+    """So far a ramp's nodes go: to where it is full, where it begins to rise within the reach."""
+    return reach if math.isnan(ramp.free) else max(reach, ramp.free + margin)
+
+
+@inlined
+def is_spent(ramp: Record, margin: float, reach: float) -> bool:
+    """Whether a ramp has all its nodes."""
+    last = ramp.nodes - 1
+    return bool(
+        ramp.state == GOING and (last == NODES - 1 or (last >= 0 and ramp.way[last] >= ends(ramp, margin, reach)))
+    )
+
+
 @building_block
+def _step(ramp: Record, pairs: np.ndarray, nodes: int, last: float, margin: float, end: float) -> float:
+    """How far it is from the node at `last`, of so many, to the next one."""
+    short, long = margin / NODES_PER_MARGIN, 0.5 * margin
+    if not ramp.free + margin <= last * (1.0 + 1e-9):
+        return short
+    # A graze goes on in long steps, but where it meets something more.
+    if nodes > _NODES_FOR_MORE:
+        return max(long, (end - last) / (NODES - nodes))
+    for k in range(ramp.first_pair, ramp.first_pair + ramp.pairs):
+        if max(ramp.free, last - margin) < pairs[k].entry < last + long:
+            return short
+    return long
+
+
+@building_block
+def plan(ramp: Record, pairs: np.ndarray, margin: float, reach: float) -> None:
+    """Decide where the ramp's next nodes are, if it has any."""
+    if ramp.state == NEW:
+        ramp.state, ramp.free, ramp.floor, ramp.lean, ramp.nodes = GOING, math.nan, 0.0, 0.0, 0
+        if ramp.start > 0.0:
+            # Nothing overlaps before: this node is known.
+            ramp.free, ramp.way[0], ramp.volume[0], ramp.slope[0], ramp.nodes = ramp.start, ramp.start, 0.0, 0.0, 1
+        else:
+            ramp.state, ramp.way[0], ramp.asked = FIRST, 0.0, 1
+            for axis in range(3):
+                ramp.push[axis] = 0.0
+            return
+    count = 0
+    if ramp.nodes == 0:
+        ramp.way[0] = last = ramp.start
+        count = 1
+    else:
+        last = ramp.way[ramp.nodes - 1]
+    end = ends(ramp, margin, reach)
+    for _ in range(NODES_PER_MARGIN):
+        if ramp.nodes + count < NODES and last < end:
+            last += _step(ramp, pairs, ramp.nodes + count, last, margin, end)
+            ramp.way[ramp.nodes + count] = last
+            count += 1
+    ramp.asked = count
+
+
+@inlined
 def write_job(
     kind: int, row: int, ramp: int, node: int, center: Vector, radius: float, shapes: FloatArray, jobs: JobColumns
 ) -> None:
@@ -107,7 +168,7 @@ def room_of(jobs: JobColumns) -> int:
     return jobs.owners.size // JOB_KINDS
 
 
-@building_block
+@inlined
 def _ask_node(
     ramp: Record,
     k: int,
@@ -135,11 +196,12 @@ def _ask_node(
             write_job(kind, row, k, node, center, ramp.radius, scene.shapes, jobs)
 
 
-@building_block
-def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float) -> int:
+@inlined
+def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float, most: int) -> int:
     """Write the jobs of the next round of the ramps there are; the number of nodes asked for, -1 without room.
 
-    Spheres and half-spaces are worked out here, by their closed forms.
+    Once there are `most` nodes the other ramps wait for another round. Spheres and half-spaces are worked out here, by
+    their closed forms.
     """
     ramps, pairs, jobs, count = tables.ramps, tables.pairs, tables.jobs, tables.progress[RAMPS]
     fast, slow = tables.ways[0], tables.ways[1]
@@ -155,6 +217,8 @@ def ask(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float,
     asked = 0
     for k in range(count):
         ramp = ramps[k]
+        if asked >= most and asked > 0:
+            break
         if ramp.state == DONE or (ramp.state == NEW and ramp.start - ramp.before > nearest + WINDOW * margin):
             continue
         if max(jobs.counts[0], jobs.counts[1], jobs.counts[2]) + (NODES_PER_MARGIN + 1) * ramp.pairs > room_of(jobs):

@@ -13,8 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.ask import NOTHING, add_to_node, most_strength, room_of
-from robot_side.ahead.nodes import ends
+from robot_side.ahead.ask import NOTHING, add_to_node, ends, most_strength, room_of
+from robot_side.ahead.kinds.layout import MESH
+from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import (
     DONE,
     FIRST,
@@ -31,6 +32,8 @@ from robot_side.compiled.vectors import Vector, load
 
 _PARTS: Final = 8
 """So finely the cubic between two nodes is looked through for where a strength begins."""
+_ENOUGH: Final = 1e-6
+"""An overlap of so much of R³ has a tangent that is good for something."""
 
 
 class _Piece(NamedTuple):
@@ -150,16 +153,24 @@ def _top(ramp: Record, margin: float) -> float:
     return top
 
 
-@building_block
-def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> bool:
-    """Shorten the ways by one ramp; whether it has reached the most that it ever does."""
-    reference = max(_top(ramp, margin), margin * ramp.lean, ramp.least)
-    level, before, reached = 0, ramp.free, 0.0
-    for node in range(ramp.nodes - 1):
+@inlined
+def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) -> None:
+    """Shorten the ways by what is new of one ramp."""
+    if ramp.walked < 0:
+        ramp.reference = max(_top(ramp, margin), margin * ramp.lean, ramp.least)
+        ramp.walked, ramp.level, ramp.along, ramp.reached = 0, 0, ramp.free, 0.0
+    reference, level, before, reached = ramp.reference, ramp.level, ramp.along, ramp.reached
+    for node in range(ramp.walked, ramp.nodes - 1):
         piece = _piece(ramp, node)
         if level == STRENGTHS:
             break
-        if piece.way + piece.step <= ramp.free:
+        end = piece.way + piece.step
+        if end <= ramp.free:
+            continue
+        rises_to = (piece.high - ramp.floor) / reference
+        if node > ramp.walked and piece.way >= ramp.free and rises_to < (level + 0.5) / STRENGTHS:
+            # No strength begins here.
+            before, reached = end, max(reached, rises_to)
             continue
         for part in range(1, _PARTS + 1):
             share = part / _PARTS
@@ -177,7 +188,28 @@ def _shorten(ramp: Record, margin: float, fast: FloatArray, slow: FloatArray) ->
                     slow[level] = min(slow[level], found + ramp.expected)
                 level += 1
             before, reached = way, strength
-    return bool(level >= most_strength(ramp, margin))
+    ramp.walked, ramp.level, ramp.along, ramp.reached = ramp.nodes - 1, level, before, reached
+    ramp.begins = before
+
+
+@inlined
+def _bound(ramp: Record, kind: int, end: float) -> None:
+    """Bound what is still to come of a ramp that has one convex primitive.
+
+    By the theorem of Brunn and Minkowski the cube root of the overlap of two convex bodies is concave along the way,
+    so that it stays below its tangent.
+    """
+    last = ramp.nodes - 1
+    volume, slope = ramp.volume[last], ramp.slope[last]
+    if ramp.pairs != 1 or kind == MESH or volume <= _ENOUGH * ramp.radius**3:
+        return
+    root = volume ** (1.0 / 3.0)
+    steep = max(slope, 0.0) / (3.0 * root * root)
+    most = root + steep * (end - ramp.way[last])
+    ramp.most = max(most * most * most - ramp.floor, 0.0)
+    if steep > 0.0 and ramp.level < STRENGTHS:
+        needed = ramp.floor + (ramp.level + 0.5) / STRENGTHS * ramp.reference
+        ramp.begins = max(ramp.begins, ramp.way[last] + (needed ** (1.0 / 3.0) - root) / steep * (1.0 - 1e-6))
 
 
 @inlined
@@ -190,8 +222,8 @@ def _take_first(ramp: Record) -> None:
     ramp.state = GOING
 
 
-@building_block
-def take(tables: TableColumns, along: Vector, margin: float, reach: float) -> None:
+@inlined
+def take(scene: SceneColumns, tables: TableColumns, along: Vector, margin: float, reach: float) -> None:
     """Put the results of the jobs into the ramps, and shorten the ways."""
     ramps, jobs, fast, slow = tables.ramps, tables.jobs, tables.ways[0], tables.ways[1]
     for kind in range(JOB_KINDS):
@@ -214,7 +246,9 @@ def take(tables: TableColumns, along: Vector, margin: float, reach: float) -> No
         elif ramp.nodes > 1:
             ended = ramp.way[ramp.nodes - 1] >= ends(ramp, margin, reach)
             if ended or ramp.way[ramp.nodes - 1] >= ramp.free + margin * (1.0 - 1e-9):
-                full = _shorten(ramp, margin, fast, slow)
+                _shorten(ramp, margin, fast, slow)
+                _bound(ramp, scene.kinds[tables.pairs[ramp.first_pair].row], ends(ramp, margin, reach))
                 entered, may_rise = _to_come(ramp, tables.pairs)
+                full = ramp.level >= most_strength(ramp, margin)
                 if full or ended or (entered == math.inf and not may_rise):
                     ramp.state = DONE

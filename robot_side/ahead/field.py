@@ -1,15 +1,15 @@
 """The field along one direction: the ways at which the eight strengths begin."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.ahead.find import find
-from robot_side.ahead.rounds import ENDED, MORE_JOBS, MORE_RAMPS, OVERLAPS, go_on
+from robot_side.ahead.rounds import ENDED, MORE_JOBS, MORE_RAMPS, OVERLAPS, PAUSED, go_on
 from robot_side.ahead.scene_table import SceneTable
-from robot_side.ahead.tables import ENTERED, LIMITED, RAMPS, Tables
+from robot_side.ahead.tables import ENTERED, LIMITED, OVERLAPPED, RAMPS, WORK, Tables
 from robot_side.ahead.total_overlap import work_out
 from robot_side.arm.port import GripperPose
 
@@ -21,6 +21,7 @@ MARGIN_M = 0.012
 LEAST_DEPTH_M = 0.0005
 """What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.5 mm)². Noise in the encoders turns a way
 aside by less."""
+ALL: Final = 1 << 60
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ class Ahead:
 
     def __post_init__(self) -> None:
         self._encoder_variance = self.encoder_sigma_rad * self.encoder_sigma_rad
+        self._given: tuple[Any, ...] = ()
+        self._looking: tuple[SceneTable, bool]
+        self._meshes: MeshWays | None = None
 
     def look(
         self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, widest_m: float = np.inf
@@ -103,18 +107,53 @@ class Ahead:
         ValueError that names the field of `pose` or `along` that holds NaN or infinity: that would compare as far away
         and silently give no warning.
         """
-        tables, counts, size = self.tables, self.counts, len(pose.sphere_radii_m)
+        self.begin(pose, scene, standing, along, widest_m)
+        while (found := self.go_on()) is None:
+            pass
+        return found
+
+    def begin(
+        self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, widest_m: float = np.inf
+    ) -> None:
+        """Begin such a look, instead of the last one; `scene` and `standing` must stay as they are until it ends."""
+        tables, size = self.tables, len(pose.sphere_radii_m)
         tables.require(size, len(scene.bounds))
-        early_m = np.zeros(len(standing)) if along.early_m is None else along.early_m
+        early_m = scene.still_m if along.early_m is None else along.early_m
         meetings = self._find(pose, scene, standing, along, early_m)
-        counts.fields += 1
-        counts.flat = scene.flat
-        if meetings:
-            self._shorten(size, meetings, scene, standing, along, early_m, widest_m)
-            counts.ramps += int(tables.progress[RAMPS])
-            counts.limited += int(tables.progress[LIMITED])
-        else:
-            counts.with_nothing_near += 1
+        self.counts.fields += 1
+        self.counts.flat = scene.flat
+        self.counts.with_nothing_near += not meetings
+        looked = along.direction, along.reach_m, self.margin_m, widest_m, self.least_depth_m
+        self._given = size, meetings, *looked, scene.has_meshes, standing, early_m, scene.addresses
+        self._looking = scene, meetings > 0
+        self._meshes = _mesh_ways(scene, tables, along.direction, along.reach_m + self.margin_m, self.margin_m)
+
+    @property
+    def work(self) -> int:
+        """How much this look has taken so far: ramps and nodes."""
+        return int(self.tables.progress[WORK])
+
+    def go_on(self, most: int = ALL) -> Field | None:
+        """Go on with the look for so many ramps and nodes, or a few more; the field once it is known."""
+        tables, progress, meshes = self.tables, self.tables.progress, self._meshes
+        scene, meets = self._looking
+        most += self.work
+        while meets and (what := go_on(most, *self._given, tables.addresses)) != ENDED:
+            if what == PAUSED:
+                return None
+            if what == OVERLAPS:
+                work_out(tables.jobs, scene)
+                if meshes is not None:
+                    meshes.look_again(int(progress[RAMPS]))
+            elif what == MORE_RAMPS:
+                tables.grow_ramps()
+            elif what == MORE_JOBS:
+                tables.grow_jobs()
+            elif meshes is not None:
+                meshes.enter(slice(int(progress[ENTERED]), int(progress[RAMPS])))
+        self.counts.ramps += int(progress[RAMPS])
+        self.counts.overlaps += int(progress[OVERLAPPED])
+        self.counts.limited += int(progress[LIMITED])
         return Field(tables.ways_m.copy(), float(tables.largest_m[0]))
 
     def _find(self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, early_m: FloatArray) -> int:
@@ -133,6 +172,7 @@ class Ahead:
                 along.reach_m + self.margin_m,
                 standing,
                 early_m,
+                0.0 if along.early_m is None else float(early_m.max(initial=0.0)),
                 scene.addresses,
                 self.tables.addresses,
             )
@@ -141,32 +181,6 @@ class Ahead:
             if count <= len(self.tables.meetings):
                 return count
             self.tables.grow_meetings(count)
-
-    def _shorten(
-        self,
-        spheres: int,
-        meetings: int,
-        scene: SceneTable,
-        standing: IntArray,
-        along: Along,
-        early_m: FloatArray,
-        widest_m: float,
-    ) -> None:
-        tables, progress = self.tables, self.tables.progress
-        looked = along.direction, along.reach_m, self.margin_m, widest_m, self.least_depth_m
-        around = scene.has_meshes, standing, early_m, scene.addresses
-        meshes = _mesh_ways(scene, tables, along.direction, along.reach_m + self.margin_m, self.margin_m)
-        while (what := go_on(spheres, meetings, *looked, *around, tables.addresses)) != ENDED:
-            if what == OVERLAPS:
-                self.counts.overlaps += work_out(tables.jobs, scene)
-                if meshes is not None:
-                    meshes.look_again(int(progress[RAMPS]))
-            elif what == MORE_RAMPS:
-                tables.grow_ramps()
-            elif what == MORE_JOBS:
-                tables.grow_jobs()
-            elif meshes is not None:
-                meshes.enter(slice(int(progress[ENTERED]), int(progress[RAMPS])))
 
 
 def _mesh_ways(

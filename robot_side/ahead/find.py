@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.ahead.kinds.layout import HALF_SPACE
-from robot_side.ahead.scene_table import SceneColumns, scene_at
+from robot_side.ahead.scene_table import SceneColumns, next_place, scene_at
 from robot_side.ahead.tables import BLOCK, begin, tables_at
 from robot_side.ahead.way import passes, way_to
 from robot_side.compiled.bundle import BUNDLE
@@ -64,7 +64,7 @@ def around_spheres(spheres: FloatArray, sigma: FloatArray, first: int, end: int)
     return middle, radius
 
 
-@building_block
+@inlined
 def near_rows(
     scene: SceneColumns, thing: int, center: Vector, radius: float, along: Vector, reach: float, near: IntArray
 ) -> int:
@@ -77,7 +77,7 @@ def near_rows(
     return count
 
 
-@building_block
+@inlined
 def _least_way(
     scene: SceneColumns, near: IntArray, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> float:
@@ -93,7 +93,7 @@ def _least_way(
 
 @compiled(
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), NUMBER, BUNDLE, BUNDLE),
     returns=COUNT,
 )
 def find(
@@ -110,6 +110,7 @@ def find(
     reach: float,
     standing: IntArray,
     early: FloatArray,
+    earliest: float,
     scene_bundle: IntArray,
     tables_bundle: IntArray,
 ) -> int:
@@ -120,7 +121,7 @@ def find(
     centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
     encoder_variance (n,), direction: the unit û (3,). mean, variance: of eq. 10 along û, without the joints' part;
     quantile: Φ⁻¹(P). standing (k,): what each object is. early (k,): by how much its ways are to be shorter, as it
-    comes towards the gripper. The bundles: of `scene_at` and `tables_at`.
+    comes towards the gripper; earliest: the most of these. The bundles: of `scene_at` and `tables_at`.
     """
     scene, tables = scene_at(scene_bundle), tables_at(tables_bundle)
     sigma, blocks, meetings, near = tables.sigma, tables.blocks, tables.meetings, tables.near
@@ -150,7 +151,12 @@ def find(
     for block in range(total):
         around = max(around, norm(subtract(load(blocks, block), middle)) + blocks[block, 3])
     found = 0
-    for thing in range(standing.size):
+    place = -1
+    while True:
+        place = next_place(scene.there, place + 1, middle, along, reach + earliest, around)
+        if place >= scene.there.order.size:
+            break
+        thing = scene.there.order[place]
         farthest = reach + early[thing]
         if standing[thing] == PASSED_OVER or not passes(middle, along, farthest, scene.object_bounds, thing, around):
             continue

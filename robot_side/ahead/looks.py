@@ -58,6 +58,17 @@ class Looks:
             self.counts[side] = len(kept)
         looked_s += [-np.inf] * (places - len(looked_s))
 
+    def due(self, now_s: float) -> list[tuple[float, int, int]]:
+        """How long ago each side was looked along from each place (s), with these two, the longest first."""
+        return sorted(
+            [
+                (now_s - looked_s, side, place)
+                for side, all_looked_s in enumerate(self.looked_s)
+                for place, looked_s in enumerate(all_looked_s)
+            ],
+            key=lambda one: (-one[0], one[1], one[2]),
+        )
+
     def add(
         self,
         side: int,

@@ -10,11 +10,11 @@ from robot_side.ahead.kinds.layout import HALF_SPACE, MESH
 from robot_side.ahead.scene_table import SceneColumns
 from robot_side.ahead.tables import BLOCK, DONE, LIMITED, NEW, PAIRS, RAMPS, STRENGTHS, WINDOW, Record, TableColumns
 from robot_side.ahead.way import passes, way_to
-from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, load
 
 
-@building_block
+@inlined
 def _meet(
     scene: SceneColumns, tables: TableColumns, count: int, center: Vector, radius: float, along: Vector, reach: float
 ) -> bool:
@@ -42,7 +42,7 @@ def _meet(
     found[RAMPS] += 1
     ramp.first_pair, ramp.pairs, ramp.radius = first, found[PAIRS] - first, radius
     ramp.state, ramp.asked, ramp.nodes, ramp.start = NEW, 0, 0, start
-    ramp.most, ramp.lean = math.inf, 0.0
+    ramp.most, ramp.lean, ramp.begins, ramp.walked, ramp.level = math.inf, 0.0, start, -1, 0
     return touching
 
 
@@ -66,7 +66,7 @@ def _next_meeting(meetings: np.ndarray, count: int) -> float:
     return nearest
 
 
-@building_block
+@inlined
 def _meet_block(
     meeting: Record,
     spheres: int,
@@ -108,7 +108,7 @@ def _meet_block(
     return True
 
 
-@building_block
+@inlined
 def meet(
     scene: SceneColumns,
     tables: TableColumns,

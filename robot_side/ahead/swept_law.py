@@ -1,7 +1,8 @@
 """The law "swept": the gripper, inflated by D_σ, is moved along each trigger until it overlaps something (§4.2).
 
-Fields are worked out in turns, one a tick at most: R2, L2, and along the stick while that is deflected. In between
-the ways are shortened by what the tool has moved along, which for a translation is exact. The shortest of the last
+Fields are worked out in turns: R2, L2, and along the stick while that is deflected. A tick does so much of one and no
+more, so that a field takes a few of them where much is near: what it finds counts from where it began. In between the
+ways are shortened by what the tool has moved along, which for a translation is exact. The shortest of the last
 tenth of a second hold: where the gripper just passes something, the encoders' noise alone makes full strength of none.
 
 While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from where that will have brought it,
@@ -11,13 +12,11 @@ gripper by itself shortens its ways by what it covers in that time.
 
 import math
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import TriggerField, Ways
-from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from robot_side.ahead.explanation import (
     Trigger,
@@ -45,22 +44,17 @@ from robot_side.ahead.felt import (
 from robot_side.ahead.field import Ahead, Along
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.law import Sensed, Situation
-from robot_side.ahead.looks import L2, R2, STICK, Looks
+from robot_side.ahead.looks import L2, R2, STICK
 from robot_side.ahead.scene_table import scene_table
-from robot_side.ahead.sideways import FingerMotion, Sideways
 from robot_side.ahead.tables import STRENGTHS
-from robot_side.ahead.total_overlap import looked_overlap_m3
-from robot_side.arm.ability import Ability, JointLimits, ability, along_approach
+from robot_side.ahead.turns import FIELD_PERIOD_S, Prospect, Turns, stopping_s
+from robot_side.arm.ability import Ability, JointLimits, ability
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings, deflected
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, load
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.objects.perceived import Role
-
-FIELD_PERIOD_S: Final = 0.01
-"""A controller is written to no more often."""
-_ROUNDING_S: Final = 1e-9
 
 
 class SweptLaw:
@@ -75,25 +69,14 @@ class SweptLaw:
         self._limits = limits
         self._motion = motion
         self._touch_speed_m_s = touch_speed_m_s(motion.trigger_speed_m_s)
-        self._looks = Looks()
         self._felt = room_to_feel()
-        self._fingers = FingerMotion()
-        self._sideways: Sideways | None = None
-        self._moments: tuple[float, ...] = ()
-        """After which to look from where `_sideways` leads"""
-        self._measured_s = -math.inf
-        self._next_s = -math.inf
-        """When something is to be measured or looked at again, at the earliest"""
         self._standing: tuple[object, IntArray] | None = None
+        self.turns = Turns(self.ahead, self._prospect, limits, motion.trigger_speed_m_s)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick; at most one field is looked at, but for the first tick."""
-        pose, looks = situation.pose, self._looks
-        stick = math.hypot(*situation.lateral)
-        # What is gripped or let go changes which spheres there are.
-        changed = self._sideways is None or len(self._sideways.own_m_s) != len(pose.sphere_radii_m)
-        if now_s >= self._next_s or changed or bool(stick) != bool(looks.looked_s[STICK]):
-            self._look_where_due(situation, now_s, changed)
+        """Work out one tick."""
+        pose, stick = situation.pose, math.hypot(*situation.lateral)
+        looks = self.turns.take(situation, now_s)
         feel(
             *(looks.seen, looks.counts, looks.newest),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_rotation), np.ascontiguousarray(pose.tool_jacobian)),
@@ -132,71 +115,9 @@ class SweptLaw:
         found = overlaps_by_object(spheres, scene_table(situation.objects), standing, self.ahead.tables)
         return TriggerExplained(terms, found)
 
-    def _look_where_due(self, situation: Situation, now_s: float, changed: bool) -> None:
-        """Look where that is due longest, and elsewhere only where it is overdue."""
-        pose, looks = situation.pose, self._looks
-        velocity = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
-        speed_m_s = float(velocity @ pose.tool_rotation[:, 2])
-        if self._sideways is None or changed or now_s - self._measured_s >= FIELD_PERIOD_S - _ROUNDING_S:
-            self._measured_s = now_s
-            self._sideways, self._moments = self._measure(situation, velocity, speed_m_s, now_s)
-        for side in (R2, L2):
-            looks.look_from(side, 1 + len(self._moments))
-        looks.look_from(STICK, 0 if situation.lateral == (0.0, 0.0) else 1)
-        ages = [
-            (looked_s - now_s, side, place)
-            for side, all_looked_s in enumerate(looks.looked_s)
-            for place, looked_s in enumerate(all_looked_s)
-        ]
-        pause_s = FIELD_PERIOD_S
-        for younger_s, side, place in sorted(ages):
-            if -younger_s >= pause_s - _ROUNDING_S:
-                there, by = pose, None
-                if place > 0:
-                    there, by = self._sideways.moved(pose, self._moments[place - 1]), self._sideways
-                self._look(side, place, situation, there, by, speed_m_s, now_s)
-            pause_s = 2.0 * FIELD_PERIOD_S
-        self._next_s = min(self._measured_s, *map(min, filter(None, looks.looked_s))) + FIELD_PERIOD_S - _ROUNDING_S
-
-    def _measure(
-        self, situation: Situation, velocity: FloatArray, speed_m_s: float, now_s: float
-    ) -> tuple[Sideways, tuple[float, ...]]:
-        """What moves the gripper besides the triggers; velocity (3,): of the tool."""
-        pose = situation.pose
-        sideways = Sideways(
-            velocity - speed_m_s * pose.tool_rotation[:, 2],
-            pose.tool_jacobian[3:] @ situation.joint_velocities_rad_s,
-            self._fingers.see(pose, now_s),
-        )
-        able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
-        stopping_s = _stopping_s(situation, able)
-        return sideways, sideways.moments(pose, stopping_s, stopping_s * able.full_speed_m_s)
-
-    def _look(
-        self,
-        side: int,
-        place: int,
-        situation: Situation,
-        pose: GripperPose,
-        sideways: Sideways | None,
-        speed_m_s: float,
-        now_s: float,
-    ) -> None:
-        """sideways: what has brought the gripper to this pose; None where it stands there now."""
+    def _prospect(self, side: int, situation: Situation, pose: GripperPose) -> Prospect:
         along, able, _ = self._along(side, situation, pose)
-        scene, standing = scene_table(situation.objects), self._stands(situation)
-        if sideways is not None and sideways.moves_fingers:
-            # What the fingers close on is what they are to touch.
-            standing = np.where(standing == TARGET, PASSED_OVER, standing)
-        widest_m = math.inf if situation.gap_m is None else 0.5 * situation.gap_m
-        found = self.ahead.look(pose, scene, standing, along, widest_m)
-        overlap_m3 = 0.0
-        if place == 0 and side == (R2 if speed_m_s >= 0.0 else L2):
-            moved_m = abs(speed_m_s) * situation.loop_age_s * along.direction
-            spheres = len(pose.sphere_radii_m)
-            overlap_m3 = looked_overlap_m3(moved_m, spheres, scene, standing, self.ahead.tables)
-        where = along.direction, pose.tool_position_m, found.ways_m
-        self._looks.add(side, place, now_s, *where, able, along.reach_m, found.sigma_m, overlap_m3)
+        return Prospect(along, able, self._stands(situation))
 
     def _along(self, side: int, situation: Situation, pose: GripperPose) -> tuple[Along, Ability, float]:
         """What the errors are along one side, what the joints give there, and σ_δ."""
@@ -246,7 +167,7 @@ def _early_m(situation: Situation, direction: FloatArray, able: Ability) -> Floa
     if velocities is None:
         return None
     early: FloatArray = np.empty(len(velocities))
-    _nearing(np.ascontiguousarray(velocities), direction, _stopping_s(situation, able), early)
+    _nearing(np.ascontiguousarray(velocities), direction, stopping_s(situation, able), early)
     return early
 
 
@@ -255,11 +176,6 @@ def _nearing(velocities: FloatArray, direction: FloatArray, stopping: float, ear
     along = load(direction.reshape(1, 3), 0)
     for thing in range(early.size):
         early[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
-
-
-def _stopping_s(situation: Situation, able: Ability) -> float:
-    """From a report until the arm stands, which went at full speed and was told to stop by what is felt of it."""
-    return situation.loop_age_s + HORIZON_S + able.full_speed_m_s / able.acceleration_m_s2
 
 
 def _trigger_field(felt: list[float], side: int) -> TriggerField:

@@ -46,6 +46,12 @@ RAMP: Final = np.dtype(
         ("least", np.float64),
         ("rising", np.float64),
         ("most", np.float64),
+        ("begins", np.float64),
+        ("walked", np.int64),
+        ("level", np.int64),
+        ("along", np.float64),
+        ("reached", np.float64),
+        ("reference", np.float64),
         ("way", np.float64, (NODES,)),
         ("volume", np.float64, (NODES,)),
         ("slope", np.float64, (NODES,)),
@@ -56,7 +62,9 @@ RAMP: Final = np.dtype(
 nearer; before: by that, and by D_σ for a bare sphere. expected: D_σ(P) - D_σ(0.5). start: no overlap grows before this
 way. free: d; NaN while not known. floor: V(0). lean: |∇V(0)|. least: V_min. rising: what the primitives that still rise
 add to the slope at the last node. most: by so much the overlap rises at most; infinite where nobody has worked that
-out."""
+out. begins: no strength that is to come begins before this way, less the margin. walked: up to this node it has
+shortened the ways, -1 for not at all; level: by so many strengths; along, reached: the way until which that was, and
+the strength there, as a share of the reference, what makes full strength."""
 
 PAIR: Final = np.dtype([("row", np.int64), ("entry", np.float64), ("again", np.float64)])
 """A primitive's row in the scene, and the way at which the ramp's sphere begins to enter it: NaN for a mesh until that
@@ -100,6 +108,13 @@ class JobColumns(NamedTuple):
     """(r, 3)"""
     vertices: FloatArray
     """(r, 4, 3)"""
+    areas: FloatArray
+    """(j,) worked out"""
+    unsettled: IntArray
+    """(r + 1,) which of one kind need the precise forms"""
+    kernels: IntArray
+    """(4,) addresses of the kernels that work out boxes and tetrahedra: the lanes, then the precise forms; 0 for one
+    that has not been needed yet"""
 
 
 class JobParts(NamedTuple):
@@ -128,9 +143,10 @@ class Jobs:
             box_rotations=np.zeros((room, 3, 3)),
             box_half_sizes=np.zeros((room, 3)),
             vertices=np.zeros((room, 4, 3)),
+            areas=np.zeros(JOB_KINDS * room),
+            unsettled=np.zeros(room + 1, dtype=np.int64),
+            kernels=np.zeros(4, dtype=np.int64),
         )
-        self.areas: FloatArray = np.zeros(JOB_KINDS * room)
-        self.unsettled: IntArray = np.zeros(room + 1, dtype=np.int64)
         self._parts: dict[tuple[int, int], JobParts] = {}
 
     def parts(self, kind: int, count: int, shapes: tuple[np.ndarray, ...]) -> JobParts:
@@ -140,17 +156,18 @@ class Jobs:
             columns, part = self.columns, slice(kind * self.room, kind * self.room + count)
             known = self._parts[kind, count] = JobParts(
                 (columns.centers[part], columns.radii[part], *(shape[:count] for shape in shapes)),
-                (columns.volumes[part], columns.gradients[part], self.areas[part]),
-                self.unsettled[: count + 1],
+                (columns.volumes[part], columns.gradients[part], columns.areas[part]),
+                columns.unsettled[: count + 1],
             )
         return known
 
 
 PAIRS, RAMPS, LIMITED = 0, 1, 2
 """What is counted in `progress`: pairs, ramps, and spheres that were limited to half the gap (§3.4)."""
-STEP, LEFT, ENTERED, ROUNDS = 3, 4, 5, 6
-"""And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun."""
-PROGRESS: Final = 7
+STEP, LEFT, ENTERED, ROUNDS, OVERLAPPED, WORK = 3, 4, 5, 6, 7, 8
+"""And where a look stands: what comes next, meetings left, ramps before the last of them met, rounds begun, overlaps
+worked out, and how much has been done: ramps met and nodes asked for."""
+PROGRESS: Final = 9
 MEET, ASK, TAKE = 0, 1, 2
 """Steps of a round."""
 
@@ -198,6 +215,9 @@ def tables_at(bundle: IntArray) -> TableColumns:
             matrices(bundle, 18, 3, 3),
             rows(bundle, 19, 3),
             matrices(bundle, 20, 4, 3),
+            numbers(bundle, 21),
+            indices(bundle, 22),
+            indices(bundle, 23),
         ),
     )
 

@@ -9,29 +9,79 @@ from robot_side.ahead.ask import room_of, write_job
 from robot_side.ahead.find import PASSED_OVER, around_spheres
 from robot_side.ahead.kinds import half_space, sphere
 from robot_side.ahead.kinds.layout import HALF_SPACE, SPHERE
-from robot_side.ahead.scene_table import SceneTable, scene_at
-from robot_side.ahead.tables import BOX_JOBS, MESH_JOBS, TETRAHEDRON_JOBS, JobParts, Jobs, Tables, tables_at
+from robot_side.ahead.scene_table import SceneTable, next_place, scene_at
+from robot_side.ahead.tables import (
+    BOX_JOBS,
+    JOB_KINDS,
+    MESH_JOBS,
+    TETRAHEDRON_JOBS,
+    JobColumns,
+    JobParts,
+    Jobs,
+    Tables,
+    tables_at,
+)
 from robot_side.ahead.way import passes
 from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, Compiled, compiled, input_array, input_indices
+from robot_side.compiled.calls import call_of
+from robot_side.compiled.kernel import COUNT, NUMBER, Compiled, compiled, inlined, input_array, input_indices
 from robot_side.compiled.vectors import add, load
 from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
+_overlap_boxes, _overlap_tetrahedra = call_of(overlap_boxes), call_of(overlap_tetrahedra)
+_precise_boxes, _precise_tetrahedra = call_of(precise_boxes), call_of(precise_tetrahedra)
 
-def work_out(jobs: Jobs, scene: SceneTable) -> int:
-    """Fill in volumes and gradients of all jobs; how many there were."""
+
+@inlined
+def worked_out(jobs: JobColumns) -> bool:
+    """Fill in volumes and gradients of all jobs; False where `work_out` has to: for meshes, and the first of a kind."""
+    boxes, tetrahedra, kernels = jobs.counts[BOX_JOBS], jobs.counts[TETRAHEDRON_JOBS], jobs.kernels
+    if jobs.counts[MESH_JOBS] > 0 or (boxes > 0 and kernels[0] == 0) or (tetrahedra > 0 and kernels[2] == 0):
+        return False
+    if boxes > 0:
+        part = slice(BOX_JOBS * room_of(jobs), BOX_JOBS * room_of(jobs) + boxes)
+        spheres = jobs.centers[part], jobs.radii[part]
+        shapes = jobs.box_centers[:boxes], jobs.box_rotations[:boxes], jobs.box_half_sizes[:boxes]
+        results = jobs.volumes[part], jobs.gradients[part], jobs.areas[part]
+        unsettled = _overlap_boxes(kernels[0], (*spheres, *shapes, *results, jobs.unsettled[: boxes + 1]))
+        if unsettled > 0:
+            _precise_boxes(kernels[1], (*spheres, *shapes, jobs.unsettled[:unsettled], *results))
+    if tetrahedra > 0:
+        part = slice(TETRAHEDRON_JOBS * room_of(jobs), TETRAHEDRON_JOBS * room_of(jobs) + tetrahedra)
+        spheres, corners = (jobs.centers[part], jobs.radii[part]), jobs.vertices[:tetrahedra]
+        results = jobs.volumes[part], jobs.gradients[part], jobs.areas[part]
+        unsettled = _overlap_tetrahedra(kernels[2], (*spheres, corners, *results, jobs.unsettled[: tetrahedra + 1]))
+        if unsettled > 0:
+            _precise_tetrahedra(kernels[3], (*spheres, corners, jobs.unsettled[:unsettled], *results))
+    return True
+
+
+@inlined
+def summed(jobs: JobColumns) -> float:
+    """The volume in all."""
+    total = 0.0
+    for kind in range(JOB_KINDS):
+        first = kind * room_of(jobs)
+        for job in range(first, first + jobs.counts[kind]):
+            total += jobs.volumes[job]
+    return total
+
+
+def work_out(jobs: Jobs, scene: SceneTable) -> None:
+    """The same from Python, which notes where the kernels are."""
     columns = jobs.columns
     boxes, tetrahedra, meshes = columns.counts.tolist()
     if boxes:
         shapes = columns.box_centers, columns.box_rotations, columns.box_half_sizes
         _exactly(overlap_boxes, precise_boxes, jobs.parts(BOX_JOBS, boxes, shapes))
+        columns.kernels[:2] = overlap_boxes.address, precise_boxes.address
     if tetrahedra:
         _exactly(overlap_tetrahedra, precise_tetrahedra, jobs.parts(TETRAHEDRON_JOBS, tetrahedra, (columns.vertices,)))
+        columns.kernels[2:] = overlap_tetrahedra.address, precise_tetrahedra.address
     if meshes:
         _meshes(jobs, scene, meshes)
-    return int(boxes + tetrahedra + meshes)
 
 
 def _exactly(overlap: Compiled, precise: Compiled, parts: JobParts) -> None:
@@ -47,7 +97,7 @@ def _meshes(jobs: Jobs, scene: SceneTable, count: int) -> None:
 
     columns, part = jobs.columns, slice(MESH_JOBS * jobs.room, MESH_JOBS * jobs.room + count)
     placed = scene.rows_of_kind.take(columns.owners["row"][part])
-    results = columns.volumes[part], columns.gradients[part], jobs.areas[part], jobs.unsettled[:count]
+    results = columns.volumes[part], columns.gradients[part], columns.areas[part], columns.unsettled[:count]
     overlap_loop(columns.centers[part], columns.radii[part], placed, *scene.placed_meshes, *results)
 
 
@@ -82,9 +132,10 @@ def _total_m3(
             raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
         total += at_once
         jobs = tables.jobs
-        if work_out(jobs, scene):
-            counts, volumes = jobs.columns.counts, jobs.columns.volumes
-            total += sum(volumes[kind * jobs.room :][:count].sum() for kind, count in enumerate(counts))
+        if jobs.columns.counts.any():
+            work_out(jobs, scene)
+            for kind, done in enumerate(jobs.columns.counts):
+                total += jobs.columns.volumes[kind * jobs.room :][:done].sum()
     return float(total)
 
 
@@ -105,7 +156,7 @@ def _gather(
     scene_bundle: IntArray,
     tables_bundle: IntArray,
 ) -> float:
-    """Write a job for each pair that bounds do not settle; the sum of the closed forms.
+    """The sum of the overlaps, but of those for which it leaves jobs.
 
     spheres (m, 4), of which those from `begin` to `end` count; inflated (m, 1 or more): by its first column. -1 where
     there is no room, NaN for what is not finite.
@@ -121,12 +172,16 @@ def _gather(
     total, nowhere = 0.0, (0.0, 0.0, 0.0)
     middle, around = around_spheres(spheres, inflated, begin, end)
     middle = add(middle, shift)
-    for thing in range(standing.size):
-        if standing[thing] == PASSED_OVER or not passes(middle, nowhere, 0.0, scene.object_bounds, thing, around):
-            continue
+    place = -1
+    while True:
+        place = next_place(scene.there, place + 1, middle, nowhere, 0.0, around)
+        if place >= scene.there.order.size:
+            break
+        thing = scene.there.order[place]
         for i in range(begin, end):
             center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
-            if not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
+            passed_over = standing[thing] == PASSED_OVER
+            if passed_over or not passes(center, nowhere, 0.0, scene.object_bounds, thing, radius):
                 continue
             for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
                 kind = scene.kinds[row]
@@ -139,4 +194,7 @@ def _gather(
                     if jobs.counts.max() == room_of(jobs):
                         return -1.0
                     write_job(kind, row, i, 0, center, radius, scene.shapes, jobs)
+    if worked_out(jobs):
+        total += summed(jobs)
+        jobs.counts[:] = 0
     return total

@@ -5,15 +5,17 @@ Numba is imported untyped; everything else in this package sees ordinary typed f
 
 import contextlib
 import functools
+import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, cast
 
 import numba
 import numba.extending
 import numpy as np
 
-from robot_side.compiled.numba_inside import WithoutMachineCode, keep_on_disk
+from robot_side.compiled.machine_code import kept
+from robot_side.compiled.numba_inside import WithoutMachineCode, entry_point, keep_on_disk, machine
 from robot_side.compiled.sources import digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -100,6 +102,19 @@ def _power_of_two_below(_typing: Any, _length: Any) -> Any:
 power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
 """The largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only."""
 
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without looking for garbage, which takes a tenth of a compilation: it allocates much and keeps most of it."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
 _kernels: list["Compiled"] = []
 
 
@@ -120,7 +135,7 @@ class Compiled:
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         self.function = function
         """What it is compiled from."""
-        self._signature = (returns or numba.types.void)(*arguments)
+        self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
         """Whether it is compiled, so that the next call takes no longer than any other."""
@@ -130,19 +145,39 @@ class Compiled:
         """Compile or load now."""
         with self._preparing:
             if not self.ready:
-                # Only now does every building block exist. Without any writable place for it (a read-only image,
-                # say) the kernel works uncached.
-                with contextlib.suppress(RuntimeError):
-                    keep_on_disk(self._dispatcher, self.function, digest)
-                self._dispatcher.compile(self._signature)
+                keep_on_disk(self._dispatcher, self.name, self._key())
+                with _uncollected():
+                    self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
                 self.ready = True
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether another process finds it by its name."""
+        top_level = self.function.__qualname__ == self.function.__name__
+        return top_level and self.name.startswith("robot_side.")
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether its machine code for this processor is on disk."""
+        return kept(self.name, self._key()) is not None
+
+    def _key(self) -> str:
+        # Not before it is asked for: only then does every building block exist.
+        return f"{machine()} {self.signature} {digest(self.function)}"
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the kernel; TypeError for arrays that its signature does not name."""
         if not self.ready:
             self.prepare()
         return self._dispatcher(*arguments)
+
+    @property
+    def address(self) -> int:
+        """Where its machine code is, for `calls.call_of`; compiles it if need be."""
+        if not self.ready:
+            self.prepare()
+        return entry_point(self._dispatcher, self.signature)
 
     @property
     def cache_hits(self) -> int:

@@ -4,14 +4,21 @@ Tried with the versions that pyproject.toml pins. To try another one: widen the 
 on an empty cache, and see that cold compilation takes no longer.
 """
 
-import contextlib
-from collections.abc import Callable
-from typing import Any, cast
+import pickle
+import sys
+from typing import Any, Final, cast
 
-from numba.core.caching import FunctionCache
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+import llvmlite
+import numba
+from numba.core.caching import _Cache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.registry import cpu_target
+from numba.core.serialize import dumps
 from numba.core.typed_passes import NativeLowering
+
+from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
@@ -31,6 +38,14 @@ class _ForCallers(LoweringPass):
         return True
 
 
+class _ForLinking(JITCodeLibrary):
+    """Optimised, to be linked into kernels; never in memory as something to run."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
+        self._finalized = True
+
+
 class WithoutMachineCode(CompilerBase):
     """Compile to what a kernel needs to link the function in.
 
@@ -43,44 +58,70 @@ class WithoutMachineCode(CompilerBase):
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
+        library: Any = cast(Any, _ForLinking)(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library.enable_object_caching()
+        self.state.library = library
         passes: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
         passes.add_pass_after(_ForCallers, NativeLowering)
         passes.finalize()
         return [passes]
 
 
-class _CacheByDigest(FunctionCache):
-    """Numba's cache on disk, with a digest of ours in its key.
+def machine() -> str:
+    """What decides, beside the sources, whether machine code is good here: versions, and the processor."""
+    processor = cast(Any, cpu_target).target_context.codegen().magic_tuple()
+    return f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag} {processor}"
 
-    Numba by itself looks only at the file of the kernel, and would go on running machine code with an old version of
-    a building block from another file.
+
+class _OnDisk(_Cache):
+    """Keep a kernel's machine code in a file of `machine_code`.
+
+    Numba's own cache knows a kernel by its file alone, and would go on running machine code with an old version of a
+    building block from another file; it keeps nothing where it can only read, and ends the start on a full disk.
     """
 
-    def __init__(self, function: Callable[..., Any], digest: Callable[[Callable[..., Any]], str]) -> None:
-        super().__init__(function)  # type: ignore[no-untyped-call]
-        self._digest = digest(function)
+    cache_path = property(lambda _: str(machine_code_folder()))
 
-    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        key: tuple[Any, ...] = super()._index_key(signature, codegen)  # type: ignore[no-untyped-call]
-        return (*key, self._digest)
+    def __init__(self, name: str, key: str) -> None:
+        self._names: Final = name, key
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled kernel, or None where there is none.
+        """The compiled kernel, or None where there is none."""
+        del sig
+        target_context.refresh()
+        code = kept(*self._names)
+        # Numba's own way to keep it; whoever can write there can run programs as this user anyway.
+        return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))  # noqa: S301
 
-        What a damaged file holds (after a crash or a full disk) is thrown away and compiled again.
-        """
-        try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except Exception:
-            # Unpickling may raise anything.
-            with contextlib.suppress(OSError):
-                self.flush()  # type: ignore[no-untyped-call]
-            return None
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep it."""
+        del sig
+        # An address of this process is in some.
+        if not data.library.has_dynamic_globals:
+            keep(*self._names, cast(Any, dumps)(data._reduce()))
+
+    def enable(self) -> None:
+        """It always is."""
+
+    disable = flush = enable
 
 
-def keep_on_disk(dispatcher: Any, function: Callable[..., Any], digest: Callable[[Callable[..., Any]], str]) -> None:
-    """Give the dispatcher of `function` a cache on disk that is keyed by `digest(function)`, too.
+def keep_on_disk(dispatcher: Any, name: str, key: str) -> None:
+    """Have the dispatcher look for machine code on disk by `name` and `key`, and keep there what it compiles."""
+    dispatcher._cache = cast(Any, _OnDisk)(name, key)
 
-    RuntimeError where there is no writable place for it.
-    """
-    dispatcher._cache = cast(Any, _CacheByDigest)(function, digest)
+
+def entry_point(dispatcher: Any, signature: Any) -> int:
+    """The address of a compiled kernel's machine code, as kernels call each other."""
+    result = dispatcher.overloads[signature.args]
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+
+
+def call_at(context: Any, builder: Any, signature: Any, address: Any, given: list[Any]) -> Any:
+    """Build the call of a kernel of this signature at an address; what it returns."""
+    convention = context.call_conv
+    callee = builder.inttoptr(address, convention.get_function_type(signature.return_type, signature.args).as_pointer())
+    status, result = convention.call_function(builder, callee, signature.return_type, signature.args, given)
+    with cast(Any, builder).if_then(status.is_error):
+        convention.return_status_propagate(builder, status)
+    return result

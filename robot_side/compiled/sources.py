@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 _OURS = frozenset({"common", "robot_side"})
-_COMPILERS = ("sources.py", "kernel.py", "numba_inside.py")
+_COMPILERS = ("kernel.py", "numba_inside.py")
 """The files beside this one that decide how any kernel is compiled."""
 
 
@@ -38,6 +38,11 @@ def digest(function: Callable[..., Any]) -> str:
     for line in sorted(_constants(function)):
         result.update(line.encode() + b"\0")
     return result.hexdigest()
+
+
+def code_sizes(function: Callable[..., Any]) -> dict[FunctionType, int]:
+    """Every function that compiling `function` compiles, itself too, with the size of its bytecode (bytes)."""
+    return {part: len(part.__code__.co_code) for part in _parts(function) if isinstance(part, FunctionType)}
 
 
 @functools.cache

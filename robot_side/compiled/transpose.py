@@ -17,11 +17,13 @@ _FOUR = ir.VectorType(ir.DoubleType(), 4)
 _DOUBLE_BYTES = 8
 
 
-def _transpose_four(_typing: Any, rows: Any, _start: Any, _width: Any, columns: Any, _end: Any, _apart: Any) -> Any:
+def _transpose_four(
+    _typing: Any, rows: Any, _1: Any, _2: Any, _3: Any, _4: Any, columns: Any, _end: Any, _apart: Any
+) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        source, start, width, target, end, apart = arguments
-        read, write = _access(context, builder, signature.args[0], source, signature.args[3], target)
-        first, second, third, fourth = (read(_plus(builder, start, width, row)) for row in range(4))
+        source, *starts, target, end, apart = arguments
+        read, write = _access(context, builder, signature.args[0], source, signature.args[5], target)
+        first, second, third, fourth = (read(start) for start in starts)
         even_low, odd_low = _pick(builder, first, second, 0, 4, 2, 6), _pick(builder, first, second, 1, 5, 3, 7)
         even_high, odd_high = _pick(builder, third, fourth, 0, 4, 2, 6), _pick(builder, third, fourth, 1, 5, 3, 7)
         write(_plus(builder, end, apart, 0), _pick(builder, even_low, even_high, 0, 1, 4, 5))
@@ -31,7 +33,7 @@ def _transpose_four(_typing: Any, rows: Any, _start: Any, _width: Any, columns: 
         return context.get_dummy_value()
 
     index = numba.types.int64
-    return numba.types.void(rows, index, index, columns, index, index), generate
+    return numba.types.void(rows, index, index, index, index, columns, index, index), generate
 
 
 def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: Any, _apart: Any) -> Any:
@@ -50,11 +52,12 @@ def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: A
     return numba.types.void(rows, index, columns, index, index), generate
 
 
-transpose_four: Callable[[FloatArray, int, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
-    _transpose_four
-)
-"""(rows, start, width, columns, end, apart): four numbers from `start` of each of four rows, `width` numbers apart in
-`rows`, to four numbers from `end` of each of four columns, `apart` numbers apart in `columns`. Both are flat."""
+transpose_four: Callable[[FloatArray, int, int, int, int, FloatArray, int, int], None] = cast(
+    Any, numba.extending.intrinsic
+)(_transpose_four)
+"""(rows, first, second, third, fourth, columns, end, apart): four numbers of each of four rows, which begin at these
+places in `rows`, to four numbers from `end` of each of four columns, `apart` numbers apart in `columns`. Both are
+flat."""
 
 transpose_three: Callable[[FloatArray, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
     _transpose_three

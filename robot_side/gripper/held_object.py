@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.ahead.distances import distance_to_object
+from robot_side.ahead.distances import object_distances
+from robot_side.ahead.scene_table import scene_table
 from robot_side.arm.port import GripperPose
 from robot_side.compiled.kernel import compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, load
@@ -43,13 +44,14 @@ def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach
     half-space, which has no end to be lifted by, whatever its role.
     """
     unbounded = set(objects.half_space_object.tolist())
-    distances = {
-        index: distance_to_object(objects, index, tool_position_m)
-        for index, role in enumerate(objects.roles)
-        if role is not Role.SUPPORT and index not in unbounded
-    }
-    nearest = min(distances, key=lambda index: distances[index], default=None)
-    return nearest if nearest is not None and distances[nearest] <= reach_m else None
+    point_m, no_radius = np.ascontiguousarray(tool_position_m[None]), np.zeros(1)
+    distances_m = object_distances(point_m, no_radius, scene_table(objects), reach_m)
+    within = (
+        index
+        for index in np.flatnonzero(np.isfinite(distances_m)).tolist()
+        if objects.roles[index] is not Role.SUPPORT and index not in unbounded
+    )
+    return min(within, key=lambda index: float(distances_m[index]), default=None)
 
 
 def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldCovers | None = None) -> HeldObject:

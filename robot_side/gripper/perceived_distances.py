@@ -28,14 +28,15 @@ def perceived_distances(
     pose: GripperPose, objects: PerceivedObjects, target: int | None, held: int | None
 ) -> PerceivedDistances:
     """The distances in one frame; `target` and `held` are indices in `objects`, or None."""
-    passed_over = [role is Role.SUPPORT or index == held for index, role in enumerate(objects.roles)]
     wanted = target if target != held else None
     reach_m, distances_m = _FIRST_REACH_M, np.full(len(objects.names), np.inf)
     # No object that is nearer than the reach is missed, so that the search ends as soon as both are.
     scene = scene_table(objects)
     while reach_m <= _FARTHEST_M:
         distances_m = object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m)
-        distances_m[np.array(passed_over, dtype=np.bool_)] = np.inf
+        for index in np.flatnonzero(np.isfinite(distances_m)):
+            if index == held or objects.roles[index] is Role.SUPPORT:
+                distances_m[index] = np.inf
         if np.isfinite(distances_m).any() and (wanted is None or np.isfinite(distances_m[wanted])):
             break
         reach_m *= 2.0

@@ -1,8 +1,9 @@
 """What the camera reports: objects as spheres, boxes, tetrahedra, meshes and half-spaces, each with a role."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,12 +23,30 @@ class Role(Enum):
     IGNORED = "ignored"
 
 
-@dataclass(frozen=True)
+class Kind(NamedTuple):
+    """The fields of a frame that describe one kind of primitive."""
+
+    owner: str
+    """Each primitive's object"""
+    fields: tuple[str, ...]
+    """Where it is, and how large, a row each"""
+
+
+KINDS: Final = (
+    Kind("sphere_object", ("sphere_centers_m", "sphere_radii_m")),
+    Kind("box_object", ("box_centers_m", "box_rotations", "box_half_sizes_m")),
+    Kind("tetrahedron_object", ("tetrahedron_vertices_m",)),
+    Kind("half_space_object", ("half_space_normals", "half_space_offsets_m")),
+    Kind("mesh_object", ("mesh_positions_m", "mesh_rotations")),
+)
+
+
+@dataclass(frozen=True, eq=False)
 class PerceivedObjects:
     """Every object at its perceived pose, in the world frame, as contiguous arrays by kind of primitive.
 
     An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`.
-    Ignored objects have no primitives.
+    Ignored objects have no primitives. Each frame is equal to itself alone.
     """
 
     time_s: float
@@ -69,6 +88,25 @@ class PerceivedObjects:
     """(k, 3, 3) object to world, with `positions_m`"""
     velocities_m_s: FloatArray | None = None
     """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
+    since: "tuple[SomeObjects, PerceivedObjects] | None" = field(default=None, init=False, repr=False)
+    """Which objects may be elsewhere than in an earlier frame, and the frame of these alone; None: any may be."""
+
+
+class SomeObjects(Protocol):
+    """Objects of a frame that may be elsewhere in the next ones (see `movers`)."""
+
+    first: PerceivedObjects
+    things: IntArray
+    rows: Mapping[str, IntArray]
+
+    @property
+    def at_first(self) -> PerceivedObjects:
+        """These alone, as they are in `first`."""
+        ...
+
+    def place_of(self, thing: int) -> int | None:
+        """Which of these an object is; None for another one."""
+        ...
 
 
 class ObjectSource(Protocol):

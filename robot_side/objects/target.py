@@ -1,5 +1,8 @@
 """Which object is the target: found in a frame, and switched by the operator's button."""
 
+import weakref
+from typing import Any
+
 import numpy as np
 
 from common.arrays import FloatArray
@@ -30,9 +33,34 @@ def object_centers(objects: PerceivedObjects) -> FloatArray:
     return centers_m
 
 
+_newest_centers: "weakref.WeakKeyDictionary[PerceivedObjects, FloatArray]" = weakref.WeakKeyDictionary()
+
+
+def object_center(objects: PerceivedObjects, index: int) -> FloatArray:
+    """The row (3,) of `object_centers` of one object, at the cost of what is new in the frame."""
+    if objects.since is not None:
+        movers, moved = objects.since
+        place = movers.place_of(index)
+        objects, index = (movers.first, index) if place is None else (moved, place)
+    centers_m = _newest_centers.get(objects)
+    if centers_m is None:
+        centers_m = _newest_centers[objects] = object_centers(objects)
+    center_m: FloatArray = centers_m[index]
+    return center_m
+
+
 def target_index(objects: PerceivedObjects) -> int | None:
     """The object whose role is the target; None when there is none."""
-    return objects.roles.index(Role.TARGET) if Role.TARGET in objects.roles else None
+    # Frames share their roles, which may be many.
+    if _newest_target[0] is not objects.roles:
+        roles = objects.roles
+        _newest_target[:] = [roles, roles.index(Role.TARGET) if Role.TARGET in roles else None]
+    found: int | None = _newest_target[1]
+    return found
+
+
+_newest_target: list[Any] = [None, None]
+"""The roles that were searched last, and what was found."""
 
 
 def next_target(

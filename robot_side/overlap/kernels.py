@@ -1,9 +1,10 @@
 """Overlaps of (sphere, primitive) pairs in contiguous arrays: what a 1 kHz tick calls.
 
-Nothing is validated here: the caller vouches for finite values, radii >= 0, rotations that are orthonormal to
-1e-6, normals other than 0 and equal numbers of rows. Arrays are float64 and C-contiguous, lengths in m; any
-other type or layout raises TypeError. Each function returns (volumes (p,) in m³, gradients (p, 3) = dV/dcentre
-in m², areas (p,) = dV/dradius in m²) in new arrays. `robot_side.overlap` has the functions that check.
+The caller vouches for equal numbers of rows, and for finite values, radii >= 0, rotations that are orthonormal to
+1e-6 and normals other than 0; with `vouched=False` any other value raises `DoubtfulNumbersError`, and so may one that
+is just within its limits. Arrays are float64 and C-contiguous, lengths in m; any other type or layout raises TypeError.
+Each function returns (volumes (p,) in m³, gradients (p, 3) = dV/dcentre in m², areas (p,) = dV/dradius in m²) in new
+arrays. `robot_side.overlap` has the functions that say what is wrong.
 
 Boxes and tetrahedra go three ways: bounds settle most pairs that do not cut, vector lanes work out the others, and
 the few for which doubles do not suffice (see `lane_result`) are worked out once more by the precise forms.
@@ -17,12 +18,14 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import Compiled, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import TRUTH, Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
+from robot_side.overlap.checks.arguments import LARGEST, SMALLEST_NORMAL
 from robot_side.overlap.closed_forms.ball import sphere_overlap
 from robot_side.overlap.closed_forms.half_space import half_space_overlap
 from robot_side.overlap.closed_forms.solid import Overlap, Overlaps
 from robot_side.overlap.lanes.box_batch import overlap_boxes
+from robot_side.overlap.lanes.lanes import reach
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
@@ -43,19 +46,29 @@ class PairCounts:
     """worked out by the precise forms"""
 
 
+class DoubtfulNumbersError(ValueError):
+    """Numbers may be out of range or NaN."""
+
+
 def sphere_pairs(
-    centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray
+    centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, vouched: bool = True
 ) -> Overlaps:
     """Spheres `centers` (p, 3), `radii` (p,) with spheres `other_centers` (p, 3), `other_radii` (p,)."""
-    results = _empty(len(radii))
-    _sphere_loop(centers, radii, other_centers, other_radii, *results)
-    return results
+    return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), vouched)
 
 
-def half_space_pairs(centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray) -> Overlaps:
+def half_space_pairs(
+    centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray, *, vouched: bool = True
+) -> Overlaps:
     """Spheres `centers` (p, 3), `radii` (p,) with half-spaces normals (p, 3)·x <= offsets (p,)."""
-    results = _empty(len(radii))
-    _half_space_loop(centers, radii, normals, offsets, *results)
+    return _one_by_one(_half_space_loop, (centers, radii, normals, offsets), vouched)
+
+
+def _one_by_one(loop: Compiled, arguments: tuple[FloatArray, ...], vouched: bool) -> Overlaps:
+    total = len(arguments[1])
+    results = np.empty(total), np.empty((total, 3)), np.empty(total)
+    if not loop(*arguments, *results) and not vouched:
+        raise DoubtfulNumbersError
     return results
 
 
@@ -66,6 +79,7 @@ def box_pairs(
     box_rotations: FloatArray,
     box_half_sizes: FloatArray,
     *,
+    vouched: bool = True,
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
@@ -74,7 +88,7 @@ def box_pairs(
     `threads` None takes as many as pay.
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
-    return _many(overlap_boxes, precise_boxes, arguments, counts, threads)
+    return _many(overlap_boxes, precise_boxes, arguments, vouched, counts, threads)
 
 
 def tetrahedron_pairs(
@@ -82,6 +96,7 @@ def tetrahedron_pairs(
     radii: FloatArray,
     vertices: FloatArray,
     *,
+    vouched: bool = True,
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
@@ -89,13 +104,14 @@ def tetrahedron_pairs(
 
     `threads` None takes as many as pay.
     """
-    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), counts, threads)
+    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), vouched, counts, threads)
 
 
 def _many(
     overlap: Compiled,
     precise: Compiled,
     arguments: tuple[FloatArray, ...],
+    vouched: bool,
     counts: PairCounts | None,
     threads: int | None,
 ) -> Overlaps:
@@ -105,14 +121,14 @@ def _many(
     if threads is None:
         threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
     if threads <= 1:
-        parts = [_part(overlap, precise, arguments, results)]
+        parts = [_part(overlap, precise, arguments, results, vouched)]
     else:
         ends = np.linspace(0, total, threads + 1).astype(int).tolist()
 
         def part_of(first: int, last: int) -> tuple[int, int]:
             rows = slice(first, last)
             own = results[0][rows], results[1][rows], results[2][rows]
-            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own)
+            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own, vouched)
 
         try:
             shared = _pool().map(part_of, ends[:-1], ends[1:])
@@ -128,14 +144,19 @@ def _many(
 
 
 def _part(
-    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps
+    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, vouched: bool
 ) -> tuple[int, int]:
     """Fill in `results`; how many pairs bounds did not settle, and how many took the precise forms."""
     rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
+    partial = rows.item(-1)
+    if partial < 0:
+        if not vouched:
+            raise DoubtfulNumbersError
+        partial = ~partial
     if unsettled:
         precise(*arguments, rows[:unsettled], *results)
-    return int(rows[-1]), unsettled
+    return partial, unsettled
 
 
 @cache
@@ -147,10 +168,6 @@ def _pool() -> ThreadPoolExecutor:
 os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-def _empty(count: int) -> Overlaps:
-    return np.empty(count), np.empty((count, 3)), np.empty(count)
-
-
 @inlined
 def _store(pair: int, overlap: Overlap, volumes: FloatArray, gradients: FloatArray, areas: FloatArray) -> None:
     volumes[pair] = overlap[0]
@@ -160,7 +177,7 @@ def _store(pair: int, overlap: Overlap, volumes: FloatArray, gradients: FloatArr
     areas[pair] = overlap[2]
 
 
-@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS)
+@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=TRUTH)
 def _sphere_loop(
     centers: FloatArray,
     radii: FloatArray,
@@ -169,13 +186,18 @@ def _sphere_loop(
     volumes: FloatArray,
     gradients: FloatArray,
     areas: FloatArray,
-) -> None:
+) -> bool:
+    sure = True
     for pair in range(radii.size):
-        overlap = sphere_overlap(load(centers, pair), radii[pair], load(other_centers, pair), other_radii[pair])
-        _store(pair, overlap, volumes, gradients, areas)
+        center, radius = load(centers, pair), radii[pair]
+        other, other_radius = load(other_centers, pair), other_radii[pair]
+        _store(pair, sphere_overlap(center, radius, other, other_radius), volumes, gradients, areas)
+        lengths = (radius >= 0.0) & (other_radius >= 0.0)
+        sure &= lengths & (reach(center) + radius + reach(other) + other_radius <= LARGEST)
+    return sure
 
 
-@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS)
+@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=TRUTH)
 def _half_space_loop(
     centers: FloatArray,
     radii: FloatArray,
@@ -184,7 +206,11 @@ def _half_space_loop(
     volumes: FloatArray,
     gradients: FloatArray,
     areas: FloatArray,
-) -> None:
+) -> bool:
+    sure = True
     for pair in range(radii.size):
-        overlap = half_space_overlap(load(centers, pair), radii[pair], load(normals, pair), offsets[pair])
-        _store(pair, overlap, volumes, gradients, areas)
+        center, radius, normal, offset = load(centers, pair), radii[pair], load(normals, pair), offsets[pair]
+        _store(pair, half_space_overlap(center, radius, normal, offset), volumes, gradients, areas)
+        lengths = (radius >= 0.0) & (reach(normal) > 2.0 * SMALLEST_NORMAL)
+        sure &= lengths & (reach(center) + radius + reach(normal) + abs(offset) <= LARGEST)
+    return sure

@@ -19,14 +19,23 @@ are right to 1e-9 or better of themselves; with slivers and needles that holds d
 docs/benchmarks.md has the figures.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, overload
 
 import numpy.typing as npt
 
 from common.arrays import FloatArray
-from robot_side.overlap.checks.arguments import broadcast, directions, lengths, numbers, rotations
+from robot_side.overlap.checks.arguments import Check, broadcast, directions, lengths, numbers, plain_rows, rotations
 from robot_side.overlap.closed_forms.solid import Overlaps
-from robot_side.overlap.kernels import box_pairs, half_space_pairs, sphere_pairs, tetrahedron_pairs
+from robot_side.overlap.kernels import (
+    DoubtfulNumbersError,
+    box_pairs,
+    half_space_pairs,
+    sphere_pairs,
+    tetrahedron_pairs,
+)
 
 Array = npt.ArrayLike
 
@@ -48,14 +57,7 @@ def sphere_sphere(
     centers: Array, radii: Array, other_centers: Array, other_radii: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
     """Overlap with the spheres `other_centers` (..., 3), `other_radii` (...) in m; see this module."""
-    arguments = (
-        numbers("centers", centers, (3,)),
-        lengths("radii", radii),
-        numbers("other_centers", other_centers, (3,)),
-        lengths("other_radii", other_radii),
-    )
-    shape = broadcast(arguments)
-    return _result(sphere_pairs(*(argument.rows(shape) for argument in arguments)), shape, gradient)
+    return _overlaps(_SPHERES, (centers, radii, other_centers, other_radii), gradient)
 
 
 @overload
@@ -73,14 +75,7 @@ def sphere_half_space(
 
     The normals need not have unit length, but must not be 0.
     """
-    arguments = (
-        numbers("centers", centers, (3,)),
-        lengths("radii", radii),
-        directions("normals", normals),
-        numbers("offsets", offsets),
-    )
-    shape = broadcast(arguments)
-    return _result(half_space_pairs(*(argument.rows(shape) for argument in arguments)), shape, gradient)
+    return _overlaps(_HALF_SPACES, (centers, radii, normals, offsets), gradient)
 
 
 @overload
@@ -118,15 +113,7 @@ def sphere_box(
     `box_half_sizes` half (..., 3) in m. The set is taken for the Q given, however it was rounded; with
     ‖QᵀQ - I‖ > 1e-6 (Frobenius) it is refused.
     """
-    arguments = (
-        numbers("centers", centers, (3,)),
-        lengths("radii", radii),
-        numbers("box_centers", box_centers, (3,)),
-        rotations("box_rotations", box_rotations),
-        lengths("box_half_sizes", box_half_sizes, (3,)),
-    )
-    shape = broadcast(arguments)
-    return _result(box_pairs(*(argument.rows(shape) for argument in arguments)), shape, gradient)
+    return _overlaps(_BOXES, (centers, radii, box_centers, box_rotations, box_half_sizes), gradient)
 
 
 @overload
@@ -139,17 +126,54 @@ def sphere_tetrahedron(
     centers: Array, radii: Array, vertices: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
     """Overlap with the tetrahedra of `vertices` (..., 4, 3) in m, in any order; see this module."""
-    arguments = (
-        numbers("centers", centers, (3,)),
-        lengths("radii", radii),
-        numbers("vertices", vertices, (4, 3)),
-    )
+    return _overlaps(_TETRAHEDRA, (centers, radii, vertices), gradient)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """The overlaps of one kind of solid, and what is asked of each argument: its name and last dimensions."""
+
+    pairs: Callable[..., Overlaps]
+    arguments: tuple[tuple[Check, str, tuple[int, ...]], ...]
+
+    @cached_property
+    def trailing(self) -> tuple[tuple[int, ...], ...]:
+        return tuple(trailing for _, _, trailing in self.arguments)
+
+
+_CENTERS_AND_RADII = (numbers, "centers", (3,)), (lengths, "radii", ())
+_SPHERES = _Kind(sphere_pairs, (*_CENTERS_AND_RADII, (numbers, "other_centers", (3,)), (lengths, "other_radii", ())))
+_HALF_SPACES = _Kind(half_space_pairs, (*_CENTERS_AND_RADII, (directions, "normals", (3,)), (numbers, "offsets", ())))
+_BOXES = _Kind(
+    box_pairs,
+    (
+        *_CENTERS_AND_RADII,
+        (numbers, "box_centers", (3,)),
+        (rotations, "box_rotations", (3, 3)),
+        (lengths, "box_half_sizes", (3,)),
+    ),
+)
+_TETRAHEDRA = _Kind(tetrahedron_pairs, (*_CENTERS_AND_RADII, (numbers, "vertices", (4, 3))))
+
+
+def _overlaps(kind: _Kind, given: tuple[Array, ...], gradient: bool) -> FloatArray | Overlaps:
+    # What is plain goes straight to the kernels, which find out in passing whether numbers are in doubt.
+    plain = plain_rows(given, kind.trailing)
+    if plain is not None:
+        rows, shape = plain
+        try:
+            return _result(kind.pairs(*rows, vouched=False), shape, gradient)
+        except DoubtfulNumbersError:
+            pass
+    arguments = [check(name, value, last) for (check, name, last), value in zip(kind.arguments, given, strict=True)]
     shape = broadcast(arguments)
-    return _result(tetrahedron_pairs(*(argument.rows(shape) for argument in arguments)), shape, gradient)
+    return _result(kind.pairs(*(argument.rows(shape) for argument in arguments)), shape, gradient)
 
 
 def _result(overlaps: Overlaps, shape: tuple[int, ...], gradient: bool) -> FloatArray | Overlaps:
     volumes, gradients, areas = overlaps
+    if len(shape) == 1:
+        return overlaps if gradient else volumes
     if not gradient:
         return volumes.reshape(shape)
     return volumes.reshape(shape), gradients.reshape(*shape, 3), areas.reshape(shape)

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,6 +20,16 @@ if TYPE_CHECKING:
 _EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
 _MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
 """What a mesh describes, unless it is a tetrahedron."""
+
+
+_ARRAYS: Final = {
+    "sphere": ("_radii_m",),
+    "box": ("_box_offsets_m", "_box_half_sizes_m"),
+    "tetrahedron": ("_corners_m",),
+    "mesh": ("_mesh_index",),
+    "plane": (),
+}
+"""Of each kind those with a row for each primitive, besides geoms and objects."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +93,18 @@ class ObjectPrimitives:
     def approximated(self) -> tuple[str, ...]:
         """Names of the objects that are seen larger than they are."""
         return tuple(self.volume_errors)
+
+    def only(self, things: IntArray) -> "ObjectPrimitives":
+        """Those of some of the objects, things (m,), rising: by their places among these."""
+        part = copy(self)
+        part._names = tuple(self._names[thing] for thing in things)
+        for kind, arrays in _ARRAYS.items():
+            owners = getattr(self, f"_{kind}_object")
+            kept = np.isin(owners, things)
+            setattr(part, f"_{kind}_object", np.searchsorted(things, owners[kept]))
+            for name in (f"_{kind}_geoms", *arrays):
+                setattr(part, name, getattr(self, name)[kept])
+        return part
 
     def place(
         self,

@@ -52,11 +52,11 @@ class Scene:
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Names of the objects that no joint lets move."""
-        bodies = self.model.geom_bodyid
-        return frozenset(
-            thing.name for thing in self.objects if not self.model.body_weldid[bodies[list(thing.geoms)]].any()
-        )
+        """Names of the objects that no joint lets move, and nobody else does."""
+        model = self.model
+        movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
+        moves = movable[model.geom_bodyid]
+        return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
 
     @property
     def approximated(self) -> tuple[str, ...]:

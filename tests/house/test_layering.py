@@ -28,11 +28,12 @@ ARROWS = """
     common/sockets: common common/files
     common/command: common common/emulation common/files common/recording
 
-    robot_side/compiled: common
+    robot_side/compiled: common common/companion common/files
     robot_side/overlap/checks: common robot_side/compiled
     robot_side/overlap/digits: common robot_side/compiled
     robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
-    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
+    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
+        robot_side/overlap/closed_forms
     robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
     robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
         robot_side/overlap/closed_forms
@@ -90,8 +91,8 @@ ARROWS = """
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*
-    feelahead/commands: common/* operator_side/* feelahead/both_sides feelahead/benchmarks/* feelahead/experiments/*
-        feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/approaches feelahead/both_sides
+        feelahead/benchmarks/* feelahead/experiments/* feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of

@@ -9,10 +9,13 @@ import pytest
 from common.errors import ConfigurationError
 from robot_side.ahead.paper_law import PaperLaw
 from robot_side.ahead.swept_law import SweptLaw
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble, build_robot_side
+from robot_side.compiled.kernel import Compiled, imported_kernels
+from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.objects.perceived import Role
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
 from robot_side.simulation.joint_reference import MotionLimits
 from tests.helpers.arm_models import planar_arm
@@ -140,3 +143,48 @@ def test_a_search_for_spheres_is_announced_once_and_only_at_the_first_start(
         ["searching for spheres that cover gripper and objects"] if searches else []
     )
     assert again == []
+
+
+BALL = '<body name="ball" pos="0.9 0 0.3"><freejoint/><geom size="0.02"/></body>'
+WEDGE = '<body name="wedge" pos="0.9 0 0.3"><freejoint/><geom type="mesh" mesh="wedge"/></body>'
+WEDGE_MESH = '<asset><mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/></asset><worldbody>'
+
+
+@pytest.mark.parametrize(
+    ("world", "boxes", "tetrahedra"),
+    [(BALL, False, False), (BOX, True, False), (WEDGE, False, True), (BOX + WEDGE, True, True)],
+    ids=["ball", "box", "tetrahedron", "both"],
+)
+@pytest.mark.parametrize("role", ["obstacle", "ignored"])
+def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
+    tmp_path: Path, world: str, *, boxes: bool, tetrahedra: bool, role: str
+) -> None:
+    model = planar_arm(tmp_path, world=world)
+    model.write_text(model.read_text().replace("<worldbody>", WEDGE_MESH, 1))
+    roles = dict.fromkeys(("carton", "wedge"), Role(role)) if "ball" not in world else {}
+    roles = {name: value for name, value in roles.items() if f'"{name}"' in world}
+    assembled = assemble(RobotSettings(model=model, site="tcp", roles=roles), 1, "clock")
+    needed = {kernel.name.rpartition(".")[2] for kernel in assembled.kernels}
+    assert needed >= {"find", "go_on", "feel"}
+    assert ("overlap_boxes" in needed, "precise_boxes" in needed) == (boxes, boxes)
+    assert ("overlap_tetrahedra" in needed, "precise_tetrahedra" in needed) == (tetrahedra, tetrahedra)
+    every = {kernel.name.rpartition(".")[2] for kernel in imported_kernels()}
+    assert needed | {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"} == every
+
+
+def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = planar_arm(tmp_path, world='<geom name="post" type="box" size="0.05 0.05 0.1" pos="0.33 0 0.8"/>')
+    assembled = assemble(RobotSettings(model=model, site="tcp"), 1, "clock")
+    warm_up(kernels=assembled.kernels)
+    ready = set(assembled.kernels)
+
+    def run(kernel: Compiled, *arguments: Any) -> Any:
+        assert kernel in ready
+        return kernel._dispatcher(*arguments)
+
+    monkeypatch.setattr(Compiled, "__call__", run)
+    for tick in range(50):
+        assembled.core.tick(0.001 * tick)
+    assert assembled.core.figures.summary()["overlap_mm3"]["max"] > 0.0

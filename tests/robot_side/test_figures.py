@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from common.protocol.uniform_field import uniform_field
-from common.statistics import RunningStatistics
 from robot_side.ahead.law import Sensed
-from robot_side.figures import MOVING_M_S, RunFigures, tick_microseconds
+from robot_side.figures import MOVING_M_S, RunFigures
 from robot_side.objects.perceived import Role
 from robot_side.simulation.ground_truth import Truth
 
@@ -185,14 +184,6 @@ def test_another_target_that_stands_higher_has_not_been_lifted() -> None:
 
 def test_a_target_without_a_height_spoils_nothing() -> None:
     assert lifted_mm((False, np.nan), (False, 0.05), (True, 0.05), (True, 0.15)) == pytest.approx(100.0)
-
-
-def test_tick_times_are_in_microseconds() -> None:
-    times = RunningStatistics()
-    assert tick_microseconds(times) == {"p50": None, "p99": None, "max": None}
-    for milliseconds in range(1, 102):
-        times.add(1e-3 * milliseconds)
-    assert tick_microseconds(times) == pytest.approx({"p50": 51_000.0, "p99": 100_000.0, "max": 101_000.0})
 
 
 def test_a_summary_is_json_and_stays_as_it_was_taken() -> None:

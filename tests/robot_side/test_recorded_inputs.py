@@ -45,8 +45,8 @@ COUNTS = st.tuples(*(st.integers(0, 5) for _ in ARRAYS))
 
 
 def test_every_array_of_a_frame_is_recorded() -> None:
-    # The last two are for whoever looks, and nothing of the core depends on them.
-    others = {"time_s", "names", "roles", "mesh_library", "positions_m", "rotations"}
+    # Nothing of the core depends on the two before the last, and the last one says nothing that the arrays do not.
+    others = {"time_s", "names", "roles", "mesh_library", "positions_m", "rotations", "since"}
     assert {field.name for field in fields(PerceivedObjects)} == {*ARRAYS, *others}
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from feelahead.both_sides.processes import SideProcess
 from feelahead.experiments.faults.two_machines import Machine
+from robot_side.compiled.machine_code import machine_code_folder
 from tests.helpers.repository import ROOT
 from tests.kernel.waiting import CheckError, require, wait_until
 
@@ -48,6 +49,7 @@ class Host:
             "HOME": str(self.home),
             "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",
             "PYTHONPATH": str(ROOT),
+            "NUMBA_CACHE_DIR": str(machine_code_folder()),  # each would compile for half a minute
         }
         given = folders | variables | self.also
         return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]

@@ -15,11 +15,12 @@ from feelahead.benchmarks.felt.plain_feel import Look, PlainLooks, plain_overlap
 from feelahead.benchmarks.felt.plain_ways import plain_ways, primitives, statistical_m
 from feelahead.benchmarks.felt.recorded_ticks import Recorded, Tick
 from robot_side.ahead.explanation import moved_and_inflated
-from robot_side.ahead.field import Ahead, Along, Field
+from robot_side.ahead.field import ALL, Ahead, Along, Field
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.looks import L2, R2, Looks
 from robot_side.ahead.scene_table import SceneTable
 from robot_side.ahead.swept_law import SweptLaw
+from robot_side.ahead.turns import Prospect
 from robot_side.arm.ability import Ability
 from robot_side.arm.port import GripperPose
 
@@ -49,19 +50,28 @@ class _BesideAhead(Ahead):
     differences: Differences
     plain_m: FloatArray
     asked: tuple[GripperPose, SceneTable, IntArray, Along]
+    widest_m: float
 
-    def look(
+    def begin(
         self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, widest_m: float = np.inf
-    ) -> Field:
+    ) -> None:
         """As any."""
-        found = super().look(pose, scene, standing, along, widest_m)
-        plain_m = plain_ways(pose, scene.objects, standing, along, widest_m, self.encoder_sigma_rad)
+        super().begin(pose, scene, standing, along, widest_m)
+        self.asked, self.widest_m = (pose, scene, standing, along), widest_m
+
+    def go_on(self, most: int = ALL) -> Field | None:
+        """As any."""
+        found = super().go_on(most)
+        if found is None:
+            return None
+        pose, scene, standing, along = self.asked
+        plain_m = plain_ways(pose, scene.objects, standing, along, self.widest_m, self.encoder_sigma_rad)
         self.differences.looks += 1
         self.differences.ways += int(np.isfinite(plain_m).sum())
         self.differences.take("ways of a look, m", found.ways_m, plain_m)
         sigma_m = statistical_m(pose, along, self.encoder_sigma_rad)[0].max()
         self.differences.take("largest D_σ of a look, m", found.sigma_m, sigma_m)
-        self.plain_m, self.asked = plain_m, (pose, scene, standing, along)
+        self.plain_m = plain_m
         return found
 
 
@@ -113,20 +123,23 @@ class _BesideLooks(Looks):
 class BesideLaw(SweptLaw):
     """The law, whose every tick is worked out plainly, too."""
 
-    _now: Situation
+    _began: Situation
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.differences = Differences()
         self._beside = _BesideAhead(self.ahead.encoder_sigma_rad)
         self._beside.differences = self.differences
-        self.ahead = self._beside
+        self.ahead = self.turns.ahead = self._beside
         self._kept = _BesideLooks(self._beside, self._plain_overlap_m3)
-        self._looks = self._kept
+        self.turns.looks = self._kept
+
+    def _prospect(self, side: int, situation: Situation, pose: GripperPose) -> Prospect:
+        self._began = situation
+        return super()._prospect(side, situation, pose)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick."""
-        self._now = situation
         sensed = super().sense(situation, now_s)
         stick_speed_m_s = self._motion.stick_speed_m_s * min(math.hypot(*situation.lateral), 1.0)
         plain = self._kept.plain.felt(situation, stick_speed_m_s, touch_speed_m_s(self._motion.trigger_speed_m_s))
@@ -147,11 +160,11 @@ class BesideLaw(SweptLaw):
     def _plain_overlap_m3(self, side: int, place: int) -> float:
         """Of the gripper in the last look, moved by the robot side's δ; only along the side that leads."""
         pose, scene, standing, along = self._beside.asked
-        velocity = pose.tool_jacobian[:3] @ self._now.joint_velocities_rad_s
-        speed_m_s = float(velocity @ self._now.pose.tool_rotation[:, 2])
+        velocity = pose.tool_jacobian[:3] @ self._began.joint_velocities_rad_s
+        speed_m_s = float(velocity @ self._began.pose.tool_rotation[:, 2])
         if place != 0 or side != (R2 if speed_m_s >= 0.0 else L2):
             return 0.0
-        moved_m = abs(speed_m_s) * self._now.loop_age_s * along.direction
+        moved_m = abs(speed_m_s) * self._began.loop_age_s * along.direction
         sigma_m, _ = statistical_m(pose, along, self._beside.encoder_sigma_rad)
         return plain_overlap_m3(moved_and_inflated(pose, moved_m, sigma_m), primitives(scene.objects), standing)
 

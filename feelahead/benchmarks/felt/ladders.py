@@ -3,8 +3,8 @@
 from typing import Final
 
 from feelahead.benchmarks.felt.turning import COVER_M, Turned
-from robot_side.ahead.nodes import NODES_PER_MARGIN
-from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.ahead.ask import NODES_PER_MARGIN
+from robot_side.ahead.turns import FIELD_PERIOD_S
 
 RATE: Final = "field rate"
 LATE: Final = "a look is late"

@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.ask import NOTHING
-from robot_side.ahead.nodes import NODES_PER_MARGIN
+from robot_side.ahead.ask import NODES_PER_MARGIN, NOTHING
 from robot_side.ahead.tables import NODES, STRENGTHS
 
 _PARTS: Final = 8

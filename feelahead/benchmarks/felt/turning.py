@@ -9,10 +9,11 @@ from functools import partial
 from typing import Any, Final
 
 from feelahead.approaches.approach import Approach, robot_settings
+from robot_side.ahead.ask import NODES_PER_MARGIN
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.looks import Looks
-from robot_side.ahead.nodes import NODES_PER_MARGIN
-from robot_side.ahead.swept_law import FIELD_PERIOD_S, SweptLaw
+from robot_side.ahead.swept_law import SweptLaw
+from robot_side.ahead.turns import FIELD_PERIOD_S
 from robot_side.settings import RobotSettings
 
 COVER_M: Final = RobotSettings().cover_m
@@ -77,7 +78,7 @@ class LateLaw(SweptLaw):
     def __init__(self, late_ticks: int, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._late = LateLooks(late_ticks)
-        self._looks = self._late
+        self.turns.looks = self._late
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick."""
@@ -100,12 +101,12 @@ def exchanged(module_name: str, **by_name: Any) -> Iterator[None]:
 def turned(how: Turned) -> Iterator[None]:
     """Have whatever is built and run within it be so, in this process; what has no parameter of its own by its name."""
     with ExitStack() as stack:
-        stack.enter_context(exchanged("robot_side.ahead.swept_law", FIELD_PERIOD_S=how.period_s))
+        for name in ("swept_law", "turns"):
+            stack.enter_context(exchanged(f"robot_side.ahead.{name}", FIELD_PERIOD_S=how.period_s))
         if how.late_ticks:
             stack.enter_context(exchanged("robot_side.assembly", SweptLaw=partial(LateLaw, how.late_ticks)))
         if how.nodes != NODES_PER_MARGIN:
-            for name in ("nodes", "ask"):
-                stack.enter_context(exchanged(f"robot_side.ahead.{name}", NODES_PER_MARGIN=how.nodes))
+            stack.enter_context(exchanged("robot_side.ahead.ask", NODES_PER_MARGIN=how.nodes))
         if how.cover_m != COVER_M:
             settings = partial(_covered, robot_settings, how.cover_m)
             stack.enter_context(exchanged("feelahead.approaches.approach", robot_settings=settings))

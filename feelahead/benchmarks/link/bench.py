@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import Progress
@@ -24,6 +25,7 @@ from common.realtime.pacing import SPIN_S
 from feelahead.benchmarks.link.real import HEADER, Plan, RealRun, cpu_s, run_real
 from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band, table
 from feelahead.benchmarks.link.samples import LinkSample, play, read_link_sample
+from feelahead.benchmarks.link.turns import KINDS, OURS, Kind, Share, ratio, take_turns
 from feelahead.benchmarks.report import Goal, Table, show, show_goals
 
 PROGRAM = "feelahead bench link"
@@ -33,6 +35,7 @@ _CPU_LIMIT = 0.20
 _BASELINE = 3000
 """Messages without a link, to tell the emulation's cost from that of sockets and pacing."""
 _SEEDS, _PAIRS = 20, 200
+_TURNS, _TURN_S = 7, 1.0
 _REAL_MOMENT_LIMIT_MS = 0.5
 
 
@@ -41,9 +44,10 @@ class LinkBenchSettings:
     """What the emulated link does to messages, beside what was asked, and beside a recording of a real link.
 
     In real time: two processes on this machine send to each other over ZeroMQ, each delaying what it sends. Shown are
-    how late messages were released, the delays from sending to reception, and the processor time, beside that of bare
-    ZeroMQ and bare UDP sockets which do the same. With --virtual,
-    nothing waits: the model alone, message by message, the same on every machine but for the time taken.
+    how late messages were released, the delays from sending to reception, and the processor time; then, in turns and
+    without a link, that of both whole ends, with protocol and session, of their sockets alone, and of bare ZeroMQ and
+    bare UDP sockets. With --virtual, nothing waits: the model alone, message by message, the same on every machine but
+    for the time taken.
 
     Try: feelahead bench link --link "delay 50ms 10ms distribution normal loss 1%" --count 3000
          feelahead bench link --link "delay 50ms 10ms distribution normal" --virtual
@@ -198,19 +202,18 @@ def _real(
     # What rests instead of spinning, with and without parts of it: where the processor time goes.
     resting = dataclasses.replace(plan, count=min(plan.count, _BASELINE), spin_s=0.0)
     without = dataclasses.replace(resting, link=LinkSpec())
-    costs = {
-        "without spinning": resting,
-        "without a link either": without,
-        "bare ZeroMQ": dataclasses.replace(without, transport="bare ZeroMQ"),
-        "bare UDP": dataclasses.replace(without, transport="bare UDP"),
-    }
-    bar = progress.add_task("messages", total=(plan.count + len(costs) * resting.count) * plan.period_s)
+    costs = {"without spinning": resting, "without a link either": without}
+    turn_s, turns_count = min(_TURN_S, plan.count * plan.period_s), min(_TURNS, 1 + plan.count // 1000)
+    bar = progress.add_task(
+        "messages", total=(plan.count + len(costs) * resting.count) * plan.period_s + turns_count * len(KINDS) * turn_s
+    )
     try:
         run = run_real(plan, lambda passed_s: progress.advance(bar, passed_s))
         shares = {
             name: run_real(one, lambda passed_s: progress.advance(bar, passed_s)).cpu_share
             for name, one in costs.items()
         }
+        turns = take_turns(turn_s, turns_count, plan.period_s, lambda passed_s: progress.advance(bar, passed_s))
     except TimeoutError as error:
         raise FeelaheadError(f"{error}; is the machine too busy?") from error
     except PermissionError as error:
@@ -220,6 +223,7 @@ def _real(
     ends = {"to_operator": run.robot.line, "to_robot": run.operator.line}
     _show_lines(console, ends)
     show(console, _end_to_end(run))
+    show(console, _beside_bare(turns))
     goals = [
         Goal(f"release error p99 of {name}, us", end["achieved"]["release_error_us"]["p99"], _RELEASE_LIMIT_US)
         for name, end in ends.items()
@@ -228,6 +232,10 @@ def _real(
     goals.append(Goal("share of one core, both ends together", run.cpu_share, _CPU_LIMIT, detail=detail))
     added = shares["without spinning"] - shares["without a link either"]
     goals.append(Goal("share of one core that the emulation adds, without spinning", added, _CPU_LIMIT))
+    goals += [
+        Goal(f"{kind} by bare ZeroMQ, share of a core without spinning", ratio(turns[kind], turns["bare ZeroMQ"]), 1.3)
+        for kind in OURS
+    ]
     sample = run.sample("to_operator")
     if reference is not None:
         kept, stalls = reference.without_stalls(profile)
@@ -279,6 +287,20 @@ def _end_to_end(run: RealRun) -> Table:
         "p1 / p50 / p95 / p99, ms",
     )
     return Table("From sending to reception", columns, rows, "Lost includes what the socket refused (unsent).")
+
+
+def _beside_bare(turns: dict[Kind, list[Share]]) -> Table:
+    rows = [
+        (
+            kind,
+            *(f"{np.median([getattr(one, name) for one in found]):.3f}" for name in ("robot", "operator", "both")),
+            f"{np.median([one.sent_per_s for one in found]):.0f}",
+            *(f"{ratio(found, turns[peer]):.2f}" for peer in ("bare ZeroMQ", "bare UDP")),
+        )
+        for kind, found in turns.items()
+    ]
+    columns = ("share of a core", "robot", "operator", "both", "messages/s", "by bare ZeroMQ", "by bare UDP")
+    return Table("Without spinning and without a link, in turns", columns, rows, "Medians over the turns.")
 
 
 def _quantiles(values: Any) -> list[float]:

@@ -1,6 +1,6 @@
-"""The ends that the benchmark's exchange is compared with: bare UDP and bare ZeroMQ, which no side speaks.
+"""Sockets reduced to what a measurement needs: the robot side's, bare ZeroMQ ones and bare UDP.
 
-They show what pacing, waking and Python cost by themselves, and what ZeroMQ's own threads add to it.
+The bare ones show what waking and Python cost by themselves, and what ZeroMQ's own threads add to it.
 """
 
 import select
@@ -10,7 +10,10 @@ from typing import Protocol, Self
 
 import zmq
 
+from common.sockets.robot import RobotSockets
+
 _LARGEST_BYTES = 65536
+_EVENTS, _POLLIN = int(zmq.EVENTS), int(zmq.POLLIN)
 
 
 class Link(Protocol):
@@ -78,11 +81,11 @@ class DatagramLink:
 
 
 class BareZeroMQLink:
-    """A PAIR socket over TCP on loopback: it binds, or connects to `address`."""
+    """A ROUTER that binds over TCP on loopback, or a DEALER that connects to `address`, with nothing around it."""
 
     def __init__(self, address: str | None = None) -> None:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket = self._context.socket(zmq.PAIR)
+        self._socket = self._context.socket(zmq.ROUTER if address is None else zmq.DEALER)
         self._socket.setsockopt(zmq.LINGER, 0)
         if address is None:
             self._socket.bind("tcp://127.0.0.1:*")
@@ -91,6 +94,8 @@ class BareZeroMQLink:
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
         """Where to reach this end."""
         self._descriptor = self._socket.fileno()
+        self._routes = address is None
+        self._peer: bytes | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -103,15 +108,19 @@ class BareZeroMQLink:
     def receive(self) -> list[bytes]:
         """Everything that has arrived, oldest first."""
         received: list[bytes] = []
-        while True:
-            try:
-                received.append(self._socket.recv(zmq.NOBLOCK))
-            except zmq.Again:
-                return received
+        while self._readable():
+            if self._routes:
+                self._peer = self._socket.recv(zmq.NOBLOCK)
+            received.append(self._socket.recv(zmq.NOBLOCK))
+        return received
 
     def send(self, payload: bytes) -> bool:
-        """Send to the other end; False when that cannot be done at once."""
+        """Send to the other end; False when nobody is known there, or it cannot be done at once."""
         try:
+            if self._routes:
+                if self._peer is None:
+                    return False
+                self._socket.send(self._peer, zmq.NOBLOCK | zmq.SNDMORE)
             self._socket.send(payload, zmq.NOBLOCK)
         except zmq.Again:
             return False
@@ -125,4 +134,27 @@ class BareZeroMQLink:
 
     def _readable(self) -> bool:
         # The descriptor tells of changes only, and a send may have taken notice of one.
-        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
+        return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
+
+
+class RobotLink:
+    """The robot side's sockets as the end of a link to whoever spoke last."""
+
+    def __init__(self, sockets: RobotSockets) -> None:
+        self._sockets = sockets
+        self._peer = b""
+
+    def receive(self) -> list[bytes]:
+        """Everything that has arrived, oldest first."""
+        received = self._sockets.receive()
+        if received:
+            self._peer = received[-1][0]
+        return [payload for _, payload in received]
+
+    def send(self, payload: bytes) -> bool:
+        """Send to the other end; whether that could be done at once."""
+        return self._sockets.send(self._peer, payload)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for something to arrive; whether it has."""
+        return self._sockets.wait(timeout_s)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from common.realtime.pacing import SPIN_S, Pacer, wait_for_turn
 from common.realtime.priority import raise_priority, schedule_realtime
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
-from feelahead.benchmarks.link.peers import BareZeroMQLink, DatagramLink, Link
+from feelahead.benchmarks.link.peers import Link, RobotLink
 from feelahead.benchmarks.link.samples import LinkSample
 
 HEADER = struct.Struct("<qd")
@@ -50,8 +50,6 @@ class Plan:
     """How long both ends keep the processor busy before what is due."""
     realtime: bool = False
     """Whether both ends ask for SCHED_FIFO."""
-    transport: Literal["sides", "bare ZeroMQ", "bare UDP"] = "sides"
-    """The sides' own sockets, or what they are compared with."""
 
 
 @dataclass(frozen=True)
@@ -86,24 +84,6 @@ class RealRun:
         """The messages of one direction."""
         sender, receiver = (self.robot, self.operator) if direction == "to_operator" else (self.operator, self.robot)
         return LinkSample(sender.sent_s, receiver.received_s - sender.sent_s)
-
-
-class _RobotLink:
-    def __init__(self, sockets: RobotSockets) -> None:
-        self._sockets = sockets
-        self._peer = b""
-
-    def receive(self) -> list[bytes]:
-        received = self._sockets.receive()
-        if received:
-            self._peer = received[-1][0]
-        return [payload for _, payload in received]
-
-    def send(self, payload: bytes) -> bool:
-        return self._sockets.send(self._peer, payload)
-
-    def wait(self, timeout_s: float) -> bool:
-        return self._sockets.wait(timeout_s)
 
 
 def run_real(plan: Plan, waiting: Callable[[float], object]) -> RealRun:
@@ -151,26 +131,17 @@ def _next(pipe: Connection, child: BaseProcess, waiting: Callable[[float], objec
 
 def _robot_process(plan: Plan, results: Connection) -> None:
     def run() -> None:
-        if plan.transport == "sides":
-            with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
-                results.send((sockets.control_endpoint, sockets.view_endpoint))
-                _run_and_stay(plan, "to_operator", _RobotLink(sockets), results)
-            return
-        with DatagramLink() if plan.transport == "bare UDP" else BareZeroMQLink() as link:
-            results.send(link.address)
-            _run_and_stay(plan, "to_operator", link, results)
+        with RobotSockets("tcp://127.0.0.1:0", "tcp://127.0.0.1:0") as sockets:
+            results.send((sockets.control_endpoint, sockets.view_endpoint))
+            _run_and_stay(plan, "to_operator", RobotLink(sockets), results)
 
     _guarded(plan, run, results)
 
 
 def _operator_process(plan: Plan, address: Any, results: Connection) -> None:
     def run() -> None:
-        if plan.transport == "sides":
-            with OperatorSockets(*address) as sockets:
-                _run_and_stay(plan, "to_robot", sockets, results)
-            return
-        with DatagramLink(address) if plan.transport == "bare UDP" else BareZeroMQLink(address) as link:
-            _run_and_stay(plan, "to_robot", link, results)
+        with OperatorSockets(*address) as sockets:
+            _run_and_stay(plan, "to_robot", sockets, results)
 
     _guarded(plan, run, results)
 

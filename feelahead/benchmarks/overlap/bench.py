@@ -23,12 +23,15 @@ from feelahead.benchmarks.overlap.goals import judge
 from feelahead.benchmarks.overlap.meshes import measure_meshes
 from feelahead.benchmarks.overlap.peers import SDIST, HeaderPeer, PythonPeer
 from feelahead.benchmarks.overlap.plots import draw
-from feelahead.benchmarks.overlap.speed import measure_speed, partial_pairs
 from feelahead.benchmarks.overlap.stress import count_failures
-from feelahead.benchmarks.overlap.timing import available_cores
+from feelahead.benchmarks.overlap.times.call_sizes import measure_call_sizes
+from feelahead.benchmarks.overlap.times.speed import BATCH, measure_speed, partial_pairs
+from feelahead.benchmarks.overlap.times.timing import available_cores
+from feelahead.benchmarks.overlap.times.widths import measure_widths
 from feelahead.benchmarks.overlap.tiny import measure_directions, measure_tiny
 from feelahead.benchmarks.overlap.tradeoff import measure_tradeoff
 from feelahead.benchmarks.report import Report, Table, markdown, show, show_goals, write_csv
+from robot_side.compiled.processor import processor_name
 from robot_side.overlap import warm_up
 
 PROGRAM = "feelahead bench overlap"
@@ -67,7 +70,7 @@ class OverlapBenchSettings:
     truths: Annotated[int | None, tyro.conf.arg(metavar="PAIRS")] = None
     """How many pairs of each class are compared with the truth; 40 unless given, 6 with --quick."""
     timed: Annotated[int | None, tyro.conf.arg(metavar="PAIRS")] = None
-    """How many pairs are timed at once; 20000 unless given."""
+    """How many pairs are timed, in batches of 4096; 20480 unless given."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Of the pairs: another seed gives others of the same classes."""
 
@@ -113,12 +116,15 @@ def measure(settings: OverlapBenchSettings, header_peer: HeaderPeer, progress: P
     clock, report, python_peer = MonotonicClock(), Report(), PythonPeer()
     steps = progress.add_task("benchmark", total=7)
     report.add("start", "ours", "all", "kernels", {"warm-up": (warm_up(), "s")})
-    repeats = 5 if settings.quick else 15
-    timed = settings.timed or 20_000
-    measure_speed(report, (python_peer, header_peer), progress, timed, repeats, clock)
+    repeats, turns = (5, 5) if settings.quick else (15, 20)
+    timed = settings.timed or 5 * BATCH
+    measure_speed(report, (python_peer, header_peer), progress, timed, turns, clock)
+    measure_call_sizes(report, progress, timed, turns, clock)
+    if not settings.quick:
+        measure_widths(report, progress, turns)
     progress.advance(steps)
     measure_distances(report, partial_pairs("box", min(timed, 2000)), repeats, clock)
-    measure_meshes(report, progress, min(timed, 500), repeats, 2 if settings.quick else 6, clock, small=timed < 1000)
+    measure_meshes(report, progress, min(timed, 500), turns, 2 if settings.quick else 6, clock, small=timed < 1000)
     progress.advance(steps)
     truths = settings.truths or (6 if settings.quick else 40)
     samples = draw_samples(frozen_classes(truths, settings.seed), progress)
@@ -134,7 +140,7 @@ def measure(settings: OverlapBenchSettings, header_peer: HeaderPeer, progress: P
     progress.advance(steps)
     measure_tradeoff(report, samples, (python_peer, header_peer), clock, progress, quick=settings.quick)
     progress.advance(steps)
-    judge(report)
+    judge(report, processor())
     return report
 
 
@@ -146,7 +152,7 @@ def _machine(settings: OverlapBenchSettings) -> Table:
         except importlib.metadata.PackageNotFoundError:
             versions.append((package, "not installed"))
     rows = [
-        ("processor", _processor()),
+        ("processor", processor()),
         ("cores", str(available_cores())),
         ("system", f"{platform.system()} {platform.machine()}"),
         ("versions", ", ".join(f"{name} {version}" for name, version in versions)),
@@ -155,7 +161,8 @@ def _machine(settings: OverlapBenchSettings) -> Table:
     return Table("Machine", ("", "value"), rows)
 
 
-def _processor() -> str:
+def processor() -> str:
+    """What this machine calls its processor, what LLVM takes it for, and its widest vectors."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -163,7 +170,7 @@ def _processor() -> str:
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     flags = next((line for line in lines if line.startswith("flags")), "")
     vectors = "AVX-512" if " avx512f" in flags else "AVX2" if " avx2" in flags else "no AVX2"
-    return f"{names[0] if names else platform.processor() or 'unknown'} ({vectors})"
+    return f"{names[0] if names else platform.processor() or 'unknown'} ({processor_name()}, {vectors})"
 
 
 def _write(settings: OverlapBenchSettings, report: Report, tables: list[Table]) -> None:

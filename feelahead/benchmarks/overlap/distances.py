@@ -13,7 +13,7 @@ import numpy as np
 
 from common.clock import Clock
 from feelahead.benchmarks.overlap.pairs import Pairs
-from feelahead.benchmarks.overlap.timing import nanoseconds_each, one_core
+from feelahead.benchmarks.overlap.times.timing import nanoseconds_each, one_core
 from feelahead.benchmarks.report import Report, Table, short
 
 _CALLS = 2000
@@ -37,7 +37,7 @@ def measure_distances(report: Report, pairs: Pairs, repeats: int, clock: Clock) 
         rows.append((name, short(time_ns)))
     ours = report.value("speed", "ours, a call each", "box", "partial", "time")
     rows += [] if ours is None else [("our overlap, checked, a call each", short(ours))]
-    ours = report.value("speed", "ours, kernel, gradient", "box", "partial", "time")
+    ours = report.value("speed", "ours, kernel", "box", "partial", "time")
     rows += [] if ours is None else [("our overlap with gradient, kernel, batch", short(ours))]
     report.tables.append(
         Table(

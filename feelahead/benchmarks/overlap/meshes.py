@@ -9,7 +9,7 @@ from rich.progress import Progress
 from common.arrays import FloatArray, IntArray
 from common.clock import Clock
 from feelahead.benchmarks.overlap.contact import nearest_points
-from feelahead.benchmarks.overlap.timing import ROUNDS, nanoseconds_each, one_core
+from feelahead.benchmarks.overlap.times.timing import in_turns, short_calls
 from feelahead.benchmarks.overlap.truth import true_mesh_overlap
 from feelahead.benchmarks.report import Report, Table, short
 from robot_side import overlap
@@ -18,6 +18,8 @@ TORUS = (1.0, 0.35)
 """Radii (m) of the ring and of its tube."""
 FEW_TRIANGLES = 50
 """Up to so many triangles a query is to cost less than 20 boxes."""
+_AT_ONCE = 250
+"""Queries of a call."""
 _RADII = (0.004, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.12, 0.15, 0.25, 0.4, 0.6)
 
 
@@ -42,7 +44,7 @@ def torus(around: int, across: int) -> tuple[FloatArray, IntArray]:
 
 
 def measure_meshes(
-    report: Report, progress: Progress, queries: int, repeats: int, truths: int, clock: Clock, *, small: bool
+    report: Report, progress: Progress, queries: int, turns: int, truths: int, clock: Clock, *, small: bool
 ) -> None:
     """Add the time of a query for spheres of several radii, and the worst error of `truths` of them.
 
@@ -64,24 +66,30 @@ def measure_meshes(
         centers = _near_surface(rng, queries, radius)
         radii = np.full(queries, radius)
         touched = float(np.mean([_touched(vertices, triangles, center, radius) for center in centers[:20]]))
-        times = []
-        for gradient in (False, True):
-            run = partial(mesh.overlap, centers, radii, gradient=gradient)
-            with one_core():
-                times.append(min(nanoseconds_each(run, queries, repeats, clock) for _ in range(ROUNDS)))
+        parts = [slice(first, first + _AT_ONCE) for first in range(0, queries, _AT_ONCE)]
+        contenders = [
+            short_calls(
+                name,
+                [partial(mesh.overlap, centers[part], radii[part], gradient=gradient) for part in parts],
+                queries,
+                clock,
+            )
+            for name, gradient in (("time", False), ("time, gradient", True))
+        ]
+        times = in_turns(contenders, turns)
         case = f"radius {radius:g} m"
-        values = {"triangles": (touched, ""), "time": (times[0], "ns/query"), "time, gradient": (times[1], "ns/query")}
+        values = {"triangles": (touched, ""), **{name: (each_ns, "ns/query") for name, each_ns in times.items()}}
         report.add("mesh", "ours", "mesh", case, values)
-        ratio = "" if box_ns is None else short(times[0] / box_ns)
+        ratio = "" if box_ns is None else short(times["time"] / box_ns)
         progress.advance(bar)
-        rows.append((f"{radius:g}", f"{touched:.0f}", short(times[0]), short(times[1]), ratio))
+        rows.append((f"{radius:g}", f"{touched:.0f}", *(short(each_ns) for each_ns in times.values()), ratio))
     report.tables.append(
         Table(
             f"Meshes: a torus of {len(triangles)} triangles",
             ("radius, m", "triangles touched", "ns a query", "with gradient", "times a box"),
             rows,
             "Centres at random depths around the surface; triangles touched are the mean of 20 queries; a box: "
-            "our kernel on partial pairs, above. Both are the best of as many rounds.",
+            f"our kernel on partial pairs, above. Checked calls of {_AT_ONCE} queries.",
         )
     )
     worst = _worst_error(mesh, truths)

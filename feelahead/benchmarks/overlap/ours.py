@@ -36,14 +36,8 @@ def kernel_overlaps(pairs: Pairs) -> Overlaps:
 
 
 def kernel_volumes(pairs: Pairs) -> FloatArray:
-    """Volumes alone, where the kernels can leave out the rest; else with all of it. In one thread."""
-    options = {"gradient": False} if volumes_apart(pairs.solid) else {}
-    return np.asarray(_KERNELS[pairs.solid](*pairs.arguments, **options, **_one_thread(pairs.solid))[0])
-
-
-def volumes_apart(solid: Solid) -> bool:
-    """Whether the kernel can leave out gradients and areas."""
-    return "gradient" in _options(solid)
+    """Their volumes alone."""
+    return np.asarray(kernel_overlaps(pairs)[0])
 
 
 @functools.cache
@@ -52,7 +46,7 @@ def _options(solid: Solid) -> frozenset[str]:
     return frozenset(inspect.signature(_KERNELS[solid]).parameters)
 
 
-def _one_thread(solid: Solid) -> dict[str, int]:
+def _one_thread(solid: Solid) -> dict[str, Any]:
     """Keeps a kernel that would share out many pairs among threads from doing so."""
     return {"threads": 1} if "threads" in _options(solid) else {}
 
@@ -72,6 +66,21 @@ def call_by_call(pairs: Pairs) -> FloatArray:
     """Volumes from the public function, in a call for each pair."""
     function = _PUBLIC[pairs.solid]
     return np.array([function(*arguments) for arguments in zip(*pairs.arguments, strict=True)])
+
+
+def calls(pairs: Pairs, each: int, *, checked: bool) -> Callable[[], object]:
+    """What makes calls of `each` pairs, of the public function with gradients or of the kernel in one thread."""
+    function, options = _KERNELS[pairs.solid], _one_thread(pairs.solid)
+    if checked:
+        function, options = _PUBLIC[pairs.solid], {"gradient": True}
+    call = functools.partial(function, **options)
+    arguments = [pairs[slice(first, first + each)].arguments for first in range(0, len(pairs), each)]
+
+    def run() -> None:
+        for given in arguments:
+            call(*given)
+
+    return run
 
 
 def threaded_volumes(pairs: Pairs, pool: ThreadPoolExecutor, threads: int) -> FloatArray:

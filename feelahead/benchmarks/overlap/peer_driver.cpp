@@ -2,8 +2,8 @@
 //
 // Usage: peer_driver PAIRS VOLUMES REPEATS
 // PAIRS: int64 count, int64 corners (4 or 8), then for each pair 3 + 1 + 3 * corners doubles: centre, radius,
-// corners. VOLUMES: count doubles; NaN where the header throws. Standard output: two numbers, the median
-// nanoseconds a pair of building the spheres and elements, and of overlap_volume() on the built ones.
+// corners. VOLUMES: count doubles; NaN where the header throws. Standard output: two lines with a number for each part
+// of 128 pairs, the least nanoseconds of building its spheres and elements, and of overlap_volume() on the built ones.
 
 #include <algorithm>
 #include <array>
@@ -21,51 +21,58 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double nanoseconds_each(Clock::time_point start, std::size_t count) {
+constexpr std::size_t at_once = 128;
+
+void keep_least(double& least, Clock::time_point start) {
   const std::chrono::duration<double, std::nano> elapsed = Clock::now() - start;
-  return elapsed.count() / static_cast<double>(count);
+  least = std::min(least, elapsed.count());
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+void print(const std::vector<double>& numbers) {
+  for (const double number : numbers) std::printf("%.1f ", number);
+  std::printf("\n");
 }
 
 template<typename Element, std::size_t Corners>
 int run(const std::vector<double>& numbers, std::size_t count, int repeats, const char* path) {
   constexpr std::size_t stride = 4 + 3 * Corners;
-  std::vector<double> building, overlapping, volumes(count);
+  const std::size_t parts = (count + at_once - 1) / at_once;
+  const double never = std::numeric_limits<double>::infinity();
+  std::vector<double> building(parts, never), overlapping(parts, never), volumes(count);
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    std::vector<overlap::Sphere> spheres;
-    std::vector<Element> elements;
-    spheres.reserve(count);
-    elements.reserve(count);
-    const auto before = Clock::now();
-    for (std::size_t pair = 0; pair < count; ++pair) {
-      const double* row = numbers.data() + pair * stride;
-      std::array<overlap::Vector, Corners> corners;
-      for (std::size_t corner = 0; corner < Corners; ++corner) {
-        const double* at = row + 4 + 3 * corner;
-        corners[corner] = overlap::Vector{at[0], at[1], at[2]};
+    for (std::size_t part = 0; part < parts; ++part) {
+      const std::size_t first = part * at_once, last = std::min(count, first + at_once);
+      std::vector<overlap::Sphere> spheres;
+      std::vector<Element> elements;
+      spheres.reserve(at_once);
+      elements.reserve(at_once);
+      const auto before = Clock::now();
+      for (std::size_t pair = first; pair < last; ++pair) {
+        const double* row = numbers.data() + pair * stride;
+        std::array<overlap::Vector, Corners> corners;
+        for (std::size_t corner = 0; corner < Corners; ++corner) {
+          const double* at = row + 4 + 3 * corner;
+          corners[corner] = overlap::Vector{at[0], at[1], at[2]};
+        }
+        spheres.emplace_back(overlap::Vector{row[0], row[1], row[2]}, row[3]);
+        elements.emplace_back(corners);
       }
-      spheres.emplace_back(overlap::Vector{row[0], row[1], row[2]}, row[3]);
-      elements.emplace_back(corners);
-    }
-    building.push_back(nanoseconds_each(before, count));
-    const auto start = Clock::now();
-    for (std::size_t pair = 0; pair < count; ++pair) {
-      try {
-        volumes[pair] = overlap::overlap_volume(spheres[pair], elements[pair]);
-      } catch (...) {
-        volumes[pair] = std::numeric_limits<double>::quiet_NaN();
+      keep_least(building[part], before);
+      const auto start = Clock::now();
+      for (std::size_t pair = first; pair < last; ++pair) {
+        try {
+          volumes[pair] = overlap::overlap_volume(spheres[pair - first], elements[pair - first]);
+        } catch (...) {
+          volumes[pair] = std::numeric_limits<double>::quiet_NaN();
+        }
       }
+      keep_least(overlapping[part], start);
     }
-    overlapping.push_back(nanoseconds_each(start, count));
   }
   std::ofstream output(path, std::ios::binary);
   output.write(reinterpret_cast<const char*>(volumes.data()), static_cast<std::streamsize>(count * sizeof(double)));
-  std::printf("%.3f %.3f\n", median(building), median(overlapping));
+  print(building);
+  print(overlapping);
   return output.good() ? 0 : 1;
 }
 

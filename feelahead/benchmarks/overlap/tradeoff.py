@@ -15,7 +15,7 @@ from feelahead.benchmarks.overlap import ours as overlap_ours
 from feelahead.benchmarks.overlap.accuracy import Sample
 from feelahead.benchmarks.overlap.pairs import Pairs
 from feelahead.benchmarks.overlap.peers import HeaderPeer, PythonPeer
-from feelahead.benchmarks.overlap.timing import available_cores, nanoseconds_each
+from feelahead.benchmarks.overlap.times.timing import available_cores, nanoseconds_each
 from feelahead.benchmarks.report import Report, Table, short
 
 _BATCH = 4000
@@ -79,7 +79,6 @@ def _methods(
     found = [
         Method("ours, a call each", overlap_ours.call_by_call, rows=200),
         Method("ours, batch", overlap_ours.kernel_volumes, batch=_BATCH),
-        Method("ours, batch, gradient", lambda pairs: overlap_ours.kernel_overlaps(pairs)[0], batch=_BATCH),
         Method(
             f"ours, batch, {threads} threads",
             lambda pairs: overlap_ours.threaded_volumes(pairs, pool, threads),

@@ -16,6 +16,7 @@ from common.arrays import FloatArray
 from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from feelahead.benchmarks.report import Figure, Goal, Table, show, show_goals, write_csv
+from feelahead.benchmarks.tick.allocations import allocations, goals, tables
 from feelahead.benchmarks.tick.timed_robot import AWAY, COLUMNS, STAGES
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.real_time import START_S, run_for
@@ -43,10 +44,14 @@ class TickSettings:
     """4 s each, and 1 000 objects at most."""
     csv: Path | None = None
     """Each figure as a row."""
+    allocations: int | None = None
+    """Instead: whether memory stays flat over so many ticks in virtual time, and what allocates arrays; on Linux."""
 
     def __post_init__(self) -> None:
         if not 3.0 <= self.seconds <= 600.0:
             raise ValueError(f"--seconds {self.seconds}: valid: 3 to 600")
+        if self.allocations is not None and not 100 <= self.allocations <= 100_000_000:
+            raise ValueError(f"--allocations {self.allocations}: valid: 100 to 100000000")
         if not all(0 < count <= 1_000_000 for count in self.objects):
             raise ValueError(f"--objects {self.objects}: valid: 1 to 1000000 each")
 
@@ -91,6 +96,8 @@ class Ticks:
 def bench_tick(arguments: Sequence[str]) -> int:
     """Measure, print, and compare with the goals."""
     settings = parse_settings(TickSettings, _PROGRAM, arguments)
+    if settings.allocations is not None:
+        return _bench_allocations(settings.allocations, settings.csv)
     counts = [count for count in settings.objects if not (settings.quick and count > 1_000)]
     cases = [
         Case("demo, each stage timed"),
@@ -115,6 +122,18 @@ def bench_tick(arguments: Sequence[str]) -> int:
     show_goals(console, _goals({ticks.name: ticks for ticks in found}))
     if settings.csv is not None:
         write_csv(settings.csv, [figure for ticks in found for figure in _figures(ticks)])
+    return 0
+
+
+def _bench_allocations(ticks: int, csv: Path | None) -> int:
+    console, found = Console(width=100 if not sys.stdout.isatty() else None), allocations(ticks)
+    for table in tables(found):
+        show(console, table)
+    show_goals(console, goals(found))
+    if csv is not None:
+        places = [(f"{line.place} bytes", line.bytes_a_tick, "B") for line in found.lines]
+        resident = [("resident", value, "MB") for value in found.resident_mb]
+        write_csv(csv, [Figure("tick", "ours", "", "allocations", *each) for each in (*resident, *places)])
     return 0
 
 

@@ -6,7 +6,8 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.objects.movers import OF_OBJECTS, Movers
+from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """Of the built-in table's things."""
@@ -46,11 +47,35 @@ class Crowd:
         kinds = np.arange(self.count) % len(_KINDS) if one is None else np.full(self.count, one)
         object.__setattr__(self, "kinds", kinds)
 
-    def at(self, time_s: float) -> FloatArray:
-        """Where the centres (n, 3) are: the first `moving` go to and fro."""
-        centers_m: FloatArray = self.centers_m.copy()
-        centers_m[: self.moving, 0] += _FASTEST_M_S * np.sin(time_s + np.arange(self.moving))
+    def at(self, time_s: float, count: int) -> FloatArray:
+        """Where the centres (count, 3) of the first are: the first `moving` go to and fro."""
+        moving, centers_m = min(self.moving, count), self.centers_m[:count].copy()
+        centers_m[:moving, 0] += _FASTEST_M_S * np.sin(time_s + np.arange(moving))
         return centers_m
+
+    def seen(self, time_s: float, count: int) -> PerceivedObjects:
+        """The first `count` of them as a frame."""
+        at, radii_m, kinds = self.at(time_s, count), self.radii_m[:count], self.kinds[:count]
+        spheres, boxes, tetrahedra = (np.flatnonzero(kinds == kind) for kind in range(len(_KINDS)))
+        edge = 1.0 / np.sqrt(3.0)
+        corners = edge * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
+        return PerceivedObjects(
+            time_s=time_s,
+            names=tuple(f"crowd {k}" for k in range(count)),
+            roles=(Role.OBSTACLE,) * count,
+            sphere_centers_m=at[spheres],
+            sphere_radii_m=radii_m[spheres],
+            sphere_object=spheres,
+            box_centers_m=at[boxes],
+            box_rotations=np.tile(np.eye(3), (len(boxes), 1, 1)),
+            box_half_sizes_m=np.repeat(edge * radii_m[boxes, None], 3, axis=1),
+            box_object=boxes,
+            tetrahedron_vertices_m=at[tetrahedra, None] + radii_m[tetrahedra, None, None] * corners,
+            tetrahedron_object=tetrahedra,
+            half_space_normals=np.empty((0, 3)),
+            half_space_offsets_m=np.empty(0),
+            half_space_object=np.empty(0, dtype=np.int64),
+        )
 
 
 class CrowdedCamera:
@@ -59,16 +84,19 @@ class CrowdedCamera:
     def __init__(self, camera: ObjectSource, crowd: Crowd, *, only: bool = False) -> None:
         """only: the crowd alone is seen."""
         self._camera, self._crowd, self._only = camera, crowd, only
+        self._before: PerceivedObjects | None = None
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
-        self._roles: tuple[Role, ...] = ()
-        self._names = tuple(f"crowd {k}" for k in range(crowd.count))
+        self._own_movers: SomeObjects | None = None
+        self._movers: Movers | None = None
+        self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
     def perceive(self, now_s: float) -> PerceivedObjects:
         """The camera's frame and the crowd as it was then; the same until there is a newer one."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
-            self._own, self._shown = own, self._with_crowd(own)
+            self._before, self._own = self._own, own
+            self._shown = self._with_crowd(own)
         return self._shown
 
     def set_role(self, name: str, role: Role) -> None:
@@ -77,35 +105,36 @@ class CrowdedCamera:
 
     def _with_crowd(self, own: PerceivedObjects) -> PerceivedObjects:
         crowd = self._crowd
-        if self._only:
-            own = _without_objects(own)
-        centers_m, first = crowd.at(own.time_s), len(own.names)
-        spheres, boxes, tetrahedra = (np.flatnonzero(crowd.kinds == kind) for kind in range(len(_KINDS)))
-        edge = 1.0 / np.sqrt(3.0)
-        corners = edge * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
-        vertices = centers_m[tetrahedra, None] + crowd.radii_m[tetrahedra, None, None] * corners
-        more: dict[str, Any] = {
-            "sphere_centers_m": centers_m[spheres],
-            "sphere_radii_m": crowd.radii_m[spheres],
-            "sphere_object": first + spheres,
-            "box_centers_m": centers_m[boxes],
-            "box_rotations": np.broadcast_to(np.eye(3), (len(boxes), 3, 3)),
-            "box_half_sizes_m": edge * np.broadcast_to(crowd.radii_m[boxes, None], (len(boxes), 3)),
-            "box_object": first + boxes,
-            "tetrahedron_vertices_m": vertices,
-            "tetrahedron_object": first + tetrahedra,
-        }
-        joined: dict[str, Any] = {name: np.concatenate([getattr(own, name), values]) for name, values in more.items()}
-        if self._roles[: len(own.roles)] != own.roles or self._shown is None:
-            self._roles = own.roles + (Role.OBSTACLE,) * crowd.count
-        unknown: dict[str, Any] = dict.fromkeys(("positions_m", "rotations", "velocities_m_s"))
-        return replace(own, names=own.names + self._names, roles=self._roles, **(joined | unknown))
+        if own.since is None or self._only:
+            return self._whole(_without_objects(own) if self._only else own)
+        movers, moved = own.since
+        if self._movers is None or self._own_movers is not movers:
+            # The frame that was shown whole is the one that has a table, and whose roles are known.
+            shown = self._shown if self._before is movers.first else None
+            first, moving = shown or self._whole(movers.first), len(movers.first.names) + np.arange(crowd.moving)
+            self._own_movers, self._movers = movers, Movers(first, np.concatenate([movers.things, moving]))
+            self._roles = movers.first.roles, first.roles
+        if self._roles[0] is not own.roles:
+            self._roles = own.roles, own.roles + (Role.OBSTACLE,) * crowd.count
+        return self._movers.frame(joined(moved, crowd.seen(own.time_s, crowd.moving)), self._roles[1])
+
+    def _whole(self, own: PerceivedObjects) -> PerceivedObjects:
+        return joined(own, self._crowd.seen(own.time_s, self._crowd.count))
+
+
+def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:
+    """The objects of both, as they are seen when `one` is; how fast they go nobody knows. The meshes of `one` alone."""
+    arrays: dict[str, Any] = {}
+    for kind in KINDS[:-1]:
+        arrays[kind.owner] = np.concatenate([getattr(one, kind.owner), len(one.names) + getattr(other, kind.owner)])
+        for name in kind.fields:
+            arrays[name] = np.concatenate([getattr(one, name), getattr(other, name)])
+    unknown: dict[str, Any] = dict.fromkeys(OF_OBJECTS)
+    return replace(one, names=one.names + other.names, roles=one.roles + other.roles, **(arrays | unknown))
 
 
 def _without_objects(own: PerceivedObjects) -> PerceivedObjects:
-    none: dict[str, Any] = {
-        name: value[:0]
-        for name, value in vars(own).items()
-        if isinstance(value, np.ndarray) and name not in ("positions_m", "rotations", "velocities_m_s")
-    }
+    none: dict[str, Any] = dict.fromkeys(OF_OBJECTS) | {"mesh_index": own.mesh_index[:0]}
+    for kind in KINDS:
+        none |= {name: getattr(own, name)[:0] for name in (kind.owner, *kind.fields)}
     return replace(own, names=(), roles=(), **none)

@@ -13,6 +13,7 @@ from typing import Final
 
 from common.errors import DeviceError, NoDriverError, RemoteProtocolError
 from feelahead.commands.doctor.controller_checks import ControllerSeen, HidFacts, UhidFacts
+from feelahead.commands.doctor.kernel_checks import KernelFacts
 from feelahead.commands.doctor.machine_checks import PORTS
 from feelahead.commands.doctor.python_checks import EXTRAS, modules_of
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
@@ -37,6 +38,13 @@ _RENDER: Final = """
 import json, sys
 from robot_side.cameras.off_screen import trouble_with
 print(json.dumps(trouble_with(sys.argv[1])))
+"""
+_KERNELS: Final = """
+import json
+from robot_side.compiled.machine_code import can_keep, machine_code_folder
+from robot_side.compiled.warm_up import import_kernels
+kept = [kernel.is_kept for kernel in import_kernels()]
+print(json.dumps([len(kept), kept.count(False), str(machine_code_folder()), can_keep()]))
 """
 _REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"
 
@@ -95,6 +103,12 @@ def realtime_notes() -> list[str]:
         return []
     notes: list[str] = json.loads(_output_of(_REALTIME) or "[]")
     return notes
+
+
+def kernel_facts() -> KernelFacts | None:
+    """Which kernels are compiled; None where none can be."""
+    said = _output_of(_KERNELS)
+    return None if said is None else KernelFacts(*json.loads(said))
 
 
 def rendering_troubles(backends: Sequence[str]) -> dict[str, str | None]:

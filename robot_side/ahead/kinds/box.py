@@ -2,24 +2,11 @@
 
 import math
 
-import numpy as np
-
 from common.arrays import FloatArray
-from robot_side.ahead.kinds.layout import CLOSING, LEAST_WAY_M, MOST_STEPS, TOUCHING_M, Nearest, rows
+from robot_side.ahead.kinds.layout import CLOSING, LEAST_WAY_M, MOST_STEPS, TOUCHING_M, Nearest
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
 from robot_side.objects.perceived import PerceivedObjects
-
-
-def shapes(objects: PerceivedObjects) -> FloatArray:
-    """Shapes (b, 15)."""
-    return rows(objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m)
-
-
-def bounds(objects: PerceivedObjects) -> FloatArray:
-    """Centres and half diagonals (b, 4)."""
-    half_sizes = objects.box_half_sizes_m
-    return np.column_stack([objects.box_centers_m, np.sqrt(np.einsum("bi,bi->b", half_sizes, half_sizes))])
 
 
 def volumes(objects: PerceivedObjects) -> FloatArray:

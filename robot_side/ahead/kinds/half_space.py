@@ -5,23 +5,12 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.kinds.layout import CLOSING, LEAST_WAY_M, TOUCHING_M, Nearest, rows
+from robot_side.ahead.kinds.layout import CLOSING, LEAST_WAY_M, TOUCHING_M, Nearest
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, negative
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap.closed_forms.half_space import half_space_overlap
 from robot_side.overlap.closed_forms.solid import Overlap
-
-
-def shapes(objects: PerceivedObjects) -> FloatArray:
-    """Shapes (p, 15)."""
-    return rows(objects.half_space_normals, objects.half_space_offsets_m)
-
-
-def bounds(objects: PerceivedObjects) -> FloatArray:
-    """Nothing bounds a half-space: radii without end, (p, 4)."""
-    count = len(objects.half_space_offsets_m)
-    return np.column_stack([np.zeros((count, 3)), np.full(count, np.inf)])
 
 
 def volumes(objects: PerceivedObjects) -> FloatArray:

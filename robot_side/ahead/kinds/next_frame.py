@@ -5,19 +5,21 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON
+from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, SHAPE_NUMBERS, SPHERE, TETRAHEDRON, rows
 from robot_side.compiled.kernel import (
     TRUTH,
-    building_block,
     compiled,
+    inlined,
     input_array,
     input_indices,
     output_array,
 )
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
+from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
+from robot_side.objects.perceived import PerceivedObjects
 
 
-@building_block
+@inlined
 def _place_sphere(centers: FloatArray, radii: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     """Write one sphere's numbers and bounds; its volume, as all of these do."""
     for axis in range(3):
@@ -26,7 +28,7 @@ def _place_sphere(centers: FloatArray, radii: FloatArray, k: int, shape: FloatAr
     return 4.0 / 3.0 * math.pi * float(radii[k] ** 3)
 
 
-@building_block
+@inlined
 def _place_box(
     centers: FloatArray, rotations: FloatArray, half_sizes: FloatArray, k: int, shape: FloatArray, bound: FloatArray
 ) -> float:
@@ -40,7 +42,7 @@ def _place_box(
     return 8.0 * (half[0] * half[1] * half[2])
 
 
-@building_block
+@inlined
 def _place_tetrahedron(vertices: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     for corner in range(4):
         for axis in range(3):
@@ -61,7 +63,7 @@ def _place_tetrahedron(vertices: FloatArray, k: int, shape: FloatArray, bound: F
     return abs(dot(cross(a, b), c)) / 6.0
 
 
-@building_block
+@inlined
 def _place_half_space(normals: FloatArray, offsets: FloatArray, k: int, shape: FloatArray, bound: FloatArray) -> float:
     for axis in range(3):
         shape[axis], bound[axis] = normals[k, axis], 0.0
@@ -69,8 +71,8 @@ def _place_half_space(normals: FloatArray, offsets: FloatArray, k: int, shape: F
     return math.inf
 
 
-@building_block
-def _around(bounds: FloatArray, first: int, end: int, around: FloatArray) -> None:
+@inlined
+def write_around(bounds: FloatArray, first: int, end: int, around: FloatArray) -> None:
     """Write a sphere around the bounds from `first` to `end`; of radius -inf where there are none."""
     around[:3], around[3] = 0.0, -math.inf
     low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
@@ -113,12 +115,12 @@ def place(
     object_bounds: FloatArray,
     object_volumes: FloatArray,
 ) -> bool:
-    """Fill the last four as SceneTable has them, for rows of these kinds; False if one has no volume any more.
+    """Fill the last four as SceneTable has them, for rows of these kinds; False if one has no volume.
 
     The first eight as PerceivedObjects has them; mesh_shapes (q, 15), mesh_bounds (q, 4), mesh_volumes (q,): of the
     boxes around meshes, where these are now, and of the meshes.
     """
-    shapes[:], object_volumes[:] = 0.0, 0.0
+    shapes[:], object_volumes[:], solid = 0.0, 0.0, True
     for thing in range(first_rows.size - 1):
         for row in range(first_rows[thing], first_rows[thing + 1]):
             kind, k, shape, bound = kinds[row], rows_of_kind[row], shapes[row], bounds[row]
@@ -132,13 +134,43 @@ def place(
                 volume = _place_half_space(normals, offsets, k, shape, bound)
             else:
                 shape[:], bound[:], volume = mesh_shapes[k], mesh_bounds[k], mesh_volumes[k]
-            if not volume > 0.0:
-                return False
+            solid = solid and volume > 0.0
             object_volumes[thing] += volume
-        _around(bounds, first_rows[thing], first_rows[thing + 1], object_bounds[thing])
-    return True
+        write_around(bounds, first_rows[thing], first_rows[thing + 1], object_bounds[thing])
+    return solid
 
 
 def room(rows: int, objects: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What `place` fills."""
     return np.empty((rows, 4)), np.empty((rows, 15)), np.empty((objects, 4)), np.empty(objects)
+
+
+def given(objects: PerceivedObjects) -> tuple[np.ndarray, ...]:
+    """What `place` reads of a frame: its first eleven arguments."""
+    return (
+        *(objects.sphere_centers_m, objects.sphere_radii_m),
+        *(objects.box_centers_m, objects.box_rotations, objects.box_half_sizes_m, objects.tetrahedron_vertices_m),
+        *(objects.half_space_normals, objects.half_space_offsets_m),
+        *(_mesh_boxes(objects), _mesh_spheres(objects), mesh_volumes(objects)),
+    )
+
+
+def mesh_volumes(objects: PerceivedObjects) -> FloatArray:
+    """(q,) in m³"""
+    if objects.mesh_library is None:
+        return np.empty(0)
+    return objects.mesh_library.tables.volumes.take(objects.mesh_index)
+
+
+def _mesh_boxes(objects: PerceivedObjects) -> FloatArray:
+    if objects.mesh_library is None:
+        return np.zeros((0, SHAPE_NUMBERS))
+    half_sizes_m = mesh_bounds(objects.mesh_library).half_sizes_m.take(objects.mesh_index, axis=0)
+    return rows(placed_middles(objects), objects.mesh_rotations, half_sizes_m)
+
+
+def _mesh_spheres(objects: PerceivedObjects) -> FloatArray:
+    if objects.mesh_library is None:
+        return np.empty((0, 4))
+    radii = mesh_bounds(objects.mesh_library).radii_m.take(objects.mesh_index)
+    return np.column_stack([placed_middles(objects), radii])

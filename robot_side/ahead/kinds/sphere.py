@@ -5,22 +5,12 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, TOUCHING_M, Nearest, rows
+from robot_side.ahead.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, TOUCHING_M, Nearest
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap.closed_forms.ball import sphere_overlap
 from robot_side.overlap.closed_forms.solid import Overlap
-
-
-def shapes(objects: PerceivedObjects) -> FloatArray:
-    """Shapes (s, 15)."""
-    return rows(objects.sphere_centers_m, objects.sphere_radii_m)
-
-
-def bounds(objects: PerceivedObjects) -> FloatArray:
-    """Centres and radii (s, 4) of the spheres themselves."""
-    return np.column_stack([objects.sphere_centers_m, objects.sphere_radii_m])
 
 
 def volumes(objects: PerceivedObjects) -> FloatArray:

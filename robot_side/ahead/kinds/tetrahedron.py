@@ -5,25 +5,12 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.ahead.kinds.layout import ANY_DIRECTION, CLOSING, LEAST_WAY_M, MOST_STEPS, TOUCHING_M, Nearest, rows
+from robot_side.ahead.kinds.layout import ANY_DIRECTION, CLOSING, LEAST_WAY_M, MOST_STEPS, TOUCHING_M, Nearest
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
 from robot_side.objects.perceived import PerceivedObjects
 
 Vertices = tuple[Vector, Vector, Vector, Vector]
-
-
-def shapes(objects: PerceivedObjects) -> FloatArray:
-    """Shapes (t, 15)."""
-    return rows(objects.tetrahedron_vertices_m)
-
-
-def bounds(objects: PerceivedObjects) -> FloatArray:
-    """Spheres (t, 4) about the middles of the extents along the axes."""
-    vertices = objects.tetrahedron_vertices_m
-    middles = 0.5 * (vertices.min(axis=1) + vertices.max(axis=1))
-    radii = np.linalg.norm(vertices - middles[:, None], axis=2).max(axis=1, initial=0.0)
-    return np.column_stack([middles, radii])
 
 
 def volumes(objects: PerceivedObjects) -> FloatArray:

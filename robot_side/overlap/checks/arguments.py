@@ -1,6 +1,6 @@
 """Checks of the public functions' arguments, and their broadcasting against each other."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -51,6 +51,29 @@ class Argument:
         return np.ascontiguousarray(repeated).reshape(int(np.prod(shape, dtype=np.int64)), *self.trailing)
 
 
+Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
+"""What is asked of an argument, given its name, its value and its last dimensions; ValueError where it is not so."""
+
+_FLOAT64 = np.dtype(np.float64)
+
+
+def plain_rows(
+    values: Sequence[npt.ArrayLike], trailing: Sequence[tuple[int, ...]]
+) -> tuple[list[FloatArray], tuple[int, ...]] | None:
+    """The items of float64 arrays whose leading dimensions are the same, and these; None for anything else."""
+    try:
+        arrays = [np.asarray(value) for value in values]
+    except ValueError:
+        return None
+    leading = arrays[0].shape[:-1]
+    for array, last in zip(arrays, trailing, strict=True):
+        if array.dtype != _FLOAT64 or array.shape != leading + last or not array.flags.c_contiguous:
+            return None
+    if len(leading) == 1:
+        return arrays, leading
+    return [array.reshape(-1, *last) for array, last in zip(arrays, trailing, strict=True)], leading
+
+
 def numbers(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
     """`value` as finite float64 with the last dimensions `trailing`, or ValueError."""
     return _within(name, value, trailing, -LARGEST, f"finite, magnitude at most {LARGEST:g}")
@@ -61,17 +84,17 @@ def lengths(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> 
     return _within(name, value, trailing, 0.0, f"finite, 0 to {LARGEST:g} m")
 
 
-def directions(name: str, value: npt.ArrayLike) -> Argument:
+def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)) -> Argument:
     """`numbers` (..., 3) of which no vector is 0."""
-    argument = numbers(name, value, (3,))
+    argument = numbers(name, value, trailing)
     if (short := first_short(argument.items, SMALLEST_NORMAL)) != NONE:
         argument.refuse(_index(short, argument.leading), f"a vector of length {SMALLEST_NORMAL:g} or more")
     return argument
 
 
-def rotations(name: str, value: npt.ArrayLike) -> Argument:
+def rotations(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3, 3)) -> Argument:
     """`numbers` (..., 3, 3) of which every matrix is orthonormal."""
-    argument = numbers(name, value, (3, 3))
+    argument = numbers(name, value, trailing)
     if (skewed := first_skewed(argument.items, ORTHONORMALITY)) != NONE:
         what_is_valid = f"an orthonormal matrix Q, ‖QᵀQ - I‖ <= {ORTHONORMALITY:g}"
         argument.refuse(_index(skewed, argument.leading), what_is_valid)

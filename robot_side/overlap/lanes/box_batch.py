@@ -13,7 +13,8 @@ from robot_side.compiled.kernel import (
     output_indices,
     power_of_two_below,
 )
-from robot_side.compiled.vectors import cross, dot, scale, subtract
+from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.checks.arguments import LARGEST, ORTHONORMALITY
 from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
 from robot_side.overlap.lanes.box_lane import Columns, box_lane
 from robot_side.overlap.lanes.lanes import (
@@ -21,14 +22,18 @@ from robot_side.overlap.lanes.lanes import (
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
+    SOME_DOUBTFUL,
+    SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
     column,
     copy_lane,
+    doubt,
     lane_groups,
     load_rows,
     load_vectors,
+    reach,
     scatter,
     store_result,
     vector_column,
@@ -42,6 +47,10 @@ _COLUMNS = _RESULT + RESULT_COLUMNS
 
 _SLACK = 1e-5
 """Share of all lengths by which bounds must settle a pair: rotations are orthonormal only to 1e-6."""
+
+
+_SURELY_ORTHONORMAL = 0.99 * ORTHONORMALITY**2
+"""With room for what the squared norm rounds."""
 
 
 @compiled(
@@ -72,16 +81,29 @@ def overlap_boxes(
     The boxes are given by `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world and `box_half_sizes` (p, 3).
 
     Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms.
+    worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
+    where a number may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs = np.empty(LANES, dtype=np.int64)
-    waiting_count = unsettled = partial = 0
+    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, box_centers, box_rotations, box_half_sizes, first, count, block)
-        if _bound(block, lane_groups(count)) == 0:
+        groups = lane_groups(count)
+        left = _bound(block, groups)
+        doubtful += left // SOME_DOUBTFUL
+        left %= SOME_DOUBTFUL
+        if left == 0:
+            continue
+        if left == groups * WIDTH * SOME_PARTIAL:
+            # Nothing to sort out: worked out where they are.
+            _work_out(block, groups)
+            partial += count
+            for lane in range(count):
+                own[lane] = first + lane
+            unsettled = scatter(block, _RESULT, own, count, volumes, gradients, areas, rows, unsettled)
             continue
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)
@@ -107,7 +129,7 @@ def overlap_boxes(
         _work_out(waiting, lane_groups(waiting_count))
         partial += waiting_count
         unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
-    rows[total] = partial
+    rows[total] = ~partial if doubtful > 0 else partial
     return unsettled
 
 
@@ -144,13 +166,14 @@ def _columns(block: FloatArray, lane: int) -> Columns:
 
 @building_block
 def _bound(block: FloatArray, groups: int) -> int:
-    """Fill in what the bounds of the first groups of lanes tell, and the boxes' volumes; the sum of the weights."""
+    """Fill in what bounds tell of the first groups of lanes, and the boxes' volumes; the sum of weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         q_0, q_1, q_2 = _columns(block, lane)
         half = vector_column(block, _HALF_SIZES, lane)
         radius = column(block, _RADIUS, lane)
-        middle = subtract(vector_column(block, _BOX_CENTER, lane), vector_column(block, _CENTER, lane))
+        center, box_center = vector_column(block, _CENTER, lane), vector_column(block, _BOX_CENTER, lane)
+        middle = subtract(box_center, center)
         volume = 8.0 * abs(dot(q_0, cross(q_1, q_2))) * (half[0] * half[1] * half[2])
         x, y, z = abs(dot(middle, q_0)), abs(dot(middle, q_1)), abs(dot(middle, q_2))
         slack = _SLACK * (radius + (half[0] + half[1] + half[2]) + (x + y + z))
@@ -167,10 +190,22 @@ def _bound(block: FloatArray, groups: int) -> int:
         verdict = WHOLE_SPHERE if lowest - slack >= radius else PARTIAL
         verdict = WHOLE_SOLID if within else verdict
         verdict = NOTHING if away else verdict
-        total += weight(verdict)
+        farthest = reach(center) + reach(box_center) + reach(half) + radius
+        positive = min(radius, half[0], half[1], half[2]) >= 0.0
+        sure = (farthest <= LARGEST) & positive & (_excess_2(q_0, q_1, q_2) < _SURELY_ORTHONORMAL)
+        total += weight(verdict) + doubt(sure)
         block[np.uint64(_BOUNDS * LANES + lane)] = verdict
         block[np.uint64(_SOLID_VOLUME * LANES + lane)] = volume
     return total
+
+
+@inlined
+def _excess_2(q_0: Vector, q_1: Vector, q_2: Vector) -> float:
+    """The squared Frobenius norm of QᵀQ - I for the columns of Q."""
+    first, second, third = dot(q_0, q_0) - 1.0, dot(q_1, q_1) - 1.0, dot(q_2, q_2) - 1.0
+    across_0, across_1, across_2 = dot(q_1, q_2), dot(q_2, q_0), dot(q_0, q_1)
+    across_2 = across_0 * across_0 + across_1 * across_1 + across_2 * across_2
+    return first * first + second * second + third * third + 2.0 * across_2
 
 
 @building_block

@@ -27,6 +27,9 @@ NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
 SOME_PARTIAL = 1 << 32
 """The sum of `weight` over a block is at least this if a lane is `PARTIAL`, and 0 if there is no contact in any."""
 
+SOME_DOUBTFUL = 1 << 48
+"""The sum of `doubt` over a block is at least this if a lane is doubtful, and else 0."""
+
 
 @inlined
 def column(lanes: FloatArray, index: int, lane: int) -> float:
@@ -52,6 +55,18 @@ def weight(verdict: float) -> int:
 
 
 @inlined
+def doubt(sure: bool) -> int:
+    """What one lane adds to its block's sum, whose numbers are `sure` to be in range or not."""
+    return 0 if sure else SOME_DOUBTFUL
+
+
+@inlined
+def reach(vector: Vector) -> float:
+    """The sum of the magnitudes, NaN if there is one: no part is larger."""
+    return abs(vector[0]) + abs(vector[1]) + abs(vector[2])
+
+
+@inlined
 def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, size: float, unsettled: float) -> None:
     """Write an overlap that was worked out with lengths divided by `size` to the columns from `index`."""
     area = size * size
@@ -71,7 +86,8 @@ def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: Float
         for lane in range(0, LANES, 4):
             for part in range(width // 4):
                 start, end = (first + lane) * width + 4 * part, (index + 4 * part) * LANES + lane
-                transpose_four(rows, start, width, lanes, end, LANES)
+                second, third, fourth = start + width, start + 2 * width, start + 3 * width
+                transpose_four(rows, start, second, third, fourth, lanes, end, LANES)
         for number in range(width // 4 * 4, width):
             for lane in range(LANES):
                 lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]

@@ -14,21 +14,25 @@ from robot_side.compiled.kernel import (
     power_of_two_below,
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.checks.arguments import LARGEST
 from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
 from robot_side.overlap.lanes.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
     RESULT_COLUMNS,
+    SOME_DOUBTFUL,
     SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
     column,
     copy_lane,
+    doubt,
     lane_groups,
     load_rows,
     load_vectors,
+    reach,
     scatter,
     store_result,
     vector_column,
@@ -70,22 +74,30 @@ def overlap_tetrahedra(
     """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3); the results must hold zeros.
 
     Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms.
+    worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
+    where a number may be NaN or out of range.
     """
     block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs = np.empty(LANES, dtype=np.int64)
-    waiting_count = unsettled = partial = 0
+    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):
         count = min(LANES, total - first)
         _load(centers, radii, vertices, first, count, block)
-        left = _bound_by_corners(block, lane_groups(count))
+        groups = lane_groups(count)
+        left = _bound(block, groups)
+        doubtful += left // SOME_DOUBTFUL
+        left %= SOME_DOUBTFUL
         if left == 0:
             continue
-        if left % SOME_PARTIAL > 0:
-            left = _measure_within(block, lane_groups(count))
-        if left >= SOME_PARTIAL:
-            _bound_by_planes(block, lane_groups(count))
+        if left == groups * WIDTH * SOME_PARTIAL:
+            # Nothing to sort out: worked out where they are.
+            _work_out(block, groups)
+            partial += count
+            for lane in range(count):
+                own[lane] = first + lane
+            unsettled = scatter(block, _RESULT, own, count, volumes, gradients, areas, rows, unsettled)
+            continue
         for lane in range(count):
             verdict = column(block, _BOUNDS, lane)
             if verdict == NOTHING:
@@ -110,7 +122,7 @@ def overlap_tetrahedra(
         _work_out(waiting, lane_groups(waiting_count))
         partial += waiting_count
         unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
-    rows[total] = partial
+    rows[total] = ~partial if doubtful > 0 else partial
     return unsettled
 
 
@@ -135,9 +147,22 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
     )
 
 
+@inlined
+def _bound(block: FloatArray, groups: int) -> int:
+    """Fill in what bounds tell of the first groups of lanes; the sum of the weights and doubts."""
+    left = _bound_by_corners(block, groups)
+    doubts = left // SOME_DOUBTFUL * SOME_DOUBTFUL
+    left -= doubts
+    if left % SOME_PARTIAL > 0:
+        left = _measure_within(block, groups)
+    if left >= SOME_PARTIAL:
+        left = _bound_by_planes(block, groups)
+    return doubts + left
+
+
 @building_block
 def _bound_by_corners(block: FloatArray, groups: int) -> int:
-    """Fill in what the corners and their bounding box tell; the sum of the weights."""
+    """Fill in what the corners and their bounding box tell; the sum of the weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -152,7 +177,8 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
         away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
         verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
         verdict = NOTHING if away else verdict
-        total += weight(verdict)
+        farthest = reach(center) + reach(first) + reach(second) + reach(third) + reach(fourth) + radius
+        total += weight(verdict) + doubt((farthest <= LARGEST) & (radius >= 0.0))
         block[np.uint64(_BOUNDS * LANES + lane)] = verdict
     return total
 
@@ -177,8 +203,9 @@ def _measure_within(block: FloatArray, groups: int) -> int:
 
 
 @building_block
-def _bound_by_planes(block: FloatArray, groups: int) -> None:
-    """Settle more of the pairs that the corners left undecided, by the planes of the faces."""
+def _bound_by_planes(block: FloatArray, groups: int) -> int:
+    """Settle more of the pairs that the corners left undecided, by the planes of the faces; the sum of the weights."""
+    total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
         center, radius = vector_column(block, _CENTER, lane), column(block, _RADIUS, lane)
@@ -195,9 +222,10 @@ def _bound_by_planes(block: FloatArray, groups: int) -> None:
         verdict = column(block, _BOUNDS, lane)
         partial = verdict == PARTIAL
         verdict = WHOLE_SPHERE if partial & (below_a & below_b & below_c & below_d) else verdict
-        block[np.uint64(_BOUNDS * LANES + lane)] = (
-            NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
-        )
+        verdict = NOTHING if partial & (above_a | above_b | above_c | above_d) else verdict
+        total += weight(verdict)
+        block[np.uint64(_BOUNDS * LANES + lane)] = verdict
+    return total
 
 
 @inlined

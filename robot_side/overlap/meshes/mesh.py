@@ -24,6 +24,9 @@ from robot_side.overlap.meshes.mesh_tables import mesh_tables
 
 Array = npt.ArrayLike
 
+_IN_PLACE = np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.eye(3)[None]
+"""A mesh in its own frame: as number, position and rotation of the only one that is placed."""
+
 
 class Mesh:
     """A solid bounded by triangles, prepared once for many queries; it does not change.
@@ -80,9 +83,8 @@ class Mesh:
         count = len(rows[1])
         volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
         touched = np.empty(count, dtype=np.int64)
-        nowhere = np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.eye(3)[None]
         everywhere = np.zeros(count, dtype=np.int64)
-        overlap_loop(*rows, everywhere, *nowhere, *self.tables, volumes, gradients, areas, touched)
+        overlap_loop(*rows, everywhere, *_IN_PLACE, *self.tables, volumes, gradients, areas, touched)
         results = volumes.reshape(shape), gradients.reshape(*shape, 3), areas.reshape(shape)
         return results, touched.reshape(shape)
 

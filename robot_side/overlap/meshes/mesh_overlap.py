@@ -4,18 +4,20 @@ import math
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.transpose import transpose_four
 from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
 from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
-from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.small_mesh_overlap import beyond_face
 from robot_side.overlap.meshes.tree_queries import gather_near, nearest_triangle, squared_distance, winding_number
 from robot_side.overlap.meshes.triangle_lanes import (
     CORNERS,
     IMAGINARY,
     LANES,
+    LONGEST,
     MOMENT,
     PUSH,
     PUSH_Y,
@@ -23,6 +25,7 @@ from robot_side.overlap.meshes.triangle_lanes import (
     REAL,
     ROW,
     TURN,
+    WIDTH,
     Complex,
     reduce_lanes,
     times,
@@ -111,13 +114,18 @@ def _sum_triangles(
     product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
     for first in range(0, count, LANES):
         size = min(count - first, LANES)
-        _load_lanes(tables, near, first, size, scratch)
-        triangle_geometry(scratch, size, highs(precise_center), _lows(precise_center), radius)
-        for lane in range(size):
-            triangle = near[first + lane]
-            if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
-                refine_lane(scratch, lane, tables, triangle, precise_center, radius)
-        triangle_terms(scratch, size)
+        groups = (size + (WIDTH - 1)) // WIDTH
+        _load_lanes(tables, near, first, size, groups, scratch)
+        large = 0
+        for lane in range(groups * WIDTH):
+            large += 1 if scratch[LONGEST + lane] > FAR * radius else 0
+        triangle_geometry(scratch, groups, highs(precise_center), _lows(precise_center), radius)
+        if large > 0:
+            for lane in range(size):
+                triangle = near[first + lane]
+                if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
+                    refine_lane(scratch, lane, tables, triangle, precise_center, radius)
+        triangle_terms(scratch, groups)
         reduce_lanes(scratch, size)
         product = times(product, (scratch[REAL], scratch[IMAGINARY]))
         rescale = 1.0 / (abs(product[0]) + abs(product[1]))
@@ -158,11 +166,16 @@ def _lows(vector: PreciseVector) -> Vector:
 
 
 @inlined
-def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, scratch: FloatArray) -> None:
-    for lane in range(size):
-        triangle = near[first + lane]
-        for field in range(15):
-            scratch[CORNERS + field * ROW + lane] = tables.triangles[triangle, field]
+def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, groups: int, scratch: FloatArray) -> None:
+    triangles, last = tables.triangles.reshape(-1), first + size - 1
+    # Whole groups spare the loops a remainder; the last triangle fills up the last group.
+    for lane in range(0, groups * WIDTH, 4):
+        place = first + lane
+        row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
+        row_2, row_3 = FIELDS * near[min(place + 2, last)], FIELDS * near[min(place + 3, last)]
+        for field in range(0, FIELDS, 4):
+            end = CORNERS + field * ROW + lane
+            transpose_four(triangles, row_0 + field, row_1 + field, row_2 + field, row_3 + field, scratch, end, ROW)
 
 
 @building_block

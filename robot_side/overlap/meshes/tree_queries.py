@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from common.arrays import IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
@@ -15,8 +17,9 @@ _CERTAIN = 0.2
 def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
     """The squared distance (m²) from `point` to the box of a node."""
     total = 0.0
+    row = np.uint64(node)
     for axis in range(3):
-        low, high = tables.boxes[node, axis], tables.boxes[node, 3 + axis]
+        low, high = tables.boxes[row, axis], tables.boxes[row, 3 + axis]
         gap = max(low - point[axis], point[axis] - high, 0.0)
         total += gap * gap
     return total
@@ -43,10 +46,11 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
             continue
         first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
         for triangle in range(first, first + size):
-            gap_x = tables.spheres[triangle, 0] - point[0]
-            gap_y = tables.spheres[triangle, 1] - point[1]
-            gap_z = tables.spheres[triangle, 2] - point[2]
-            reach = tables.spheres[triangle, 3] + radius
+            row = np.uint64(triangle)
+            gap_x = tables.spheres[row, 0] - point[0]
+            gap_y = tables.spheres[row, 1] - point[1]
+            gap_z = tables.spheres[row, 2] - point[2]
+            reach = tables.spheres[row, 3] + radius
             # Written in any case, kept by counting on: no branch to guess.
             near[count] = triangle
             count += 1 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z <= reach * reach else 0

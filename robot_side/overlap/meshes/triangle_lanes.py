@@ -30,12 +30,15 @@ from robot_side.overlap.digits.arctangent import arctangent
 
 LANES = 64
 """Triangles handled at once."""
+WIDTH = 8
+"""Lanes come in groups of as many as the widest vectors hold."""
 ROW = LANES + 8
 """The distance between two rows of the scratch array: rows 4096 bytes apart would get in each other's way."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
 CORNERS, SECOND_CORNERS, THIRD_CORNERS, NORMAL, INVERSE_LENGTHS = 0, 3 * ROW, 6 * ROW, 9 * ROW, 12 * ROW
+LONGEST = 15 * ROW  # until the heights take its place
 HEIGHTS, DISTANCES, BASES = 15 * ROW, 18 * ROW, 21 * ROW
 STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * ROW, 27 * ROW, 30 * ROW, 33 * ROW
 REAL, IMAGINARY, TURN, MOMENT = 34 * ROW, 35 * ROW, 36 * ROW, 37 * ROW
@@ -93,13 +96,13 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
 
 
 @building_block
-def triangle_geometry(scratch: FloatArray, count: int, center: Vector, center_rest: Vector, radius: float) -> None:
-    """Fill `HEIGHTS` to `HEIGHT` from the corners, normals and inverse edge lengths of `count` lanes.
+def triangle_geometry(scratch: FloatArray, groups: int, center: Vector, center_rest: Vector, radius: float) -> None:
+    """Fill `HEIGHTS` to `HEIGHT` from the corners, normals and inverse edge lengths of so many groups of `WIDTH` lanes.
 
     The centre is `center` + `center_rest` (m), the corners are made relative to it, in radii.
     """
     scaling = 1.0 / radius
-    for lane in range(count):
+    for lane in range(groups * WIDTH):
         raw_a = _load3(scratch, CORNERS, lane)
         raw_b = _load3(scratch, SECOND_CORNERS, lane)
         raw_c = _load3(scratch, THIRD_CORNERS, lane)
@@ -194,13 +197,13 @@ def _wraps(a: Complex, b: Complex, product: Complex) -> float:
 
 
 @building_block
-def triangle_terms(scratch: FloatArray, count: int) -> None:
-    """Fill `REAL` to `PUSH` of `count` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
+def triangle_terms(scratch: FloatArray, groups: int) -> None:
+    """Fill `REAL` to `PUSH` of so many groups of `WIDTH` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
 
     REAL + i IMAGINARY has half of the straight-bounded part of Ω for its argument, TURN is half of the rest of Ω;
     MOMENT is h A, PUSH A n.
     """
-    for lane in range(count):
+    for lane in range(groups * WIDTH):
         normal = _load3(scratch, NORMAL, lane)
         heights = _load3(scratch, HEIGHTS, lane)
         distances = _load3(scratch, DISTANCES, lane)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.sockets import shell
+from common.sockets import inbox, shell
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import Authenticator, RobotKeys, make_key_pair
 from common.sockets.keys import KeyFolder
@@ -85,7 +85,7 @@ PORT: dict[str, tuple[object, str, object, Callable[[RobotSockets, OperatorSocke
         port.test_a_peer_that_floods_is_cut_off_and_the_operator_is_not,
     ),
     "the limit of each call": (
-        *(shell, "MESSAGES_PER_RECEIVE", 10**9),
+        *(inbox, "MESSAGES_PER_RECEIVE", 10**9),
         lambda robot, operator, _: port.test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
             robot, operator, 20_000
         ),

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 import zmq
 
-from common.sockets import shell
+from common.sockets import inbox
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES
@@ -121,7 +121,7 @@ def test_one_call_receives_a_bounded_number(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     greet(robot, operator)
-    monkeypatch.setattr(shell, "MESSAGES_PER_RECEIVE", 3)
+    monkeypatch.setattr(inbox, "MESSAGES_PER_RECEIVE", 3)
     for number in range(8):
         send_until_connected(operator, b"%d" % number)
     batches: list[list[bytes]] = []

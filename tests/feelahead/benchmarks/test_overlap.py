@@ -5,6 +5,7 @@ import importlib.util
 import math
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 import feelahead.main
+from common.arrays import FloatArray
+from common.clock import MonotonicClock, VirtualClock
 from common.errors import ConfigurationError
 from feelahead.benchmarks.overlap import peers as overlap_peers
 from feelahead.benchmarks.overlap.accuracy import draw_samples, measure_accuracy
@@ -22,8 +25,11 @@ from feelahead.benchmarks.overlap.goals import judge
 from feelahead.benchmarks.overlap.ours import kernel_volumes
 from feelahead.benchmarks.overlap.pairs import Pairs, Solid
 from feelahead.benchmarks.overlap.peers import HeaderPeer, PythonPeer, package_corners
-from feelahead.benchmarks.overlap.speed import TRIVIAL, partial_pairs, trivial_pairs
 from feelahead.benchmarks.overlap.stress import count_failures
+from feelahead.benchmarks.overlap.times.call_sizes import measure_call_sizes
+from feelahead.benchmarks.overlap.times.speed import BATCH, TRIVIAL, partial_pairs, trivial_pairs
+from feelahead.benchmarks.overlap.times.timing import Contender, in_turns, short_calls
+from feelahead.benchmarks.overlap.times.widths import wide_vectors_pay
 from feelahead.benchmarks.overlap.tiny import measure_tiny
 from feelahead.benchmarks.report import COLUMNS, Goal, Report, short
 
@@ -120,11 +126,11 @@ def test_everything_else_runs_without_the_package(monkeypatch: pytest.MonkeyPatc
     ours, theirs = count_failures(report, classes, samples, peer, progress)
     assert ours.pairs == 2 * len(classes)
     assert theirs is None
-    judge(report)
+    judge(report, "a processor")
     assert {figure.method for figure in report.figures} == {"ours"}
     verdicts = {goal.claim: goal.verdict for goal in report.goals}
     assert verdicts["exceptions"] == "met"
-    assert verdicts["times faster than the C++ package, box, one core"] == "not measured"
+    assert verdicts["times faster than the C++ package, box, checked, with gradient"] == "not measured"
 
 
 def test_help_lists_the_benchmarks_and_teaches(capsys: pytest.CaptureFixture[str]) -> None:
@@ -232,6 +238,55 @@ def test_the_driver_reads_pairs_and_writes_volumes(tmp_path: Path, monkeypatch: 
         assert HeaderPeer(header).missing.startswith("does not compile: ")
     finally:
         peer.close()
+
+
+def test_what_takes_turns_counts_by_the_least_time_of_each_part() -> None:
+    clock = VirtualClock()
+    given = {"first": [[40.0, 20.0], [30.0, 90.0]], "second": [[7.0], [9.0]]}
+    order: list[str] = []
+
+    def turn(name: str) -> FloatArray:
+        order.append(name)
+        return np.array(given[name][order.count(name) - 1])
+
+    contenders = [Contender(name, 10, partial(turn, name)) for name in given]
+    assert in_turns(contenders, 2) == {"first": 5.0, "second": 0.7}
+    assert order == ["first", "second", "first", "second"]
+
+    # Calls that take 3 ms, then 1 ms each, of which there are enough to fill a turn.
+    taken: list[float] = []
+
+    def run() -> None:
+        taken.append(0.001 if taken else 0.003)
+        clock.advance_to(clock.now() + taken[-1])
+
+    assert short_calls("calls", [run, run], 2, clock).turn() == pytest.approx([1e6, 1e6])
+    assert 0.03 <= sum(taken) <= 0.033
+
+
+def test_calls_of_every_size_are_timed() -> None:
+    report = Report()
+    with Progress(disable=True) as progress:
+        measure_call_sizes(report, progress, 64, 1, MonotonicClock())
+    assert [row[0] for row in report.tables[0].rows] == ["1", "8", "64"]
+    assert (report.value("calls", "ours, checked", "box", "8 pairs", "time") or 0.0) > 0.0
+
+
+@pytest.mark.parametrize(("wide", "pays"), [(94.0, True), (96.0, False), (None, False)])
+def test_wide_vectors_pay_where_they_are_measured_to(wide: float | None, pays: bool) -> None:
+    report = Report()
+    for solid in ("tetrahedron", "box"):
+        for bits, each_ns in ((256, 100.0), (512, wide)):
+            if each_ns is not None:
+                case = f"{BATCH} pairs a call"
+                report.add("widths", f"{bits} bits", solid, case, {"time": (each_ns, "ns/pair")})
+    assert wide_vectors_pay(report) is pays
+    report.add("speed", "ours, checked", "box", "partial", {"time": (100.0, "ns/pair")})
+    report.add("speed", "overlap, C++", "box", "partial", {"time": (1500.0, "ns/pair")})
+    judge(report, "a processor")
+    goal = next(goal for goal in report.goals if "C++ package, box" in goal.claim)
+    assert goal.detail == "1500 / 100 ns a pair; a processor"
+    assert goal.verdict == ("missed" if pays else "met")
 
 
 def test_goals_are_judged_both_ways() -> None:

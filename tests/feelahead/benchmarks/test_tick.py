@@ -9,6 +9,8 @@ from feelahead.benchmarks.tick.crowd import MIDDLE_M, NEAREST_M, Crowd, CrowdedC
 from feelahead.benchmarks.tick.timed_robot import COLUMNS, STAGES
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.objects.validity import require_valid
+from robot_side.simulation.camera import MujocoCamera
+from robot_side.simulation.scene import load_scene
 from tests.helpers.perceived_scenes import Scene
 
 
@@ -47,6 +49,36 @@ def test_the_crowd_is_the_same_until_there_is_a_newer_frame() -> None:
     second = crowded.perceive(1.0)
     moved = np.any(second.sphere_centers_m != first.sphere_centers_m, axis=1)
     assert moved.tolist() == [True] * 3 + [False] * 3
+
+
+def test_of_a_crowd_around_what_a_camera_sees_a_frame_says_what_moves() -> None:
+    scene = load_scene()
+    camera = CrowdedCamera(MujocoCamera(scene), Crowd(300, 9))
+    first, second = camera.perceive(0.0), camera.perceive(0.5)
+    require_valid(first)
+    assert second.since is not None
+    assert second.since[0].first is first
+    assert second.roles is first.roles
+    moved = second.since[1]
+    own = [thing.name for thing in scene.objects if thing.name not in scene.fixed]
+    assert list(moved.names) == own + [f"crowd {k}" for k in range(9)]
+    require_valid(second)
+    changed = np.any(second.sphere_centers_m != first.sphere_centers_m, axis=1)
+    of_crowd = second.sphere_object >= len(scene.objects)
+    assert int(changed[of_crowd].sum()) == 3
+    assert len(second.roles) == len(second.names) == len(scene.objects) + 300
+    # As long as nobody changes a role, all frames share one tuple.
+    assert camera.perceive(1.0).roles is second.roles
+    camera.set_role(own[0], Role.TARGET)
+    assert camera.perceive(1.5).roles[second.names.index(own[0])] is Role.TARGET
+
+
+def test_alone_a_crowd_is_all_there_is() -> None:
+    camera = CrowdedCamera(MujocoCamera(load_scene()), Crowd(30, 3), only=True)
+    for now_s in (0.0, 0.5):
+        frame = camera.perceive(now_s)
+        require_valid(frame)
+        assert frame.names == tuple(f"crowd {k}" for k in range(30))
 
 
 def test_what_is_asked_of_the_way_from_look_to_message_leaves_out_physics_and_frames() -> None:

@@ -1,6 +1,7 @@
 """Each check of `feelahead doctor` on facts that a test makes up, and the command on this machine."""
 
 import json
+import re
 import socket
 import tomllib
 from pathlib import Path
@@ -22,6 +23,7 @@ from feelahead.commands.doctor.controller_checks import (
     missing_grants,
 )
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
+from feelahead.commands.doctor.kernel_checks import COMPILE, KernelFacts, check_kernels
 from feelahead.commands.doctor.machine_checks import (
     PORTS,
     RENDERING,
@@ -35,7 +37,9 @@ from feelahead.main import command
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
 from robot_side.cameras.off_screen import BACKENDS, REMEDY
+from robot_side.compiled import warm_up as warm_up_module
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
+from tests.helpers.fresh_kernels import fresh_kernels
 from tests.helpers.repository import ROOT
 
 OK, NOTE, MISSING = Verdict.OK, Verdict.NOTE, Verdict.MISSING
@@ -271,9 +275,9 @@ def test_here_it_tells_of_everything(capsys: pytest.CaptureFixture[str]) -> None
     code = command(["doctor", "--json"])
     told = json.loads(capsys.readouterr().out)
     names = [finding["name"] for finding in told["findings"]]
+    assert {"kernels", "--realtime", "ports"} <= set(names)
     expected = ("Python", *(f"extra {extra}" for extra in EXTRAS), "hidapi", "udev rule", "controller", "/dev/uhid")
     assert names[: len(expected)] == list(expected)
-    assert {"--realtime", "ports"} <= set(names)
     assert code == (0 if told["demo"] else 1)
 
 
@@ -306,3 +310,53 @@ def test_a_way_to_render_that_does_not_work_says_why(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
     monkeypatch.setenv("EGL_PLATFORM", "none")
     assert str(facts.rendering_troubles(["egl"])["egl"]).startswith("egl: ")
+
+
+@pytest.mark.parametrize(
+    ("seen", "verdict", "said", "remedy"),
+    [
+        (KernelFacts(30, 0, "/there", writable=True), OK, "30 compiled for this processor, in /there", None),
+        (KernelFacts(30, 0, "/there", writable=False), OK, "30 compiled for this processor, in /there", None),
+        (KernelFacts(30, 2, "/there", writable=True), NOTE, "2 of 30 are not compiled", COMPILE),
+        (KernelFacts(30, 2, "/there", writable=False), NOTE, "each start compiles", f"NUMBA_CACHE_DIR.*{COMPILE}"),
+    ],
+)
+def test_kernels(seen: KernelFacts, verdict: Verdict, said: str, remedy: str | None) -> None:
+    (found,) = check_kernels(seen)
+    assert found.verdict is verdict
+    assert said in found.said
+    assert fit_for_demo([found])
+    assert (found.remedy is None) == (remedy is None)
+    assert remedy is None or re.search(remedy, found.remedy or "")
+
+
+def test_without_numba_nothing_is_said_of_kernels() -> None:
+    assert check_kernels(None) == []
+
+
+def test_kernels_are_compiled_beforehand_and_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setattr(warm_up_module, "import_kernels", fresh_kernels)
+    assert command(["doctor", "--compile", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["compiled"], told["kernels"], told["missing"]) == (3, 3, 0)
+    assert told["folder"] == str(tmp_path / "kernels")
+    assert command(["doctor", "--compile"]) == 0
+    assert capsys.readouterr().out.startswith("0 kernels compiled")
+
+
+def test_kernels_that_cannot_be_kept_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
+    monkeypatch.setattr(warm_up_module, "import_kernels", fresh_kernels)
+    assert command(["doctor", "--compile"]) == 1
+    assert "3 of 3 kernels were compiled, but not kept" in capsys.readouterr().out
+
+
+def test_compiling_is_of_this_machine_alone() -> None:
+    with pytest.raises(ConfigurationError, match="--compile with --connect"):
+        command(["doctor", "--compile", "--connect", "tcp://127.0.0.1:5555"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import weakref
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,13 +12,17 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from robot_side.ahead import scene_table as module
 from robot_side.ahead.field import Ahead
+from robot_side.ahead.kinds.blocks import TOGETHER
 from robot_side.ahead.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
 from robot_side.ahead.scene_table import SceneTable, scene_table
+from robot_side.objects.movers import Movers
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.objects.validity import require_valid
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from tests.helpers.ahead.fields import along, ball_pose, look
+from tests.helpers.ahead.primitive_rows import object_bound
+from tests.helpers.ahead.primitive_rows import rows_of as rows_of_primitives
 from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
@@ -117,23 +122,108 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
     )
 
 
-NUMBERS = ("bounds", "shapes", "object_bounds", "object_volumes")
-ORDER = ("kinds", "rows_of_kind", "first_rows")
+def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
+    """The table has what its definitions say of each primitive and each object."""
+    rows = rows_of_primitives(objects)
+    of_thing = [[row for row in rows if row.thing == thing] for thing in range(len(objects.names))]
+    same = partial(np.testing.assert_allclose, rtol=1e-12, atol=1e-12)
+    assert [row.kind for row in rows] == table.kinds.tolist()
+    assert [row.row_of_kind for row in rows] == table.rows_of_kind.tolist()
+    assert np.diff(table.first_rows).tolist() == [len(mine) for mine in of_thing]
+    same(table.bounds, np.reshape([row.bound for row in rows], (-1, 4)))
+    same(table.shapes, np.reshape([row.shape for row in rows], (-1, 15)))
+    same(table.object_bounds, np.reshape([object_bound(mine) for mine in of_thing], (-1, 4)))
+    same(table.object_volumes, [sum(row.volume_m3 for row in mine) for mine in of_thing])
+    if objects.mesh_library is not None:
+        np.testing.assert_array_equal(table.placed_meshes[1], objects.mesh_positions_m)
+        np.testing.assert_array_equal(table.placed_meshes[2], objects.mesh_rotations)
+
+
+def any_objects(seed: int) -> tuple[PerceivedObjects, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    return (mixed() if seed % 3 == 0 else random_scene(rng, 3, meshes=seed % 2)), rng
 
 
 @settings(derandomize=True, deadline=None, max_examples=30)
-@given(seed=st.integers(0, 2**32 - 1), meshes=st.integers(0, 1))
-def test_the_next_frame_of_the_same_objects_has_the_table_that_would_be_made_anew(seed: int, meshes: int) -> None:
-    rng = np.random.default_rng(seed)
-    first = mixed() if seed % 3 == 0 else random_scene(rng, 3, meshes=meshes)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_table_has_what_is_defined_of_each_primitive_and_so_has_that_of_the_next_frame(seed: int) -> None:
+    first, rng = any_objects(seed)
+    assert_as_defined(module._make(first), first)
     last, objects = scene_table(first), moved(first, rng)
-    found, anew = module._moved(last, objects), module._make(objects)
+    found = module._moved(last, objects)
     assert found is not None
     assert found.objects is objects
-    for name in NUMBERS:
-        np.testing.assert_allclose(getattr(found, name), getattr(anew, name), rtol=1e-14, atol=1e-14)
-    for name in ORDER:
-        np.testing.assert_array_equal(getattr(found, name), getattr(anew, name))
+    assert_as_defined(found, objects)
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed: int) -> None:
+    first, rng = any_objects(seed)
+    some, others = (Movers(first, np.flatnonzero(rng.uniform(size=len(first.names)) < share)) for share in (0.5, 0.5))
+    frames = [movers.frame(moved(movers.at_first, rng), first.roles) for movers in (some, some, others)]
+    table = scene_table(first)
+    kept = table.bounds
+    for objects in (*frames, first, frames[0], first):
+        assert scene_table(objects) is table
+        assert table.objects is objects
+        assert_as_defined(table, objects)
+    assert table.bounds is kept
+
+
+def test_a_frame_that_is_refused_changes_nothing() -> None:
+    first = mixed()
+    movers = Movers(first, np.array([0, 3]))
+    good = moved(movers.at_first, np.random.default_rng(1))
+    frame = movers.frame(good, first.roles)
+    table = scene_table(frame)
+    bad = movers.frame(dataclasses.replace(good, box_rotations=1.1 * good.box_rotations), first.roles)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="box_rotations"):
+            scene_table(bad)
+        assert_as_defined(table, frame)
+    assert scene_table(frame) is table
+
+
+def test_what_loses_its_volume_has_a_table_of_its_own() -> None:
+    first = mixed()
+    movers = Movers(first, np.array([0, 3]))
+    frame = movers.frame(movers.at_first, first.roles)
+    table = scene_table(frame)
+    flat = dataclasses.replace(movers.at_first, box_half_sizes_m=movers.at_first.box_half_sizes_m * [0.0, 1.0, 1.0])
+    without = movers.frame(flat, first.roles)
+    assert scene_table(without).flat == 2
+    assert_as_defined(scene_table(without), without)
+    assert_as_defined(table, frame)
+    # And where something had none in the first place.
+    spread = Movers(dataclasses.replace(without), np.array([0, 3]))
+    assert_as_defined(scene_table(spread.frame(movers.at_first, first.roles)), frame)
+
+
+@pytest.mark.parametrize("unbounded", [0, 3])
+def test_blocks_bound_their_objects_wherever_these_go(unbounded: int) -> None:
+    rng = np.random.default_rng(unbounded)
+    scene = Scene()
+    for _ in range(unbounded):
+        scene.add().half_space([0.0, 0.0, 1.0], -1.0)
+    for center in rng.uniform(-1.0, 1.0, (5000, 3)):
+        scene.add().sphere(center, float(rng.uniform(0.001, 0.01)))
+    first = scene.add(Role.IGNORED).objects()
+    movers = Movers(first, np.sort(rng.choice(5000, 50, replace=False)))
+    for objects in (first, movers.frame(moved(movers.at_first, rng), first.roles)):
+        table, blocks = scene_table(objects), scene_table(objects).blocks
+        assert sorted(blocks.order) == list(range(5000 + unbounded))
+        assert set(blocks.order[:unbounded]) == set(range(unbounded))
+        np.testing.assert_array_equal(blocks.bounds, table.object_bounds[blocks.order])
+        places = np.arange(len(blocks.order))
+        for bounds, together in ((blocks.blocks, TOGETHER), (blocks.groups, TOGETHER**2)):
+            assert len(bounds) == -(-len(places) // together)
+            around = bounds[places // together]
+            apart = np.linalg.norm(blocks.bounds[:, :3] - around[:, :3], axis=1) + blocks.bounds[:, 3]
+            assert (apart <= around[:, 3] * (1.0 + 1e-12)).all()
+        if objects is first:
+            # What follows each other is near each other: a block of random ones would be 1.7 m large.
+            assert np.median(blocks.blocks[:, 3]) < 0.7
 
 
 def test_other_objects_and_those_that_lose_their_volume_get_a_table_of_their_own() -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.ahead.sideways import SPACING_M, FingerMotion, Sideways
-from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.ahead.turns import FIELD_PERIOD_S
 from robot_side.arm.port import GripperPose
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh

@@ -10,7 +10,7 @@ import pytest
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.ahead.felt import BEYOND_M
-from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.ahead.turns import FIELD_PERIOD_S
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.overlap import sphere_box
 from tests.helpers.ahead.fields import AHEAD, RADIUS_M, ball_pose

@@ -1,6 +1,7 @@
 """When the swept law looks, tick by tick in virtual time, and what holds until it looks again."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,12 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.ahead.looks import STEADY_S
-from robot_side.ahead.swept_law import FIELD_PERIOD_S
+from robot_side.ahead.turns import FIELD_PERIOD_S, MOST_WORK
 from robot_side.arm.port import GripperPose
-from tests.helpers.ahead.fields import ball_pose
+from robot_side.objects.perceived import PerceivedObjects
+from tests.helpers.ahead.fields import RADIUS_M, ball_pose
 from tests.helpers.ahead.situations import Senses, at, situation, swept, walls
+from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene
 
 # When it looks
@@ -24,14 +27,14 @@ class Watched:
         self.law = swept()
         self.looks: list[tuple[float, str]] = []
         self.now_s = 7.0
-        look: Callable[..., Any] = self.law.ahead.look
+        look: Callable[..., Any] = self.law.ahead.begin
 
         def watched(pose: GripperPose, scene: Any, standing: Any, along: Any, widest_m: float) -> Any:
             along_z = float(along.direction @ pose.tool_rotation[:, 2])
             self.looks.append((self.now_s, {1: "r2", -1: "l2"}.get(round(along_z), "stick")))
             return look(pose, scene, standing, along, widest_m)
 
-        monkeypatch.setattr(self.law.ahead, "look", watched)
+        monkeypatch.setattr(self.law.ahead, "begin", watched)
 
     def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
         """How often it looked in each tick."""
@@ -83,6 +86,89 @@ def test_a_stick_that_is_deflected_is_looked_along_within_a_tick_or_two(watched:
     before = len([1 for _, side in watched.looks if side == "stick"])
     watched.tick(0.001, 30)
     assert len([1 for _, side in watched.looks if side == "stick"]) == before
+
+
+CROWD = free_pose(
+    [[x, y, 0.001 * abs(x - y)] for x in np.linspace(-0.05, 0.05, 12) for y in np.linspace(-0.05, 0.05, 12)],
+    [RADIUS_M] * 144,
+)
+
+
+class Measured:
+    """A law that is used by a crowd of spheres, and how much it did in each tick."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.law, self.now_s = swept(), 7.0
+        self.done = 0
+        go_on: Callable[..., Any] = self.law.ahead.go_on
+
+        def measured(most: int) -> Any:
+            before = self.law.ahead.work
+            found = go_on(most)
+            self.done += self.law.ahead.work - before
+            return found
+
+        monkeypatch.setattr(self.law.ahead, "go_on", measured)
+
+    def tick(self, objects: PerceivedObjects, count: int, pose: GripperPose = CROWD) -> list[int]:
+        """How much it did in each tick."""
+        numbers = []
+        for _ in range(count):
+            self.now_s += 0.001
+            self.done = 0
+            self.sensed = self.law.sense(situation(pose, objects), self.now_s)
+            numbers.append(self.done)
+        return numbers
+
+
+def test_what_is_done_in_a_tick_is_bounded_where_much_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured, objects = Measured(monkeypatch), walls(0.03, 0.03)
+    numbers = measured.tick(objects, 100)
+    # At first everything is looked at, at once.
+    assert numbers[0] > 3 * MOST_WORK
+    # The last ramps that a round meets, and the last nodes of one ramp, may go beyond.
+    assert 0.5 * MOST_WORK < max(numbers[1:]) <= MOST_WORK + 150
+    assert sum(number > 0 for number in numbers) > 50
+    assert 18 <= measured.law.summary()["fields"] <= 21
+
+
+def test_a_look_that_took_a_few_ticks_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured, objects = Measured(monkeypatch), walls(0.03, 0.03)
+    measured.tick(objects, 1)
+    at_once = measured.sensed
+    numbers = measured.tick(objects, 30)
+    assert 0 < numbers.count(0) < 25
+    np.testing.assert_allclose(measured.sensed.r2.fast_m, at_once.r2.fast_m, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(measured.sensed.l2.slow_m, at_once.l2.slow_m, rtol=0.0, atol=1e-12)
+
+
+def test_a_look_counts_from_where_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else what the tool moved while it looked would be counted twice, or not at all."""
+    measured, objects = Measured(monkeypatch), walls(0.08, 0.08, front_m=0.05)
+    for tick in range(120):
+        way_m = 0.0001 * tick
+        measured.tick(
+            objects,
+            1,
+            replace(
+                CROWD,
+                tool_position_m=np.array([0.0, 0.0, way_m]),
+                sphere_centers_m=CROWD.sphere_centers_m + np.array([0.0, 0.0, way_m]),
+            ),
+        )
+        if tick == 0:
+            first = np.array(measured.sensed.r2.fast_m)
+        np.testing.assert_allclose(measured.sensed.r2.fast_m, first - way_m, rtol=0.0, atol=1e-9)
+
+
+def test_looks_come_to_an_end_although_every_tick_has_other_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured = Measured(monkeypatch)
+    for tick in range(60):
+        away_m = 0.06 - 0.0001 * tick
+        measured.tick(walls(away_m, 0.03), 1)
+        # A wall that comes at 0.1 m/s is seen a few hundredths of a second later.
+        assert away_m < measured.sensed.r2.fast_m[-1] + 0.012 < away_m + 0.0125
+    assert measured.law.summary()["fields"] > 10
 
 
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:

@@ -11,7 +11,8 @@ from robot_side.ahead.scene_table import scene_table
 from robot_side.ahead.tables import Tables
 from robot_side.ahead.total_overlap import total_overlap_m3
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap import Mesh
+from robot_side.overlap import Mesh, sphere_sphere
+from tests.helpers.ahead.fields import REACH_M, along, ball_pose, ways_of
 from tests.helpers.ahead.ways_by_definition import overlap_of
 from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
@@ -70,3 +71,33 @@ def test_a_sphere_that_is_not_finite_is_named_and_never_silently_far_away(bad: f
     spheres[1, 3] = bad
     with pytest.raises(ValueError, match="spheres holds NaN or infinity"):
         total(spheres, random_scene(np.random.default_rng(6), 1))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_many_objects_none_is_passed_over(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene, spheres = Scene(), any_spheres(rng, 5)
+    centers_m, radii_m = rng.uniform(-2.0, 2.0, (10_000, 3)), rng.uniform(0.005, 0.05, 10_000)
+    for center, radius in zip(centers_m, radii_m, strict=True):
+        scene.add().sphere(center, float(radius))
+    expected = sum(sphere_sphere(sphere[None, :3], sphere[3:], centers_m, radii_m).sum() for sphere in spheres)
+    assert expected > 0.0
+    assert total(spheres, scene.objects()) == pytest.approx(float(expected), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ways_among_many_objects_are_those_among_the_near_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centers_m, half_sizes_m = rng.uniform(-2.0, 2.0, (10_000, 3)), rng.uniform(0.005, 0.05, (10_000, 3))
+    near = np.linalg.norm(centers_m, axis=1) < 2.0 * REACH_M
+    scenes = []
+    for kept in (np.ones_like(near), near):
+        scene = Scene()
+        for center, half in zip(centers_m[kept], half_sizes_m[kept], strict=True):
+            scene.add().box(center, half)
+        scenes.append(scene.objects())
+    direction = rng.normal(size=3)
+    looked = along(direction / np.linalg.norm(direction), 0.003)
+    ways_m = [ways_of(ball_pose(0.05), objects, looked) for objects in scenes]
+    assert np.isfinite(ways_m[0]).any()
+    np.testing.assert_allclose(ways_m[0], ways_m[1], rtol=1e-12)

@@ -1,5 +1,7 @@
 """The kernels' compilation: once, beforehand, and never from stale machine code."""
 
+import errno
+import os
 from pathlib import Path
 
 import numba
@@ -17,6 +19,8 @@ from robot_side.compiled.kernel import (
     output_array,
     record_array,
 )
+from robot_side.compiled.machine_code import can_keep, keep, kept
+from robot_side.compiled.numba_inside import machine
 from robot_side.overlap import warm_up
 
 
@@ -42,32 +46,73 @@ def test_warm_up_leaves_nothing_to_compile() -> None:
 
 
 def test_machine_code_is_kept_on_disk_until_any_source_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert _kernel().cache_hits == 0
     assert _kernel().cache_hits == 1
     monkeypatch.setattr(compile_module, "digest", lambda _: "another version")
     assert _kernel().cache_hits == 0
 
 
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_machine_code_of_another_processor_or_version_is_not_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    _kernel()
+    here = machine()
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(compile_module, "machine", lambda: here.replace(numba.__version__, "0.1"))
+        assert _kernel().cache_hits == 0
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(numba.config, "CPU_NAME", "another")
+        assert machine() != here
+    assert _kernel().cache_hits == 1
+
+
 @pytest.mark.parametrize("content", [b"", b"\x80\x05garbage", None])
 def test_damaged_machine_code_is_compiled_anew(
-    suffix: str, content: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    content: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    _kernel()
-    (file,) = tmp_path.rglob(f"*.{suffix}")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel = _kernel()
+    assert kernel.is_kept
+    (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:50] if content is None else content)
+    assert not kernel.is_kept
     assert _kernel().cache_hits == 0
     assert _kernel().cache_hits == 1
 
 
-def test_a_kernel_works_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_place(*_: object) -> None:
-        raise RuntimeError("cannot cache function: no locator available")
-
-    monkeypatch.setattr(compile_module, "keep_on_disk", no_place)
+def test_a_kernel_works_where_nothing_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
+    assert not can_keep()
     assert _kernel().cache_hits == 0
+    assert _kernel().cache_hits == 0
+
+
+def test_a_kernel_works_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+
+    def part(self: Path, content: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(content[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", part)
+    assert _kernel().cache_hits == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_of_one_kernel_a_few_versions_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (tmp_path / "of.another-0.machine-code").write_bytes(b"")
+    for version in range(20):
+        keep("of.one", str(version), b"machine code")
+        newest = max(tmp_path.glob("of.one-*"), key=lambda file: file.stat().st_mtime)
+        os.utime(newest, (version, version))
+    assert kept("of.one", "19") == b"machine code"
+    assert kept("of.one", "0") is None
+    assert len(list(tmp_path.iterdir())) == 9
 
 
 def test_an_array_of_another_kind_is_refused_rather_than_compiled_for() -> None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from robot_side.overlap import kernels, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
 
@@ -95,6 +97,41 @@ def test_numbers_that_are_not_finite_or_too_large_are_refused(kind: str, name: s
         changed(kind, name, value)()
 
 
+@given(st.sampled_from(ARGUMENTS), st.integers(1, 150), st.data())
+def test_one_bad_number_among_many_is_found(argument: tuple[str, str], count: int, data: st.DataObject) -> None:
+    kind, name = argument
+    function, arguments = CALLS[kind]
+    many = {key: np.repeat(value[:1], count, axis=0) for key, value in arguments.items()}
+    function(**many)
+    place = tuple(data.draw(st.integers(0, size - 1)) for size in many[name].shape)
+    many[name][place] = data.draw(st.sampled_from([np.nan, np.inf, -np.inf, -1.1e50]))
+    with pytest.raises(ValueError, match=re.escape(f"{name}[{', '.join(map(str, place))}] = ")):
+        function(**many)
+
+
+@pytest.mark.parametrize("kind", CALLS)
+def test_numbers_at_their_limits_are_in_range(kind: str) -> None:
+    function, arguments = CALLS[kind]
+    far = np.full((2, 3), 1e50)
+    assert function(**{**arguments, "centers": far}) == pytest.approx(0.0)
+    radii = np.full(2, 1e50)
+    volumes, gradients, areas = function(**{**arguments, "radii": radii}, gradient=True)
+    expected = function(**{**arguments, "radii": radii * (1.0 - 2.0**-52)}, gradient=True)
+    for result, near in zip((volumes, gradients, areas), expected, strict=True):
+        np.testing.assert_allclose(result, near, rtol=1e-14, atol=1e-60)
+
+
+def test_what_nobody_vouched_for_is_doubtful() -> None:
+    rng = np.random.default_rng(9)
+    centers, vertices = rng.normal(size=(200, 3)), rng.normal(size=(200, 4, 3))
+    for threads in (1, 2):
+        kernels.tetrahedron_pairs(centers, np.ones(200), vertices, vouched=False, threads=threads)
+        radii = np.ones(200)
+        radii[150] = -1.0
+        with pytest.raises(kernels.DoubtfulNumbersError):
+            kernels.tetrahedron_pairs(centers, radii, vertices, vouched=False, threads=threads)
+
+
 @pytest.mark.parametrize(
     ("kind", "name"), [("sphere", "radii"), ("box", "radii"), ("sphere", "other_radii"), ("box", "box_half_sizes")]
 )
@@ -132,6 +169,20 @@ def test_ragged_lists_are_refused() -> None:
 def test_a_normal_of_zero_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^normals\[1\] = \[0\.0, 0\.0, 0\.0\] is out of range; valid: a vector"):
         changed("half-space", "normals", np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]]))()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rotations_are_orthonormal_to_a_millionth_and_no_further(sign: float) -> None:
+    arguments = {**CALLS["box"][1], "centers": np.zeros((2, 3))}
+    shear = sign * np.eye(3, k=2)
+    # Two numbers off the diagonal of QᵀQ are the shear, and the others next to nothing.
+    for share, refused in ((0.98, False), (0.999, False), (1.001, True)):
+        turned = np.array([np.eye(3), np.eye(3) + share * 1e-6 / np.sqrt(2.0) * shear])
+        if refused:
+            with pytest.raises(ValueError, match=r"^box_rotations\[1\] = .* an orthonormal matrix"):
+                sphere_box(**{**arguments, "box_rotations": turned})
+        else:
+            sphere_box(**{**arguments, "box_rotations": turned})
 
 
 @pytest.mark.parametrize("rotation", [2.0 * np.eye(3), np.zeros((3, 3)), np.eye(3) + 1e-6 * np.eye(3, k=1)])

@@ -55,6 +55,20 @@ def test_a_pair_does_not_depend_on_its_neighbours(pairs: Pairs, make: Callable[[
 
 
 @KINDS
+@pytest.mark.parametrize("count", [1, 8, 13, LANES, 3 * LANES + 5])
+def test_blocks_in_which_all_pairs_are_cut_change_nothing(
+    pairs: Pairs, make: Callable[[int], Arrays], count: int
+) -> None:
+    arguments = make(4000)
+    mixed = pairs(*arguments)
+    cut = np.flatnonzero((mixed[2] > 0.0) & (np.abs(mixed[1]).max(axis=1) > 0.1 * mixed[2]))[:count]
+    counts = PairCounts()
+    alone = pairs(*(argument[cut] for argument in arguments), counts=counts)
+    assert (counts.pairs, counts.early) == (count, 0)
+    assert_same(alone, (mixed[0][cut], mixed[1][cut], mixed[2][cut]))
+
+
+@KINDS
 def test_threads_change_nothing(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
     arguments = make(5000)
     one, three = PairCounts(), PairCounts()

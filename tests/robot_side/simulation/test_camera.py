@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.perceived import KINDS, PerceivedObjects, Role
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
 from robot_side.simulation.encoders import Encoder
@@ -116,3 +116,55 @@ def test_a_role_changes_from_the_next_frame_on(built_in: Scene) -> None:
         camera.set_role("vase", Role.TARGET)
     with pytest.raises(ValueError, match="frame_rate_hz"):
         MujocoCamera(built_in, frame_rate_hz=0.0)
+
+
+def test_a_frame_says_what_moves_and_is_what_a_camera_that_says_all_sees(built_in: Scene) -> None:
+    names = tuple(thing.name for thing in built_in.objects)
+    error = CameraError(names, mean_m=0.01, standard_deviation_m=0.005, seed=3)
+    arm, camera = MujocoArm(built_in, Encoder()), MujocoCamera(built_in, error)
+    first = camera.perceive(0.0)
+    assert first.since is None
+    # Something falls meanwhile.
+    built_in.data.joint(int(built_in.model.body("table_scene/ball").jntadr[0])).qpos[2] += 0.05
+    for tick in range(1, 200):
+        arm.state(0.001 * tick)
+    second = camera.perceive(0.2)
+    assert second.since is not None
+    movers, moved = second.since
+    assert movers.first is first
+    assert set(moved.names) == set(names) - built_in.fixed
+    data = built_in.data
+    expected = built_in.primitives.place(0.2, built_in.roles, error.next_frame(), data.geom_xpos, data.geom_xmat)
+    for kind in KINDS:
+        for name in kind.fields:
+            np.testing.assert_array_equal(getattr(second, name), getattr(expected, name), err_msg=name)
+    ball = np.flatnonzero(second.sphere_object == index_of(second, "ball"))
+    assert (second.sphere_centers_m[ball] != first.sphere_centers_m[ball]).any()
+    assert second.velocities_m_s is not None
+    assert (second.velocities_m_s[[name in built_in.fixed for name in names]] == 0.0).all()
+
+
+def test_a_camera_whose_error_is_drawn_anew_says_all_of_each_object(built_in: Scene) -> None:
+    names = tuple(thing.name for thing in built_in.objects)
+    camera = MujocoCamera(built_in, CameraError(names, frame_standard_deviation_m=0.001))
+    frames = [camera.perceive(0.05 * number) for number in range(2)]
+    assert frames[1].since is not None
+    assert frames[1].since[1].names == names
+    first, second = (frame.box_centers_m for frame in frames)
+    assert (first != second).all()
+
+
+def test_roles_change_without_a_new_first_frame_unless_primitives_go(built_in: Scene) -> None:
+    camera = MujocoCamera(built_in)
+    first = camera.perceive(0.0)
+    camera.set_role("ball", Role.TARGET)
+    second = camera.perceive(0.05)
+    assert second.since is not None
+    assert second.since[0].first is first
+    assert second.roles[index_of(second, "ball")] is Role.TARGET
+    for role in (Role.IGNORED, Role.OBSTACLE):
+        camera.set_role("ball", role)
+        number = 2.0 if role is Role.IGNORED else 3.0
+        assert camera.perceive(number).since is None
+        later = camera.perceive(number + 0.05)
+        assert later.roles[index_of(later, "ball")] is role

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import robot_side.ahead.swept_law
+import robot_side.ahead.turns
 from feelahead.approaches.approach import Approach
 from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.benchmarks.felt.hulls import Hulls
@@ -63,7 +63,7 @@ def test_while_the_tool_moves_straight_on_a_late_look_is_felt_as_one_in_time() -
 
 
 def test_what_is_exchanged_comes_back_even_after_an_error() -> None:
-    module = robot_side.ahead.swept_law
+    module = robot_side.ahead.turns
     before = module.FIELD_PERIOD_S
     with pytest.raises(ZeroDivisionError), exchanged(module.__name__, FIELD_PERIOD_S=0.0):
         _ = 1.0 / module.FIELD_PERIOD_S
@@ -81,8 +81,8 @@ def test_everything_is_set_while_it_is_asked_for() -> None:
         return now("feelahead.approaches.approach", "robot_settings")(asked).cover_m
 
     with turned(Turned(period_s=0.02, late_ticks=2, cover_m=0.008, nodes=3)):
-        assert now("robot_side.ahead.swept_law", "FIELD_PERIOD_S") == 0.02
-        assert [now(f"robot_side.ahead.{name}", "NODES_PER_MARGIN") for name in ("nodes", "ask")] == [3, 3]
+        assert [now(f"robot_side.ahead.{name}", "FIELD_PERIOD_S") for name in ("swept_law", "turns")] == [0.02, 0.02]
+        assert now("robot_side.ahead.ask", "NODES_PER_MARGIN") == 3
         made = now("robot_side.assembly", "SweptLaw")(uncertain(), np.zeros(6), LIMITS, MOTION)
         assert isinstance(made, LateLaw)
         assert cover_m() == 0.008

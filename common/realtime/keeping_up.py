@@ -1,0 +1,111 @@
+"""Whether a loop keeps its period on this machine; if not, why, and what would help: said once, in words."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from common.clock import Clock
+from common.realtime.pacing import Pacer
+from common.realtime.stages import Stages
+from common.realtime.taken import Taken, read_taken
+
+WINDOW_S: Final = 5.0
+_LEFT_OUT: Final = 0.05
+"""A share of the turns; fewer is a hiccup, which every machine has."""
+_FULL: Final = 0.8
+"""Of the period: whoever computes for so long on average has no room for what varies."""
+_UNDISTURBED: Final = 1.25
+"""Turns that last no longer than this times what they compute were left alone."""
+
+
+class KeepingUp:
+    """Looks at one loop in windows of 5 s; only turns that its pacer is due for count as left out."""
+
+    def __init__(
+        self,
+        pacer: Pacer,
+        stages: Stages,
+        wall: Clock,
+        processor: Clock,
+        helps: Mapping[str, str],
+        taken: Callable[[], Taken] = read_taken,
+    ) -> None:
+        """`helps`: what makes each stage shorter, by its name, and "" for what is no stage's."""
+        self.said: str | None = None
+        """The sentence, once there was one."""
+        self.stages = stages
+        self._pacer, self._wall, self._processor, self._helps, self._taken = pacer, wall, processor, helps, taken
+        self._began_s = self._computed_s = 0.0
+        self._worked_s = [0.0, 0.0]
+        """In this window, without waiting: wall time and processor time."""
+        self._first: tuple[float, Taken] | None = None
+        self._window: tuple[float, Taken, int, int, list[float]] | None = None
+
+    def begin(self) -> None:
+        """The loop has something to do."""
+        self._began_s, self._computed_s = self._wall.now(), self._processor.now()
+
+    def end(self, *, turned: bool) -> str | None:
+        """It will wait now. `turned`: the pacer's turn was among it. What is to be said, once a run at most."""
+        now_s = self._wall.now()
+        self._worked_s[0] += now_s - self._began_s
+        self._worked_s[1] += self._processor.now() - self._computed_s
+        if not turned:
+            return None
+        self.stages.end_turn()
+        if self._window is not None and now_s - self._window[0] < WINDOW_S:
+            return None
+        said, before = None, self._window
+        taken = self._taken()
+        if before is not None and self.said is None:
+            self.said = said = self._judge(now_s, taken, *before)
+        if self._first is None:
+            self._first = now_s, taken
+        self.stages.take_in()
+        self._window = now_s, taken, self._pacer.turns, self._pacer.overruns, list(self.stages.spent_s)
+        self._worked_s = [0.0, 0.0]
+        return said
+
+    def summary(self) -> dict[str, Any]:
+        """`said`, and what share of the run other programs (`waited`) and the host (`stolen`) took; None: unknown."""
+        waited = stolen = None
+        if self._first is not None:
+            since_s, taken = self._first
+            waited, stolen = self._taken().shares_since(taken, self._wall.now() - since_s)
+        return {"said": self.said, "waited": waited, "stolen": stolen}
+
+    def _judge(
+        self, now_s: float, taken: Taken, since_s: float, before: Taken, turns: int, overruns: int, spent_s: list[float]
+    ) -> str | None:
+        turns, overruns = self._pacer.turns - turns, self._pacer.overruns - overruns
+        if turns == 0 or overruns <= _LEFT_OUT * (turns + overruns):
+            return None
+        wall_s, computed_s = (worked_s / turns for worked_s in self._worked_s)
+        waited, stolen = taken.shares_since(before, now_s - since_s)
+        lost = max(waited or 0.0, stolen or 0.0)
+        left_out = f"{100.0 * overruns / (turns + overruns):.0f} % of the turns are left out"
+        undisturbed = wall_s < _UNDISTURBED * computed_s and lost < _LEFT_OUT
+        if computed_s >= _FULL * self._pacer.period_s or undisturbed:
+            self.stages.take_in()
+            stage, share = self._longest(spent_s, computed_s * turns)
+            most = f", {100.0 * share:.0f} % of it {stage}" if stage else ""
+            return (
+                f"this machine is too slow: a turn computes for {1e3 * computed_s:.2g} ms where there are"
+                f" {1e3 * self._pacer.period_s:.2g} ms{most}, and {left_out}; {self._helps[stage]} would help"
+            )
+        whose = "closing other programs, or --realtime,"
+        if stolen is not None and stolen > max(waited or 0.0, _LEFT_OUT):
+            whose = f"its host took {100.0 * stolen:.0f} % of the time: a host with less to do"
+        elif waited is not None and waited > _LEFT_OUT:
+            whose = f"others had the processor for {100.0 * waited:.0f} % of the time: {whose}"
+        return (
+            f"this machine is too busy: a turn lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} of"
+            f" them, and {left_out}; {whose} would help"
+        )
+
+    def _longest(self, before_s: list[float], computed_s: float) -> tuple[str, float]:
+        """The stage with the most processor time since, and its share of all; "" where most is no stage's."""
+        spent_s = [now_s - then_s for now_s, then_s in zip(self.stages.spent_s[1::2], before_s[1::2], strict=True)]
+        longest_s = max(spent_s)
+        if longest_s < computed_s - sum(spent_s):
+            return "", 0.0
+        return self.stages.names[spent_s.index(longest_s)], min(1.0, longest_s / computed_s)

@@ -1,0 +1,80 @@
+"""What the turns of a loop spend on each of a few things, in wall time and in processor time.
+
+Reading four clocks takes a microsecond and a half, so one turn in seven is looked at: no period of the loop's own work,
+such as 4, 10 or 33 turns, is a multiple of that.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, ParamSpec, TypeVar
+
+from common.clock import Clock
+from common.statistics import BLOCK, RunningStatistics
+
+EVERY: Final = 7
+"""One turn in so many is looked at."""
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+class Stages:
+    """Adds up within a turn, and keeps statistics over the turns; a stage may lie within another one's time."""
+
+    def __init__(self, names: Sequence[str], wall: Clock, processor: Clock, seed: int = 0, every: int = EVERY) -> None:
+        """`processor`: what the thread that runs the loop has computed."""
+        self.names = tuple(names)
+        self.spent_s = [0.0] * (2 * len(self.names))
+        """Since the start, of each stage: wall time, then processor time, as many turns as were looked at stand for."""
+        self._wall, self._processor = wall, processor
+        self._every, self._until_next, self._looks = every, 0, True
+        self._turn_s = [0.0] * len(self.spent_s)
+        self._turns_s: list[list[float]] = []
+        self._statistics = [RunningStatistics(seed) for _ in self.spent_s]
+
+    def timed(self, name: str, function: Callable[Given, Result]) -> Callable[Given, Result]:
+        """`function`, whose time counts to the stage `name`; ValueError for one that there is not."""
+        place = 2 * self.names.index(name)
+        wall, processor = self._wall.now, self._processor.now
+
+        def measured(*arguments: Given.args, **others: Given.kwargs) -> Result:
+            if not self._looks:
+                return function(*arguments, **others)
+            began_s, computed_s = wall(), processor()
+            result = function(*arguments, **others)
+            turn_s = self._turn_s
+            turn_s[place] += wall() - began_s
+            turn_s[place + 1] += processor() - computed_s
+            return result
+
+        return measured
+
+    def end_turn(self) -> None:
+        """What was spent since the last call is one turn's."""
+        if self._looks:
+            self._until_next = self._every
+            self._turns_s.append(self._turn_s)
+            self._turn_s = [0.0] * len(self._turn_s)
+            if len(self._turns_s) >= BLOCK:
+                self.take_in()
+        self._until_next -= 1
+        self._looks = self._until_next == 0
+
+    def take_in(self) -> None:
+        """Reckon with the turns that wait, which costs each of them less."""
+        if not self._turns_s:
+            return
+        for place, values_s in enumerate(zip(*self._turns_s, strict=True)):
+            self.spent_s[place] += self._every * sum(values_s)
+            self._statistics[place].extend(values_s)
+        self._turns_s.clear()
+
+    def summary(self) -> dict[str, dict[str, dict[str, float | None]]]:
+        """Of each stage `wall_us` and `cpu_us` of a turn, each with `p50`, `p99` and `max`."""
+        self.take_in()
+        wall, processor = ([microseconds(one) for one in self._statistics[which::2]] for which in (0, 1))
+        return {name: {"wall_us": wall[place], "cpu_us": processor[place]} for place, name in enumerate(self.names)}
+
+
+def microseconds(time_s: RunningStatistics) -> dict[str, float | None]:
+    """`p50`, `p99` and `max` in microseconds, of samples in seconds."""
+    values_s = {"p50": time_s.quantile(0.50), "p99": time_s.quantile(0.99), "max": time_s.maximum}
+    return {name: None if value is None else 1e6 * value for name, value in values_s.items()}

@@ -1,0 +1,39 @@
+"""Calling one kernel from another by its address: Numba itself would compile the called one in anew, at full cost."""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numba
+import numba.extending
+
+from robot_side.compiled.kernel import COUNT, Compiled
+from robot_side.compiled.numba_inside import call_at
+
+
+def call_of(kernel: Compiled) -> Callable[[int, tuple[Any, ...]], Any]:
+    """The function by which kernels call `kernel`: of its `address` and a tuple of its arguments; in kernels only.
+
+    Arguments of other types than the kernel's are refused as the caller is compiled.
+    """
+    wanted = kernel.signature
+
+    def call(_typing: Any, _address: Any, given: Any) -> Any:
+        if len(given) != len(wanted.args) or not all(map(_fits, given, wanted.args)):
+            raise numba.TypingError(f"{kernel.name} takes {wanted.args}, not {given}")
+
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            address, packed = arguments
+            unpacked = [builder.extract_value(packed, place) for place in range(len(wanted.args))]
+            return call_at(context, builder, wanted, address, unpacked)
+
+        return wanted.return_type(COUNT, given), generate
+
+    return cast(Callable[[int, tuple[Any, ...]], Any], cast(Any, numba.extending.intrinsic)(call))
+
+
+def _fits(given: Any, wanted: Any) -> bool:
+    """Whether the two are alike in memory: an array may be read-only here and not there."""
+    if isinstance(wanted, numba.types.Array):
+        of = ("dtype", "ndim", "layout")
+        return isinstance(given, numba.types.Array) and all(getattr(given, a) == getattr(wanted, a) for a in of)
+    return bool(given == wanted)

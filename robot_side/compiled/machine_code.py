@@ -1,0 +1,62 @@
+"""Machine code on disk: one file for each kernel, processor and state of its sources, there whole or not at all."""
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from common.files.user_folders import cache_folder
+
+_ENDING: Final = ".machine-code"
+_CHECK_BYTES: Final = 32
+_VERSIONS: Final = 8
+"""So many files of one kernel stay: processors and states of the sources may take turns."""
+
+
+def machine_code_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Where it is: $NUMBA_CACHE_DIR, else `kernels` in the folder of what can be worked out again."""
+    given = environment.get("NUMBA_CACHE_DIR")
+    return Path(given) if given else cache_folder(environment) / "kernels"
+
+
+def can_keep() -> bool:
+    """Whether the folder can be written to, or made."""
+    folder = machine_code_folder().absolute()
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    return os.access(there, os.W_OK | os.X_OK)
+
+
+def kept(name: str, key: str) -> bytes | None:
+    """The machine code of the kernel `name` by its `key`; None where there is none, or not all of it."""
+    try:
+        content = _path(name, key).read_bytes()
+    except OSError:
+        return None
+    # A crash or a full disk may have left a part.
+    check, code = content[:_CHECK_BYTES], content[_CHECK_BYTES:]
+    return code if hashlib.sha256(code).digest() == check else None
+
+
+def keep(name: str, key: str, code: bytes) -> None:
+    """Keep it for the next start; a folder that cannot be written to, or has no room, keeps nothing."""
+    path = _path(name, key)
+    # Renamed when whole: other processes may read it, or write the same, meanwhile.
+    part = path.with_suffix(f".{os.getpid()}")
+    with contextlib.suppress(OSError):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(hashlib.sha256(code).digest() + code)
+            part.replace(path)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
+        # What processes left that were killed goes with the old ones.
+        files = sorted(path.parent.glob(f"{name}-*"), key=lambda file: file.stat().st_mtime)
+        for old in files[:-_VERSIONS]:
+            old.unlink(missing_ok=True)
+
+
+def _path(name: str, key: str) -> Path:
+    return machine_code_folder() / f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}{_ENDING}"

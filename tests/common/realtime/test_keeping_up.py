@@ -1,0 +1,132 @@
+"""A loop that does not keep its period is told why, once a run: in virtual time, with what a machine would count."""
+
+import pytest
+
+from common.clock import VirtualClock
+from common.realtime.keeping_up import WINDOW_S, KeepingUp
+from common.realtime.pacing import Pacer
+from common.realtime.stages import Stages
+from common.realtime.taken import Taken
+
+PERIOD_S = 1e-3
+HELPS = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster machine"}
+
+
+class Loop:
+    """Turns that take what a test says; `waited` and `stolen`: what the machine takes meanwhile, None for unknown."""
+
+    def __init__(self, *, waited: float | None = 0.0, stolen: float | None = 0.0) -> None:
+        self.wall, self.processor = VirtualClock(100.0), VirtualClock(7.0)
+        self._waited, self._stolen = waited, stolen
+        self.pacer = Pacer(PERIOD_S, 100.0)
+        stages = Stages(("physics", "sensing"), self.wall, self.processor)
+        self._stages = {name: stages.timed(name, self._pass) for name in ("physics", "sensing")}
+        self.keeping_up = KeepingUp(self.pacer, stages, self.wall, self.processor, HELPS, self._taken)
+        self.said: list[str] = []
+
+    def _taken(self) -> Taken:
+        passed_s = self.wall.now() - 100.0
+        waited = None if self._waited is None else self._waited * passed_s
+        stolen = None if self._stolen is None else self._stolen * 200.0 * passed_s
+        return Taken(waited, stolen, None if stolen is None else 200.0 * passed_s)
+
+    def _pass(self, wall_s: float, processor_s: float) -> None:
+        self.wall.advance_to(self.wall.now() + wall_s)
+        self.processor.advance_to(self.processor.now() + processor_s)
+
+    def run(
+        self, for_s: float, computes_s: float, lasts_s: float | None = None, *, physics: float = 0.0, every: int = 1
+    ) -> None:
+        """Turns of which each `every`-th computes for so long, `physics` of it in physics, and lasts so long."""
+        end_s, turn = self.wall.now() + for_s, 0
+        while self.wall.now() < end_s:
+            self.wall.advance_to(max(self.wall.now(), self.pacer.deadline_s))
+            self.keeping_up.begin()
+            self.pacer.begin(self.wall.now())
+            turn += 1
+            spent_s = computes_s if turn % every == 0 else 1e-4
+            self._stages["physics"](physics * spent_s, physics * spent_s)
+            self._stages["sensing"](0.1 * spent_s, 0.1 * spent_s)
+            self._pass((0.9 - physics) * spent_s, (0.9 - physics) * spent_s)
+            if lasts_s is not None:
+                self._pass(lasts_s - spent_s, 0.0)
+            if (text := self.keeping_up.end(turned=True)) is not None:
+                self.said.append(text)
+
+
+def test_a_loop_that_keeps_up_is_told_nothing() -> None:
+    loop = Loop()
+    loop.run(4 * WINDOW_S, 0.4e-3)
+    loop.run(4 * WINDOW_S, 2.5e-3, every=100)
+    assert loop.said == []
+    assert loop.keeping_up.summary() == {"said": None, "waited": 0.0, "stolen": 0.0}
+
+
+def test_too_slow_names_what_takes_longest_and_what_would_help_once() -> None:
+    loop = Loop()
+    loop.run(4 * WINDOW_S, 1.5e-3, physics=0.7)
+    (text,) = loop.said
+    assert text.startswith(
+        "this machine is too slow: a turn computes for 1.5 ms where there are 1 ms, 70 % of it physics"
+    )
+    assert text.endswith("33 % of the turns are left out; fewer bodies would help")
+    assert loop.keeping_up.summary()["said"] == text
+
+
+def test_nothing_is_said_before_the_window_is_over() -> None:
+    loop = Loop()
+    loop.run(0.9 * WINDOW_S, 1.5e-3)
+    assert loop.said == []
+
+
+def test_what_is_no_stage_has_a_help_of_its_own() -> None:
+    loop = Loop()
+    loop.run(2 * WINDOW_S, 1.5e-3)
+    assert loop.said[0].endswith("; a faster machine would help")
+    assert "of it" not in loop.said[0]
+
+
+def test_turns_that_are_too_long_at_times_are_slow_where_nobody_disturbed_them() -> None:
+    loop = Loop()
+    loop.run(2 * WINDOW_S, 4.5e-3, every=10)
+    assert loop.said[0].startswith("this machine is too slow: a turn computes for 0.54 ms")
+
+
+def test_too_busy_when_others_have_the_processor() -> None:
+    loop = Loop(waited=0.4)
+    loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
+    (text,) = loop.said
+    assert text.startswith("this machine is too busy: a turn lasts 1.4 ms and computes for 0.3 of them")
+    assert "others had the processor for 40 % of the time: closing other programs, or --realtime, would help" in text
+    assert loop.keeping_up.summary()["waited"] == pytest.approx(0.4)
+
+
+def test_too_busy_when_the_host_takes_the_time() -> None:
+    loop = Loop(waited=0.1, stolen=0.3)
+    loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
+    assert "its host took 30 % of the time: a host with less to do would help" in loop.said[0]
+
+
+def test_a_system_that_does_not_tell_is_no_obstacle() -> None:
+    loop = Loop(waited=None, stolen=None)
+    loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
+    assert loop.said[0].startswith("this machine is too busy")
+    assert loop.said[0].endswith("; closing other programs, or --realtime, would help")
+    assert loop.keeping_up.summary() == {"said": loop.said[0], "waited": None, "stolen": None}
+
+
+def test_each_window_counts_for_itself() -> None:
+    loop = Loop()
+    loop.run(6 * WINDOW_S, 0.2e-3)
+    assert loop.said == []
+    loop.run(2.5 * WINDOW_S, 1.2e-3, physics=0.8)
+    assert "a turn computes for 1.2 ms where there are 1 ms, 80 % of it physics" in loop.said[0]
+
+
+def test_turns_for_messages_alone_add_to_the_next() -> None:
+    loop = Loop()
+    for _ in range(3):
+        loop.keeping_up.begin()
+        loop._pass(1e-3, 1e-3)
+        assert loop.keeping_up.end(turned=False) is None
+    assert loop.keeping_up.summary()["waited"] is None

@@ -1,0 +1,75 @@
+"""What a turn's stages took, in virtual time."""
+
+import pytest
+
+from common.clock import VirtualClock
+from common.realtime.stages import EVERY, Stages, microseconds
+from common.statistics import BLOCK, RunningStatistics
+
+
+class Both:
+    """A wall clock and a processor's, which a test moves on."""
+
+    def __init__(self) -> None:
+        self.wall, self.processor = VirtualClock(), VirtualClock()
+
+    def pass_(self, wall_s: float, processor_s: float) -> None:
+        self.wall.advance_to(self.wall.now() + wall_s)
+        self.processor.advance_to(self.processor.now() + processor_s)
+
+
+def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
+    clocks = Both()
+    stages = Stages(("sockets", "law"), clocks.wall, clocks.processor, every=1)
+    send, think = stages.timed("sockets", clocks.pass_), stages.timed("law", clocks.pass_)
+    for _ in range(3):
+        send(2e-6, 1e-6)
+    clocks.pass_(1.0, 1.0)  # is nobody's
+    think(10e-6, 8e-6)
+    stages.end_turn()
+    send(4e-6, 4e-6)
+    stages.end_turn()
+    summary = stages.summary()
+    assert summary["sockets"]["wall_us"] == pytest.approx({"p50": 5.0, "p99": 5.98, "max": 6.0})
+    assert summary["sockets"]["cpu_us"] == pytest.approx({"p50": 3.5, "p99": 3.99, "max": 4.0})
+    assert summary["law"]["cpu_us"] == pytest.approx({"p50": 4.0, "p99": 7.92, "max": 8.0})
+    assert stages.spent_s == pytest.approx([10e-6, 7e-6, 10e-6, 8e-6])
+
+
+def test_what_is_timed_returns_what_it_would_and_an_unknown_stage_is_refused() -> None:
+    clocks = Both()
+    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
+    assert stages.timed("law", lambda one, *, other: (one, other))(1, other=2) == (1, 2)
+    with pytest.raises(ValueError, match="not in"):
+        stages.timed("physics", clocks.pass_)
+
+
+def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
+    clocks = Both()
+    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
+    think = stages.timed("law", clocks.pass_)
+    for _ in range(2 * BLOCK + 1):
+        think(1e-6, 1e-6)
+        stages.end_turn()
+        assert len(stages._turns_s) < BLOCK
+    stages.take_in()
+    assert stages.spent_s[0] == pytest.approx((2 * BLOCK + 1) * 1e-6)
+
+
+def test_one_turn_in_so_many_is_looked_at_and_stands_for_them_all() -> None:
+    clocks = Both()
+    stages = Stages(("law",), clocks.wall, clocks.processor)
+    think = stages.timed("law", clocks.pass_)
+    for turn in range(4 * EVERY):
+        think(1e-6 * turn, 2e-6)
+        stages.end_turn()
+    assert stages.summary()["law"]["wall_us"]["max"] == pytest.approx(3.0 * EVERY)
+    assert stages.spent_s == pytest.approx([EVERY * EVERY * 6e-6, 4 * EVERY * 2e-6])
+
+
+def test_nothing_yet_is_unknown_and_times_are_in_microseconds() -> None:
+    times = RunningStatistics()
+    assert microseconds(times) == {"p50": None, "p99": None, "max": None}
+    for milliseconds in range(1, 102):
+        times.add(1e-3 * milliseconds)
+    assert microseconds(times) == pytest.approx({"p50": 51_000.0, "p99": 100_000.0, "max": 101_000.0})

@@ -1,0 +1,41 @@
+"""What Linux counts of a thread that had to wait."""
+
+from pathlib import Path
+
+import pytest
+
+from common.realtime import taken as module
+from common.realtime.taken import Taken, read_taken
+
+
+def test_this_machine_tells_and_never_counts_backwards() -> None:
+    before, after = read_taken(), read_taken()
+    for waited, stolen in (after.shares_since(before, 1.0), after.shares_since(after, 1.0)):
+        assert waited is None or waited >= 0.0
+        assert stolen is None or 0.0 <= stolen <= 1.0
+
+
+def test_the_counts_are_read_in_their_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    waited, processors = tmp_path / "schedstat", tmp_path / "stat"
+    waited.write_text("5000000000 1500000000 77\n")
+    # user nice system idle iowait irq softirq steal guest guest_nice: a guest's time is in user's, too
+    processors.write_text("cpu  10 20 30 40 50 60 70 20 999 999\ncpu0 1 1 1 1 1 1 1 1 1 1\n")
+    monkeypatch.setattr(module, "_WAITED", waited)
+    monkeypatch.setattr(module, "_PROCESSORS", processors)
+    assert read_taken() == Taken(waited_s=1.5, stolen=20.0, whole=300.0)
+
+
+@pytest.mark.parametrize("text", ["", "nonsense\n", "cpu 1 2\n"])
+def test_a_system_that_does_not_count_is_unknown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    (tmp_path / "file").write_text(text)
+    for name in ("_WAITED", "_PROCESSORS"):
+        monkeypatch.setattr(module, name, tmp_path / "file")
+    assert read_taken() in (Taken(None, None, None), Taken(1e-9, None, None))
+    for name in ("_WAITED", "_PROCESSORS"):
+        monkeypatch.setattr(module, name, tmp_path / "none")
+    assert read_taken() == Taken(None, None, None)
+    assert Taken(1.0, 2.0, 3.0).shares_since(Taken(None, None, None), 1.0) == (None, None)
+
+
+def test_shares_are_of_what_passed() -> None:
+    assert Taken(3.0, 15.0, 400.0).shares_since(Taken(2.0, 5.0, 200.0), 4.0) == (0.25, 0.05)

@@ -1,0 +1,136 @@
+"""How seldom a turn asks ZeroMQ, and that nothing is overlooked for it. Nothing here sleeps."""
+
+import select
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import zmq
+
+from common.sockets import inbox as inbox_module
+from common.sockets.inbox import Inbox
+from common.sockets.operator import OperatorSockets
+from common.sockets.readable import readable as readable_now
+from common.sockets.robot import RobotSockets
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, greet, publish_until_seen
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Who was asked for EVENTS, in turn."""
+    those: list[Any] = []
+    really = readable_now
+
+    def readable(part: Any) -> bool:
+        those.append(part)
+        return really(part)
+
+    monkeypatch.setattr(inbox_module, "readable", readable)
+    return those
+
+
+@pytest.fixture
+def pair() -> Iterator[tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]]:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    ours, theirs = context.socket(zmq.PAIR), context.socket(zmq.PAIR)
+    ours.bind("tcp://127.0.0.1:*")
+    theirs.connect(ours.getsockopt_string(zmq.LAST_ENDPOINT))
+    yield ours, theirs
+    context.destroy(linger=0)
+
+
+def signal_of(inbox: Inbox) -> bool:
+    """Whether its descriptor signals within a bounded time."""
+    return bool(select.select([inbox.descriptor], [], [], PATIENT_S)[0])
+
+
+def settle(inbox: Inbox) -> None:
+    """Until the connection is made, and neither EVENTS nor the descriptor has news."""
+    while select.select([inbox.descriptor], [], [], 0.0)[0] or inbox.has_some():
+        list(inbox.read())
+
+
+def test_who_has_nothing_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
+    inbox = Inbox(pair[0], frames=1)
+    pair[1].send(b"hello")
+    assert signal_of(inbox)
+    while not inbox.has_some():
+        assert signal_of(inbox)
+    assert [[frame.bytes for frame in message] for message in inbox.read()] == [[b"hello"]]
+    asked.clear()
+    assert not any(inbox.has_some() for _ in range(100))
+    assert asked == []
+
+
+def test_the_descriptor_tells_of_what_comes_later(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
+    inbox = Inbox(pair[0], frames=1)
+    settle(inbox)
+    for number in range(50):
+        pair[1].send(b"%d" % number)
+        while not inbox.has_some():
+            assert signal_of(inbox)
+        assert [frame.bytes for message in inbox.read() for frame in message] == [b"%d" % number]
+
+
+def test_a_signal_that_another_use_took_is_no_message_lost(
+    pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"],
+) -> None:
+    ours, theirs = pair
+    inbox = Inbox(ours, frames=1)
+    theirs.send(b"first")
+    while not inbox.has_some():
+        assert signal_of(inbox)
+    list(inbox.read())
+    theirs.send(b"second")
+    assert signal_of(inbox)
+    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # as sending does
+        assert signal_of(inbox)
+    assert not inbox.has_some(), "nothing signals any more: without `used` it is overlooked"
+    inbox.used()
+    assert inbox.has_some()
+    assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
+
+
+@pytest.fixture
+def robot() -> Iterator[RobotSockets]:
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
+        yield opened
+
+
+@pytest.fixture
+def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
+        yield opened
+
+
+def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
+    robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both ends send and hear a message a turn: EVENTS after sending, for what has come, and for the end of it."""
+    peer = greet(robot, operator)
+    selects: list[int] = []
+    really = select.select
+
+    def counted(*arguments: Any) -> Any:
+        selects.append(1)
+        return really(*arguments)
+
+    monkeypatch.setattr(select, "select", counted)
+    publish_until_seen(robot, operator, b"topic")
+    assert operator.receive_view()
+    most, waits = 0, 0
+    for turn in range(50):
+        asked.clear()
+        assert operator.send(b"%d" % turn)
+        assert robot.wait(PATIENT_S)
+        assert [payload for _, payload in robot.receive()] == [b"%d" % turn]
+        assert robot.send(peer, b"%d" % turn)
+        assert operator.wait(PATIENT_S)
+        assert operator.receive() == [b"%d" % turn]
+        assert operator.receive_view() == []
+        waits += 2
+        most = max(most, *(asked.count(part) for part in (robot._control, operator._control)))
+        assert operator._view not in asked, "whose descriptor says nothing"
+    # ZeroMQ may signal for its own affairs, such as a pipe that has room again: then one is asked once more.
+    assert most <= 4
+    assert len(selects) <= 2 * waits

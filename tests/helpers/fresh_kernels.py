@@ -1,0 +1,23 @@
+"""Kernels that are compiled in a moment, as a process has them at its start."""
+
+import robot_side.assembly  # noqa: F401  (brings the kernels)
+from robot_side.compiled import kernel as compile_module
+from robot_side.compiled.kernel import Compiled, imported_kernels
+
+NAMES = (
+    "robot_side.simulation.encoders._read",
+    "robot_side.overlap.checks.array_searches.first_short",
+    "robot_side.gripper.held_object._join",
+)
+
+
+def fresh_kernels() -> tuple[Compiled, ...]:
+    """Those of `NAMES`, not yet compiled, and known to nobody else."""
+    fresh = tuple(
+        Compiled(kernel.function, tuple(kernel.signature.args), kernel.signature.return_type)
+        for kernel in imported_kernels()
+        if kernel.name in NAMES
+    )
+    for kernel in fresh:
+        compile_module._kernels.remove(kernel)
+    return fresh

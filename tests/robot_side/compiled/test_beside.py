@@ -1,0 +1,126 @@
+"""Compiling in other processes: fair shares, what they leave on disk, and what happens when they cannot."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from common.companion.process import Companion
+from robot_side.compiled import beside
+from robot_side.compiled import warm_up as warm_up_module
+from robot_side.compiled.beside import compile_beside, shares
+from robot_side.compiled.kernel import Compiled, imported_kernels
+from robot_side.compiled.sources import code_sizes
+from robot_side.compiled.warm_up import warm_up
+from tests.helpers.fresh_kernels import NAMES, fresh_kernels
+
+
+def ours() -> list[Compiled]:
+    return [kernel for kernel in imported_kernels() if kernel.is_ours]
+
+
+def size(share: list[Compiled]) -> int:
+    return sum({part: bytes_ for kernel in share for part, bytes_ in code_sizes(kernel.function).items()}.values())
+
+
+def place_of(share_of: list[list[Compiled]], name: str) -> int:
+    (place,) = (place for place, share in enumerate(share_of) if name in [kernel.function.__name__ for kernel in share])
+    return place
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_each_kernel_is_in_one_share_and_shares_are_alike(count: int) -> None:
+    found = shares(ours(), count)
+    assert sorted(kernel.name for share in found for kernel in share) == sorted(kernel.name for kernel in ours())
+    sizes = [size(share) for share in found]
+    assert len(sizes) == count
+    assert min(sizes) > 0.5 * max(sizes)
+    # What is compiled twice stays little.
+    assert sum(sizes) < 1.25 * size(ours())
+
+
+def test_kernels_of_the_same_blocks_are_in_one_share() -> None:
+    found = shares(ours(), 2)
+    assert place_of(found, "precise_boxes") == place_of(found, "precise_tetrahedra")
+
+
+def test_more_processes_than_kernels_leave_no_empty_share() -> None:
+    assert [len(share) for share in shares(fresh_kernels(), 8)] == [1, 1, 1]
+
+
+@pytest.mark.processes
+def test_other_processes_leave_machine_code_that_is_loaded_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    told: list[str] = []
+    fresh = fresh_kernels()
+    compile_beside(fresh, 2, told.append)
+    assert sorted(told) == sorted(NAMES)
+    for kernel in fresh:
+        kernel.prepare()
+    assert [kernel.cache_hits for kernel in fresh] == [1, 1, 1]
+
+
+@pytest.mark.processes
+def test_a_process_that_is_killed_leaves_its_share_to_us(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+
+    class Killed(Companion):
+        def __init__(self, module: str, arguments: Sequence[str]) -> None:
+            super().__init__(module, arguments)
+            os.kill(self.process_id, signal.SIGKILL)
+
+    monkeypatch.setattr(beside, "Companion", Killed)
+    monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
+    fresh = fresh_kernels()
+    warm_up(kernels=fresh)
+    assert [kernel.cache_hits for kernel in fresh] == [0, 0, 0]
+    assert all(kernel.is_kept for kernel in fresh)
+
+
+@pytest.mark.processes
+def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -> None:
+    program = (
+        "import os\n"
+        "import robot_side.assembly\n"
+        "from robot_side.compiled import beside\n"
+        "from robot_side.compiled.kernel import imported_kernels\n"
+        "class Told(beside.Companion):\n"
+        "    def __init__(self, *arguments):\n"
+        "        super().__init__(*arguments)\n"
+        "        print(self.process_id, flush=True)\n"
+        "beside.Companion = Told\n"
+        "kernels = [kernel for kernel in imported_kernels() if 'precise' in kernel.name]\n"
+        "beside.compile_beside(kernels, 1)\n"
+    )
+    surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=surroundings
+    ) as process:
+        assert process.stdout is not None
+        ended = os.pidfd_open(int(process.stdout.readline()))
+        process.kill()
+    try:
+        # Readable once it has ended: a few seconds, in which it would not have compiled them.
+        assert select.select([ended], [], [], 30.0)[0]
+    finally:
+        os.close(ended)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
+    monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
+    monkeypatch.setattr(warm_up_module, "compile_beside", None)
+    fresh = fresh_kernels()
+    told: list[str] = []
+    warm_up(kernels=fresh, done=told.append)
+    assert all(kernel.ready for kernel in fresh)
+    assert told == [kernel.name for kernel in fresh]
