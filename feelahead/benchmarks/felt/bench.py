@@ -32,7 +32,8 @@ _NOTE: Final = (
     " in a tick, the least of several passes that take turns. Ways of both triggers, first and full strength (of what"
     " is to be touched: half), against the finest setting of the same thing, its last row: the mean, the 95th"
     " percentile of the size, the earliest and the latest. Above 0 is felt too late, below 0 too early. A tick is"
-    " compared if either feels something within the horizon."
+    " compared if either feels something within the horizon. Single ticks are far apart where something enters or"
+    " leaves the way, which one setting sees sooner, and where a graze is full for one and not for the other."
 )
 
 

@@ -19,7 +19,7 @@ def ladders(*, quick: bool) -> dict[str, list[Turned]]:
     """By what is set: each setting, as it is among them, the finest last."""
     now_hz = round(1.0 / FIELD_PERIOD_S)
     rates = [Turned(RATE, f"{rate} Hz", period_s=1.0 / rate) for rate in (50, now_hz, 200, 500)]
-    late = [Turned(LATE, f"{ticks} ticks", late_ticks=ticks) for ticks in (10, 4, 2, 1, 0)]
+    late = [Turned(LATE, f"by {ticks} ms", late_ticks=ticks) for ticks in (10, 4, 2, 1, 0)]
     covers = [
         Turned(COVER, f"{1e3 * cover_m:g} mm", cover_m=cover_m)
         for cover_m in (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)

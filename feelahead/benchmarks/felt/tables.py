@@ -106,6 +106,7 @@ def draw(found: Found, rungs: dict[str, list[Turned]], path: Path) -> None:
     """Run time against error, a line for each ladder, of each run."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
+    from matplotlib.ticker import LogLocator, NullFormatter  # noqa: PLC0415
 
     shown, all_axes = plt.subplots(
         1, len(found.replayed), figsize=(3.4 * len(found.replayed), 3.8), dpi=110, squeeze=False, sharey=True
@@ -121,6 +122,9 @@ def draw(found: Found, rungs: dict[str, list[Turned]], path: Path) -> None:
             for one, time_us, size in zip((one for one, _ in pairs), times, sizes, strict=True):
                 axes.annotate(one.how.value, (time_us, size), fontsize=5, xytext=(2, 2), textcoords="offset points")
         axes.set(xscale="log", yscale="log", xlabel="mean run time of a tick's law, µs", title=run)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
     all_axes[0, 0].set_ylabel("95 % of |full strength's way - the finest's|, mm")
     all_axes[0, -1].legend(fontsize=6)
