@@ -4,6 +4,7 @@ Tried with the versions that pyproject.toml pins. To try another one: widen the 
 on an empty cache, and see that cold compilation takes no longer.
 """
 
+import contextlib
 import pickle
 import sys
 from typing import Any, Final, cast
@@ -91,7 +92,9 @@ class _OnDisk(_Cache):
         target_context.refresh()
         code = kept(*self._names)
         # Numba's own way to keep it; whoever can write there can run programs as this user anyway.
-        return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))  # noqa: S301
+        with contextlib.suppress(Exception):  # unpickling may raise anything: then it is compiled anew
+            return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))  # noqa: S301
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep it."""

@@ -58,17 +58,16 @@ class Watch:
         epoch: int,
         clock_domain: str,
         *,
-        announce: Callable[[str], None],
-        side: Callable[..., RobotSide],
+        watch: Callable[[Arm], Arm],
+        **given: Any,
     ) -> Assembled:
         """As robot_side.assembly's, watched."""
         assembled = assemble(
             settings,
             epoch,
             clock_domain,
-            lambda arm: _ToldArm(arm, settings.safety.gap_s, self),
-            announce=announce,
-            side=side,
+            lambda arm: _ToldArm(watch(arm), settings.safety.gap_s, self),
+            **given,
         )
         self._core = core = assembled.core
         receive = core.session.safety.receive

@@ -39,8 +39,8 @@ from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_comman
 from robot_side.cameras.off_screen import BACKENDS, REMEDY
 from robot_side.compiled import warm_up as warm_up_module
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
-from tests.helpers.fresh_kernels import fresh_kernels
 from tests.helpers.repository import ROOT
+from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 
 OK, NOTE, MISSING = Verdict.OK, Verdict.NOTE, Verdict.MISSING
 SEEN = ControllerSeen("DualSense", "/dev/hidraw3", "USB", ADDRESS, "0x0110002a", "about 95%, full")

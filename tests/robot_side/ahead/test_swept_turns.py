@@ -125,10 +125,10 @@ def test_what_is_done_in_a_tick_is_bounded_where_much_is_near(monkeypatch: pytes
     measured, objects = Measured(monkeypatch), walls(0.03, 0.03)
     numbers = measured.tick(objects, 100)
     # At first everything is looked at, at once.
-    assert numbers[0] > 3 * MOST_WORK
+    assert numbers[0] > 2 * MOST_WORK
     # The last ramps that a round meets, and the last nodes of one ramp, may go beyond.
     assert 0.5 * MOST_WORK < max(numbers[1:]) <= MOST_WORK + 150
-    assert sum(number > 0 for number in numbers) > 50
+    assert sum(number > 0 for number in numbers) >= 36
     assert 18 <= measured.law.summary()["fields"] <= 21
 
 

@@ -17,7 +17,7 @@ from robot_side.compiled.beside import compile_beside, shares
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
-from tests.helpers.fresh_kernels import NAMES, fresh_kernels
+from tests.robot_side.compiled.fresh_kernels import NAMES, fresh_kernels
 
 
 def ours() -> list[Compiled]:

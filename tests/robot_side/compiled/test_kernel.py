@@ -82,6 +82,14 @@ def test_damaged_machine_code_is_compiled_anew(
     assert _kernel().cache_hits == 1
 
 
+def test_what_is_whole_but_no_machine_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel = _kernel()
+    keep(kernel.name, kernel._key(), b"of another make")
+    assert _kernel().cache_hits == 0
+    assert _kernel().cache_hits == 1
+
+
 def test_a_kernel_works_where_nothing_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_bytes(b"")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
