@@ -30,7 +30,7 @@ $(VENV)/.test-models: tests/requirements-models.lock $(VENV)/.installed
 
 # The kernels once, before several workers would compile the same ones at the same time.
 $(VENV)/.kernels: $(VENV)/.installed $(shell find robot_side -name '*.py')
-	$(BIN)/python -c "import robot_side.assembly, robot_side.overlap.meshes.mesh_library; from robot_side.overlap import warm_up; warm_up()"
+	$(BIN)/feelahead doctor --compile
 	touch $@
 
 types: $(VENV)/.installed ## style and types

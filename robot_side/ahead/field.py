@@ -22,6 +22,7 @@ LEAST_DEPTH_M = 0.0005
 """What comes no deeper into a sphere of radius R is a graze: V_min = π R (0.5 mm)². Noise in the encoders turns a way
 aside by less."""
 ALL: Final = 1 << 60
+"""More ramps and nodes than any look takes."""
 
 
 @dataclass(frozen=True)

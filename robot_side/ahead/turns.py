@@ -162,8 +162,9 @@ class Turns:
         moved_m = None
         if place == 0 and side == (R2 if speed_m_s >= 0.0 else L2):
             moved_m = abs(speed_m_s) * situation.loop_age_s * along.direction
-        self._going = _Look(side, place, situation, pose, scene, prospect, moved_m, now_s)
         self.ahead.begin(pose, scene, standing, along, math.inf if situation.gap_m is None else 0.5 * situation.gap_m)
+        # Only what could begin is under way: what is not finite is refused.
+        self._going = _Look(side, place, situation, pose, scene, prospect, moved_m, now_s)
 
     def _go_on(self, most: int) -> int:
         """How much has been done."""

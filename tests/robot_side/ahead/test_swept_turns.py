@@ -171,6 +171,20 @@ def test_looks_come_to_an_end_although_every_tick_has_other_objects(monkeypatch:
     assert measured.law.summary()["fields"] > 10
 
 
+def test_what_could_not_begin_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured, objects = Measured(monkeypatch), walls(0.03, 0.03)
+    measured.tick(objects, 1)
+    at_once, fields = measured.sensed, measured.law.summary()["fields"]
+    measured.now_s += 0.02
+    broken = replace(CROWD, sphere_centers_m=np.full_like(CROWD.sphere_centers_m, np.nan))
+    with pytest.raises(ValueError, match="sphere_centers_m"):
+        measured.tick(objects, 1, broken)
+    # What was seen before holds, and both sides, which are overdue, are looked along anew.
+    measured.tick(objects, 1)
+    assert measured.law.summary()["fields"] == fields + 2
+    np.testing.assert_allclose(measured.sensed.r2.fast_m, at_once.r2.fast_m, rtol=0.0, atol=1e-12)
+
+
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
     law = swept()
     first = law._stands(situation(ball_pose(), walls(0.1, 0.1)))
