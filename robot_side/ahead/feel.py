@@ -197,7 +197,7 @@ def _bound(ramp: Record, kind: int, end: float) -> None:
     """Bound what is still to come of a ramp that has one convex primitive.
 
     By the theorem of Brunn and Minkowski the cube root of the overlap of two convex bodies is concave along the way,
-    so that it stays below its tangent.
+    so that the root stays below the tangent at the last node.
     """
     last = ramp.nodes - 1
     volume, slope = ramp.volume[last], ramp.slope[last]

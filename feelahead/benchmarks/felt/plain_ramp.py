@@ -36,7 +36,7 @@ class Ramp:
     least: float
     """V_min"""
     sooner_m: float
-    """By so much its ways are shorter."""
+    """By so much the ways to the object are shorter."""
     later_m: float
     """And so much longer in slow zones where the object is to be touched."""
     touchable: bool
