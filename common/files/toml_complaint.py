@@ -7,7 +7,11 @@ import types
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from msgspec import Meta
+
+from common.limits import range_in_words
 
 _LONGEST_VALUE = 100
 
@@ -21,7 +25,7 @@ def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> 
     value: Any = content
     hint: Any = settings_type
     for key in keys:
-        value, hint = value[key], get_type_hints(hint)[key]
+        value, hint = value[key], get_type_hints(hint, include_extras=True)[key]
     if not said.startswith(("Expected", "Invalid enum value")):
         # A dataclass's own complaint about its fields, which says what is valid.
         return f"{'.'.join(keys)}: {said}"
@@ -37,14 +41,15 @@ def _valid(hint: Any) -> str:
     if hint in words:
         return words[hint]
     origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return next((range_in_words(note) for note in arguments[1:] if isinstance(note, Meta)), _valid(arguments[0]))
     if origin is Literal:
         return " or ".join(json.dumps(choice) for choice in arguments)
     if origin in (Union, types.UnionType):
         return " or ".join(_valid(argument) for argument in arguments if argument is not type(None))
-    if origin is tuple:
-        return f"[{', '.join('...' if argument is Ellipsis else _valid(argument) for argument in arguments)}]"
-    if origin is dict:
-        return f"a table of NAME = {_valid(arguments[1])}"
+    if origin in (tuple, dict):
+        items = ["..." if argument is Ellipsis else _valid(argument) for argument in arguments]
+        return f"[{', '.join(items)}]" if origin is tuple else f"a table of NAME = {items[1]}"
     if isinstance(hint, type) and issubclass(hint, Enum):
         return " or ".join(json.dumps(choice.value) for choice in hint)
     if dataclasses.is_dataclass(hint):

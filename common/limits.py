@@ -1,0 +1,117 @@
+"""Check that a record's fields lie within the ranges that their type hints declare.
+
+    @dataclass(frozen=True)
+    class SafetySettings:
+        gap_s: Annotated[float, Meta(gt=0.0, lt=60.0)] = 0.1
+
+        def __post_init__(self) -> None:
+            check_limits(self)
+
+msgspec reads the same `Meta` when it decodes a message or a TOML file, so that a range is declared once. NaN lies in
+no range. `Finite` is any number but NaN and the infinities.
+"""
+
+import functools
+import sys
+from collections.abc import Callable
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from msgspec import Meta
+
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+"""A probability or a part of a whole, both ends included."""
+
+_Check = Callable[[str, Any], None]
+
+
+def check_limits(record: Any) -> None:
+    """Raise a ValueError that names the first field out of its range, its value and what is valid."""
+    kind: Any = type(record)
+    for name, check in _checks(kind):
+        check(name, getattr(record, name))
+
+
+def check_value(name: str, value: object, hint: object) -> None:
+    """Raise a ValueError that names `name` when `value` lies outside the range that the type hint declares."""
+    check = _check_of(hint)
+    if check is not None:
+        check(name, value)
+
+
+def range_in_words(meta: Meta) -> str:
+    """Say which values a `Meta` allows, as in "above 0 and below 60"."""
+    if meta.ge == -sys.float_info.max and meta.le == sys.float_info.max:
+        return "a finite number"
+    if meta.max_length is not None:
+        return f"{meta.min_length or 0} to {meta.max_length} characters"
+    if meta.ge is not None and meta.le is not None:
+        return f"{_number(meta.ge)} to {_number(meta.le)}"
+    words = {"above": meta.gt, "at least": meta.ge, "below": meta.lt, "at most": meta.le}
+    return " and ".join(f"{word} {_number(bound)}" for word, bound in words.items() if bound is not None)
+
+
+@functools.cache
+def _checks(kind: Any) -> tuple[tuple[str, _Check], ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple((name, check) for name, hint in hints.items() if (check := _check_of(hint)) is not None)
+
+
+def _check_of(hint: Any) -> _Check | None:
+    """Make the check of one type hint; None where it declares no range."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        metas = [meta for meta in arguments[1:] if isinstance(meta, Meta)]
+        return _range_check(metas[0], arguments[0]) if metas else _check_of(arguments[0])
+    if origin in (Union, UnionType):
+        checks = [check for argument in arguments if (check := _check_of(argument)) is not None]
+        return _optional_check(checks[0]) if checks and type(None) in arguments else None
+    if origin is tuple:
+        check = _check_of(arguments[0])
+        return None if check is None else _elements_check(check)
+    return None
+
+
+def _range_check(meta: Meta, kind: type) -> _Check:
+    # `not low <= value` is true for NaN, `value < low` would let it pass.
+    low = -sys.float_info.max if meta.ge is None else meta.ge
+    high = sys.float_info.max if meta.le is None else meta.le
+    above, below = meta.gt, meta.lt
+    kinds = (int,) if kind is int else (int, float)
+
+    def check(name: str, value: Any) -> None:
+        if (
+            not isinstance(value, kinds)
+            or not low <= value <= high
+            or (above is not None and value <= above)
+            or (below is not None and value >= below)
+        ):
+            whole = "a whole number " if kind is int and not isinstance(value, int) else ""
+            raise ValueError(f"{name} = {value!r}; valid: {whole}{range_in_words(meta)}")
+
+    def check_length(name: str, value: Any) -> None:
+        if not isinstance(value, str) or not (meta.min_length or 0) <= len(value) <= (meta.max_length or sys.maxsize):
+            raise ValueError(f"{name} = {value!r:.100}; valid: {range_in_words(meta)}")
+
+    return check_length if kind is str else check
+
+
+def _optional_check(check: _Check) -> _Check:
+    def check_unless_none(name: str, value: Any) -> None:
+        if value is not None:
+            check(name, value)
+
+    return check_unless_none
+
+
+def _elements_check(check: _Check) -> _Check:
+    def check_each(name: str, values: Any) -> None:
+        for place, value in enumerate(values):
+            check(f"{name}[{place}]", value)
+
+    return check_each
+
+
+def _number(value: float) -> str:
+    return f"{value:g}" if abs(value) < 1e6 or value != int(value) else f"{int(value)}"
