@@ -1,12 +1,16 @@
-"""`feelahead bench NAME` and `feelahead try NAME`: what measures the project, imported only when asked for."""
+"""`feelahead bench NAME` and `feelahead try NAME`: the questions of feelahead/lab, imported only when asked for."""
 
+import ast
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import NamedTuple
 
 from common.errors import ConfigurationError
+
+_QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
 
 
 class Entry(NamedTuple):
@@ -26,19 +30,24 @@ class Menu:
 
     name: str
     kind: str
+    questions: tuple[str, ...]
     entries: dict[str, Entry]
 
     def __call__(self, arguments: Sequence[str]) -> int:
         """Run what the first argument names."""
         if not arguments or arguments[0] in ("-h", "--help", "--list"):
-            lines = [f"  {name:<12}{entry.what}" for name, entry in self.entries.items()]
+            lines = [f"  {name:<12}{_sentence(name)}" for name in self.questions]
+            lines += [f"  {name:<12}{entry.what}" for name, entry in self.entries.items()]
             sys.stdout.write(
                 f"usage: feelahead {self.name} NAME [OPTIONS]\n\n" + "\n".join(lines) + "\n\nEach has its own --help.\n"
             )
             return 0
         name, *rest = arguments
+        if name in self.questions:
+            return _ask(self.name, name, rest)
         if name not in self.entries:
-            raise ConfigurationError(f"{self.name} {name!r}: no such {self.kind}; valid: {', '.join(self.entries)}")
+            valid = ", ".join((*self.questions, *self.entries))
+            raise ConfigurationError(f"{self.name} {name!r}: no such {self.kind}; valid: {valid}")
         entry = self.entries[name]
         try:
             result: int = getattr(import_module(entry.module), entry.function)(rest)
@@ -47,11 +56,32 @@ class Menu:
         return result
 
 
+def _sentence(name: str) -> str:
+    """Read the question that begins a question's file, without importing what it needs."""
+    text = ast.get_docstring(ast.parse((_QUESTIONS / f"{name}.py").read_text(encoding="utf-8"))) or ""
+    return text.partition("\n\n")[0].replace("\n", " ")
+
+
+def _ask(kind: str, name: str, arguments: Sequence[str]) -> int:
+    """Answer a question; ConfigurationError names the package that is missing."""
+    try:
+        sweep = import_module("feelahead.lab.sweep")
+        question = import_module(f"feelahead.lab.questions.{name}").QUESTION
+    except ModuleNotFoundError as error:
+        raise ConfigurationError(
+            f"{kind} {name}: {error.name} is not installed; it is in one of the extras robot, operator, experiments,"
+            " bench"
+        ) from error
+    code: int = sweep.ask(question, arguments)
+    return code
+
+
 _BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
 
 bench = Menu(
     "bench",
     "benchmark",
+    (),
     {
         "overlap": Entry(
             "feelahead.benchmarks.overlap.bench",
@@ -127,6 +157,7 @@ bench = Menu(
 try_out = Menu(
     "try",
     "experiment",
+    ("demo",),
     {
         "approach": Entry(
             "feelahead.experiments.approach.command",
@@ -139,12 +170,6 @@ try_out = Menu(
             "try_field",
             "how far from things each strength begins, and what a look ahead costs",
             "pip install 'feelahead[robot,bench]'",
-        ),
-        "demo": Entry(
-            "feelahead.experiments.demo_runs",
-            "try_demo",
-            "the demo over several seeds: who grasps, lifts and places, and feels the table before touching it",
-            _BOTH_SIDES,
         ),
         "haptics": Entry(
             "feelahead.experiments.haptics.command",

@@ -85,13 +85,13 @@ ARROWS = """
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
-    feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
-    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
+    feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides
+    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
         feelahead/documents
-    feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
+    feelahead/experiments: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
         feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*
-    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/approaches feelahead/both_sides
+    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/lab/* feelahead/both_sides
         feelahead/benchmarks/* feelahead/experiments/* feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
@@ -128,7 +128,7 @@ LIBRARIES = {
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
         "operator_side/terminal_view",
-        "feelahead/approaches/progress.py",
+        "feelahead/lab/progress.py",
         "feelahead/both_sides",
         "feelahead/commands",
         "feelahead/containers",

@@ -16,11 +16,11 @@ from rich.console import Console
 from common.command.command_line import parse_settings
 from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file
-from feelahead.approaches.pictures import PICTURES
-from feelahead.approaches.progress import progress
 from feelahead.benchmarks.cover.measuring import Fit, measure
 from feelahead.benchmarks.cover.picture import draw
 from feelahead.benchmarks.report import Goal, Report, Table, show, show_goals, write_csv
+from feelahead.lab.figures import PICTURES
+from feelahead.lab.progress import progress
 
 _PROGRAM = "feelahead bench cover"
 _BUILT_IN = "built-in"

@@ -9,13 +9,13 @@ from rich.console import Console
 
 from common.command.command_line import parse_settings
 from common.files.output_file import output_file
-from feelahead.approaches.frozen import frozen_hash
-from feelahead.approaches.kept import Kept
-from feelahead.approaches.progress import progress
 from feelahead.benchmarks.coverage.evaluate import Row
 from feelahead.benchmarks.coverage.settings import CoverageSettings
 from feelahead.benchmarks.coverage.tables import alarm_table, check_lines, coverage_table, draw, law_table, pull_table
 from feelahead.benchmarks.coverage.work import Piece, do, pieces
+from feelahead.lab.approaches.frozen import frozen_hash
+from feelahead.lab.approaches.kept import Kept
+from feelahead.lab.progress import progress
 
 _PROGRAM = "feelahead bench coverage"
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Final
 
-from feelahead.approaches.frozen import AHEAD, PASSED
-from feelahead.approaches.laws import LAWS, Law
-from feelahead.approaches.pulls import PULL_KINDS, PullKind
+from feelahead.lab.approaches.frozen import AHEAD, PASSED
+from feelahead.lab.approaches.laws import LAWS, Law
+from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 
 LINKS: Final = {
     "0 ms": "",

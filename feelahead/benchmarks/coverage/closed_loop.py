@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.errors import FeelaheadError
-from feelahead.approaches.approach import Approach, PullRun
-from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.laws import Law
-from feelahead.approaches.pulls import PULL_KINDS, make_pull
-from feelahead.approaches.recording import record_approach
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion
 from feelahead.benchmarks.coverage.collisions import Collision, place
 from feelahead.benchmarks.coverage.covered import stood
 from feelahead.benchmarks.coverage.laws import Draw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.approach import Approach, PullRun
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.pulls import PULL_KINDS, make_pull
+from feelahead.lab.approaches.recording import record_approach
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.settings import CameraSettings, EncoderSettings
 from robot_side.simulation.camera import CameraError

@@ -9,15 +9,15 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S, REACTION_S
-from feelahead.approaches.frozen import PASSED, SITE, frozen_scene
-from feelahead.approaches.recording import record_approach
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan
 from feelahead.benchmarks.coverage.collisions import Collision, first_touch_s, place
 from feelahead.benchmarks.coverage.covered import false_alarms, lateness_s, stood
 from feelahead.benchmarks.coverage.intervals import draws_needed, share
 from feelahead.benchmarks.coverage.laws import Draw, FieldLaw, make_law
 from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
+from feelahead.lab.approaches.recording import record_approach
+from feelahead.lab.approaches.spoilt import Spoil
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.camera import CameraError
 from robot_side.simulation.posed_scene import PosedScene

@@ -9,10 +9,10 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import Header, StiffnessUpdate
-from feelahead.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.approaches.margin_law import MarginLaw
-from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
+from feelahead.lab.approaches.margin_law import MarginLaw
+from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.feel.commands_under_way import Displacement

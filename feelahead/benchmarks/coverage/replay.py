@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.approaches.recording import POSE_S, TICK_S, RecordedApproach
+from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
 from operator_side.feel.commands_under_way import CommandsUnderWay

@@ -7,10 +7,10 @@ from typing import Annotated
 import tyro
 
 from common.files.output_file import require_output_file
-from feelahead.approaches.laws import LAWS, Law
-from feelahead.approaches.pictures import PICTURES
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import Plan, full_plan, quick_plan
+from feelahead.lab.approaches.laws import LAWS, Law
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.figures import PICTURES
 
 _GREATEST = 0.9999
 """That takes 100 000 draws a cell."""

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from functools import cache
 from statistics import median
 
-from feelahead.approaches.approach import Approach, time_to_goal_s
-from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.laws import Law
-from feelahead.approaches.pulls import PullKind, make_pull
-from feelahead.approaches.recording import record_approach
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import LINKS
 from feelahead.benchmarks.coverage.evaluate import mean_way_m
 from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.approach import Approach, time_to_goal_s
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.pulls import PullKind, make_pull
+from feelahead.lab.approaches.recording import record_approach
+from feelahead.lab.approaches.spoilt import Spoil
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.scene import load_scene
 

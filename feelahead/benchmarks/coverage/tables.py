@@ -8,9 +8,9 @@ from rich.box import MARKDOWN
 from rich.table import Table
 from rich.text import Text
 
-from feelahead.approaches.pictures import LAW_COLOURS
-from feelahead.approaches.pulls import PULL_KINDS
 from feelahead.benchmarks.coverage.cells import LINKS
+from feelahead.lab.approaches.pulls import PULL_KINDS
+from feelahead.lab.figures import LAW_COLOURS
 
 _MARKS: Final = ("o", "s", "^", "D")
 Row = dict[str, Any]

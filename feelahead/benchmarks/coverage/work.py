@@ -5,14 +5,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.approaches.kept import Records
-from feelahead.approaches.laws import Law
-from feelahead.approaches.processes import in_processes
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import Cell, Motion, Plan
 from feelahead.benchmarks.coverage.closed_loop import check
 from feelahead.benchmarks.coverage.evaluate import evaluate
 from feelahead.benchmarks.coverage.slowdown import SCENES, race
+from feelahead.lab.approaches.kept import Records
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.processes import in_processes
+from feelahead.lab.approaches.spoilt import Spoil
 
 
 @dataclass(frozen=True)

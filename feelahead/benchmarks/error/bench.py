@@ -13,9 +13,6 @@ from common.clock import MonotonicClock
 from common.command.command_line import parse_settings
 from common.errors import FeelaheadError
 from common.files.output_file import output_file, require_output_file
-from feelahead.approaches.frozen import frozen_hash
-from feelahead.approaches.pictures import PICTURES
-from feelahead.approaches.progress import progress
 from feelahead.benchmarks.error.figures import prediction_figures, propagation_figures, write_figures
 from feelahead.benchmarks.error.gripper import PosedGripper
 from feelahead.benchmarks.error.picture import draw
@@ -26,6 +23,9 @@ from feelahead.benchmarks.error.running_time import best_microseconds, propagati
 from feelahead.benchmarks.error.spread import error_table
 from feelahead.benchmarks.error.tables import failures, prediction_tables, propagation_tables
 from feelahead.benchmarks.report import show
+from feelahead.lab.approaches.frozen import frozen_hash
+from feelahead.lab.figures import PICTURES
+from feelahead.lab.progress import progress
 from robot_side.simulation.scene import load_scene
 
 PROGRAM = "feelahead bench error"

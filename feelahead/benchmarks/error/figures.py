@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from common.files.output_file import output_file
-from feelahead.approaches.pulls import PULL_KINDS
 from feelahead.benchmarks.error.prediction import COMPENSATIONS, VARIANTS, Judged
 from feelahead.benchmarks.error.propagation import METHODS, Outcome
 from feelahead.benchmarks.error.spread import Spread, age_bins, by_compensation, over
 from feelahead.benchmarks.error.tables import by_variant
+from feelahead.lab.approaches.pulls import PULL_KINDS
 
 
 class Figure(NamedTuple):

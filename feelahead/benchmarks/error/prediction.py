@@ -7,9 +7,9 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from feelahead.approaches.pulls import PullKind
-from feelahead.approaches.recording import RecordedApproach
 from feelahead.benchmarks.error.tool_path import PoseAt, ToolPath
+from feelahead.lab.approaches.pulls import PullKind
+from feelahead.lab.approaches.recording import RecordedApproach
 from operator_side.feel.commands_under_way import CommandsUnderWay
 from robot_side.arm.ability import along_approach
 from robot_side.simulation.joint_reference import MotionLimits

@@ -6,12 +6,12 @@ from functools import cache
 from typing import Final
 
 from common.errors import FeelaheadError
-from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.processes import in_processes
-from feelahead.approaches.pulls import PULL_KINDS, PullKind
-from feelahead.approaches.recording import record_approach
 from feelahead.benchmarks.error.gripper import PosedGripper
 from feelahead.benchmarks.error.prediction import Judged, judge
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.processes import in_processes
+from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
+from feelahead.lab.approaches.recording import record_approach
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.scene import load_scene

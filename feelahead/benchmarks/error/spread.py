@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.approaches.pulls import PullKind
 from feelahead.benchmarks.error.prediction import COMPENSATIONS, Compensation, Judged
+from feelahead.lab.approaches.pulls import PullKind
 
 LOOP_AGE_EDGES_S: Final = (0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)
 """Between these, approaches are taken together by the median of their loop age. The single moment's does not choose:

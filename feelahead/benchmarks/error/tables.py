@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.approaches.pulls import PULL_KINDS
 from feelahead.benchmarks.error.prediction import COMPENSATIONS, VARIANTS, Compensation, Judged
 from feelahead.benchmarks.error.propagation import METHODS, NOISE_RAD, PROBABILITY, Outcome
 from feelahead.benchmarks.error.spread import Spread, age_bins, by_compensation, over
 from feelahead.benchmarks.report import Table, short
+from feelahead.lab.approaches.pulls import PULL_KINDS
 
 SINGULAR: Final = "singular"
 FAILS: Final = 0.05

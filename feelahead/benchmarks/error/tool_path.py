@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from feelahead.approaches.recording import RecordedApproach
+from feelahead.lab.approaches.recording import RecordedApproach
 from robot_side.arm.ability import along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.simulation.joint_reference import MotionLimits

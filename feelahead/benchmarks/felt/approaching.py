@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from feelahead.approaches.approach import Approach, run_approach
-from feelahead.approaches.frozen import ASIDE, SITE, frozen_scene
 from feelahead.benchmarks.felt.turning import Turned, turned
+from feelahead.lab.approaches.approach import Approach, run_approach
+from feelahead.lab.approaches.frozen import ASIDE, SITE, frozen_scene
 
 SCENES: Final = ("wall", "mug", "post", "edge", "moving")
 """Straight ahead; drifting across; and towards what moves."""

@@ -12,7 +12,6 @@ from rich.console import Console
 
 from common.command.command_line import parse_settings
 from common.files.output_file import output_file, require_output_file
-from feelahead.approaches.progress import progress
 from feelahead.benchmarks.felt.approaching import SCENES
 from feelahead.benchmarks.felt.equality import Differences, compare
 from feelahead.benchmarks.felt.ladders import ladders
@@ -21,6 +20,7 @@ from feelahead.benchmarks.felt.recorded_ticks import DEMO, record
 from feelahead.benchmarks.felt.tables import draw, report
 from feelahead.benchmarks.felt.turning import Turned
 from feelahead.benchmarks.report import Report, Table, markdown, show, write_csv
+from feelahead.lab.progress import progress
 
 _PROGRAM: Final = "feelahead bench felt"
 _QUICK_RUNS: Final = (DEMO, "mug")

@@ -6,10 +6,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from feelahead.approaches.arming import wait_for_pull
-from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.benchmarks.felt.turning import exchanged
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings

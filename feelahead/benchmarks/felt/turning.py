@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
-from feelahead.approaches.approach import Approach, robot_settings
+from feelahead.lab.approaches.approach import Approach, robot_settings
 from robot_side.ahead.ask import NODES_PER_MARGIN
 from robot_side.ahead.law import Sensed, Situation
 from robot_side.ahead.looks import Looks
@@ -109,7 +109,7 @@ def turned(how: Turned) -> Iterator[None]:
             stack.enter_context(exchanged("robot_side.ahead.ask", NODES_PER_MARGIN=how.nodes))
         if how.cover_m != COVER_M:
             settings = partial(_covered, robot_settings, how.cover_m)
-            stack.enter_context(exchanged("feelahead.approaches.approach", robot_settings=settings))
+            stack.enter_context(exchanged("feelahead.lab.approaches.approach", robot_settings=settings))
         yield
 
 

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from common.errors import ConfigurationError
-from feelahead.approaches.progress import progress
 from feelahead.commands.doctor.finding import Finding, Verdict
+from feelahead.lab.progress import progress
 
 COMPILE: Final = "feelahead doctor --compile"
 

@@ -11,15 +11,15 @@ from rich.console import Console
 
 from common.command.command_line import parse_settings
 from common.files.output_file import write_json
-from feelahead.approaches.approach import Approach, run_approach
-from feelahead.approaches.frozen import frozen_hash
-from feelahead.approaches.laws import compensation_of, without_compensation
-from feelahead.approaches.outcome import Outcome
-from feelahead.approaches.processes import in_processes
-from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.picture import draw_comparison, draw_run
 from feelahead.experiments.approach.settings import ApproachSettings
 from feelahead.experiments.approach.table import comparison, sentence
+from feelahead.lab.approaches.approach import Approach, run_approach
+from feelahead.lab.approaches.frozen import frozen_hash
+from feelahead.lab.approaches.laws import compensation_of, without_compensation
+from feelahead.lab.approaches.outcome import Outcome
+from feelahead.lab.approaches.processes import in_processes
+from feelahead.lab.progress import progress
 
 _PROGRAM = "feelahead try approach"
 Ended = tuple[Approach, Outcome]

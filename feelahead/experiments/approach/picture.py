@@ -6,11 +6,11 @@ from statistics import median
 from typing import Final
 
 from common.emulation.spec import LinkSpec
-from feelahead.approaches.approach import Approach
-from feelahead.approaches.laws import in_words
-from feelahead.approaches.outcome import Outcome
-from feelahead.approaches.pictures import LAW_COLOURS
 from feelahead.experiments.approach.table import scene_names
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.laws import in_words
+from feelahead.lab.approaches.outcome import Outcome
+from feelahead.lab.figures import LAW_COLOURS
 
 _APART_MS: Final = 6.0
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")

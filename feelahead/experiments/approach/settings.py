@@ -9,30 +9,16 @@ from typing import Annotated, Literal
 import tyro
 
 from common.emulation.clauses import LinkModel
-from common.emulation.spec import LinkSpec
 from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file
 from common.protocol.messages import Compensation, Vector2
-from feelahead.approaches.approach import Approach
-from feelahead.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_scene
-from feelahead.approaches.laws import Law, with_compensation
-from feelahead.approaches.pictures import PICTURES
-from feelahead.approaches.spoilt import Spoil
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_scene
+from feelahead.lab.approaches.laws import Law, with_compensation
+from feelahead.lab.approaches.links import require_young_loop
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.figures import PICTURES
 from robot_side.settings import Assist
-
-_LONGEST_LOOP_S = 2.0
-"""Beyond this loop age the robot side is never armed (SafetySettings.max_delay_s)."""
-
-
-def require_young_loop(spec: str, link_model: LinkModel) -> None:
-    """ValueError for a link over which the robot side is never armed; ConfigurationError for a bad one."""
-    link = LinkSpec.parse(spec, 0, link_model)
-    loop_s = sum(link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
-    if loop_s >= _LONGEST_LOOP_S:
-        raise ValueError(
-            f"--link {spec!r}: a message and its answer take {loop_s:g} s; valid: below {_LONGEST_LOOP_S:g} s, beyond"
-            " which the robot side is never armed"
-        )
 
 
 @dataclass(frozen=True)

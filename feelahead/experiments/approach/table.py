@@ -7,9 +7,9 @@ from statistics import median
 from rich.table import Table
 from rich.text import Text
 
-from feelahead.approaches.approach import Approach
-from feelahead.approaches.laws import in_words
-from feelahead.approaches.outcome import Outcome
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.laws import in_words
+from feelahead.lab.approaches.outcome import Outcome
 
 Ended = tuple[Approach, Outcome]
 _FARTHEST_MM = 1000.0

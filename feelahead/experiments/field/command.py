@@ -16,12 +16,12 @@ from rich.table import Table
 from common.command.command_line import parse_settings
 from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file, write_json
-from feelahead.approaches.frozen import SITE, frozen_hash, frozen_scene
-from feelahead.approaches.pictures import PICTURES
-from feelahead.approaches.progress import progress
 from feelahead.experiments.approach.table import scene_names
 from feelahead.experiments.field.looking import Look, Looker
 from feelahead.experiments.field.picture import draw
+from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene
+from feelahead.lab.figures import PICTURES
+from feelahead.lab.progress import progress
 
 _PROGRAM = "feelahead try field"
 _CONVEX = ("wall", "plate", "ball", "post", "rod_10mm", "rod_5mm", "rod_2mm", "wall_45")

@@ -23,11 +23,11 @@ from rich.table import Table
 from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
 from common.files.output_file import output_file, require_output_file
-from feelahead.approaches.kept import Kept
-from feelahead.approaches.processes import in_processes
-from feelahead.approaches.progress import progress
 from feelahead.experiments.haptics.statistics import exact_interval, mcnemar_p, mean_difference_interval, restricted
-from feelahead.experiments.haptics.trial import Arm, Result, Trial, run_trial
+from feelahead.lab.approaches.kept import Kept
+from feelahead.lab.approaches.processes import in_processes
+from feelahead.lab.progress import progress
+from feelahead.lab.trial import Arm, Result, Trial, run_trial
 from operator_side.simulated_person.settings import PersonSettings
 from robot_side.simulation.built_in_scenes import SceneName
 
@@ -126,18 +126,19 @@ def compare(settings: ComparisonSettings) -> list[Row]:
             scene,
             link_of(delay_ms, settings.jitter),
             arm,
-            seed,
             settings.person,
             settings.duration,
             settings.link_model,
             1e-3 * settings.tick,
             1e-3 * settings.camera_mm,
         )
-        for scene, delay_ms, arm, seed in todo
+        for scene, delay_ms, arm, _ in todo
     ]
     try:
         with progress("trials", float(len(todo))) as advance:
-            for place, result in in_processes(run_trial, [(trial,) for trial in trials], settings.workers):
+            for place, result in in_processes(
+                run_trial, [(trial, key[-1]) for trial, key in zip(trials, todo, strict=True)], settings.workers
+            ):
                 kept.keep(names[todo[place]], [asdict(result)])
                 advance(1.0)
     finally:

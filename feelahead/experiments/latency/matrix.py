@@ -9,11 +9,11 @@ from itertools import product
 from typing import Any, Final
 
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.approaches.kept import Kept
-from feelahead.approaches.progress import progress
 from feelahead.both_sides.trial import Medium, Trial, TrialFigures, WayFigures
 from feelahead.experiments.latency.media import LoopbackMedium, VirtualMedium
 from feelahead.experiments.latency.settings import LatencySettings
+from feelahead.lab.approaches.kept import Kept
+from feelahead.lab.progress import progress
 
 _CONTAINERS: Final = "feelahead.containers.medium"
 _HERE: Final[Mapping[str, type[VirtualMedium | LoopbackMedium]]] = {

@@ -10,7 +10,7 @@ import tyro
 from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
 from common.files.output_file import require_output_file
-from feelahead.experiments.approach.settings import require_young_loop
+from feelahead.lab.approaches.links import require_young_loop
 
 
 @dataclass(frozen=True)

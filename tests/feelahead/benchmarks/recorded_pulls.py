@@ -4,13 +4,13 @@ from functools import cache
 
 import numpy as np
 
-from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.pulls import PullKind
-from feelahead.approaches.recording import RecordedApproach, record_approach
 from feelahead.benchmarks.coverage.cells import LINKS
 from feelahead.benchmarks.coverage.collisions import first_touch_s, last_release_s
 from feelahead.benchmarks.coverage.laws import Draw
 from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.pulls import PullKind
+from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene

@@ -13,9 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.reaction import HORIZON_S
-from feelahead.approaches.frozen import AHEAD, ASIDE, PASSED
-from feelahead.approaches.laws import Law
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage import bench, closed_loop
 from feelahead.benchmarks.coverage.cells import LINKS, Cell, Motion, Plan, full_plan, quick_plan
 from feelahead.benchmarks.coverage.closed_loop import check
@@ -32,6 +29,9 @@ from feelahead.benchmarks.coverage.laws import make_law
 from feelahead.benchmarks.coverage.replay import coasting_s
 from feelahead.benchmarks.coverage.settings import CoverageSettings
 from feelahead.benchmarks.coverage.work import pieces
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, PASSED
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.spoilt import Spoil
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from tests.feelahead.benchmarks.recorded_pulls import SEED, staged
 

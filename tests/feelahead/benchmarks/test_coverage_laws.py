@@ -10,15 +10,15 @@ import pytest
 from common.arrays import IntArray
 from common.protocol.codec import decode, encode
 from common.protocol.messages import Compensation, Header, MotionCommand, StiffnessUpdate
-from feelahead.approaches.approach import Approach, PullRun
-from feelahead.approaches.frozen import frozen_scene
-from feelahead.approaches.laws import Law
-from feelahead.approaches.pulls import make_pull
-from feelahead.approaches.recording import RecordedApproach
-from feelahead.approaches.spoilt import Spoil
 from feelahead.benchmarks.coverage.cells import LINKS
 from feelahead.benchmarks.coverage.covered import lateness_s, stood
 from feelahead.benchmarks.coverage.laws import Draw, make_law
+from feelahead.lab.approaches.approach import Approach, PullRun
+from feelahead.lab.approaches.frozen import frozen_scene
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.pulls import make_pull
+from feelahead.lab.approaches.recording import RecordedApproach
+from feelahead.lab.approaches.spoilt import Spoil
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.feel.blindness import Blindness

@@ -10,8 +10,6 @@ import pytest
 
 import feelahead.main
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.approaches.frozen import frozen_hash
-from feelahead.approaches.pulls import PULL_KINDS
 from feelahead.benchmarks.error import bench
 from feelahead.benchmarks.error.bench import ErrorBenchSettings, Found, bench_error
 from feelahead.benchmarks.error.figures import Figure
@@ -20,6 +18,8 @@ from feelahead.benchmarks.error.prediction import VARIANTS, Judged
 from feelahead.benchmarks.error.propagation import BATCHES, METHODS, measure_propagation
 from feelahead.benchmarks.error.recordings import DELAYS_MS, jobs, judge_all, link_spec
 from feelahead.benchmarks.error.running_time import monte_carlo_errors
+from feelahead.lab.approaches.frozen import frozen_hash
+from feelahead.lab.approaches.pulls import PULL_KINDS
 from robot_side.simulation.scene import load_scene
 
 

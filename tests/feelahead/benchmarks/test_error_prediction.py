@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from feelahead.approaches.recording import RecordedApproach
 from feelahead.benchmarks.error.figures import prediction_figures
 from feelahead.benchmarks.error.prediction import COMPENSATIONS, VARIANTS, Judged, judge, moments
 from feelahead.benchmarks.error.spread import (
@@ -22,6 +21,7 @@ from feelahead.benchmarks.error.spread import (
 )
 from feelahead.benchmarks.error.tables import cell, prediction_tables
 from feelahead.benchmarks.error.tool_path import ToolPath
+from feelahead.lab.approaches.recording import RecordedApproach
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.prediction_errors import load_prediction_errors
 from robot_side.simulation.joint_reference import MotionLimits

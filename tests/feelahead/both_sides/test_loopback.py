@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from common.protocol.messages import Compensation
-from feelahead.approaches.approach import Approach, PullRun
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import Phase, SimulatedOperator

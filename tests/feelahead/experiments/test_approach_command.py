@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.approaches.approach import Approach
-from feelahead.approaches.frozen import AHEAD, ASIDE, frozen_hash
-from feelahead.approaches.laws import LAWS, Law
-from feelahead.approaches.outcome import End, Outcome, Trace
-from feelahead.approaches.pictures import LAW_COLOURS
 from feelahead.experiments.approach import command as module
 from feelahead.experiments.approach.command import try_approach
 from feelahead.experiments.approach.table import cell, comparison, sentence
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, frozen_hash
+from feelahead.lab.approaches.laws import LAWS, Law
+from feelahead.lab.approaches.outcome import End, Outcome, Trace
+from feelahead.lab.figures import LAW_COLOURS
 from tests.helpers.repository import DATA
 
 WALL = str(DATA / "wall.xml")

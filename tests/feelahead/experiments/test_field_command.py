@@ -12,10 +12,10 @@ import pytest
 
 import feelahead.main
 from common.errors import ConfigurationError
-from feelahead.approaches.frozen import frozen_hash
 from feelahead.experiments.field import command as module
 from feelahead.experiments.field.command import try_field
 from feelahead.experiments.field.looking import Look, Looker
+from feelahead.lab.approaches.frozen import frozen_hash
 from tests.helpers.repository import DATA
 
 WALL = str(DATA / "wall.xml")

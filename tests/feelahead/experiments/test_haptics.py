@@ -11,11 +11,13 @@ from rich.console import Console
 from scipy.stats import binom
 
 from common.errors import ConfigurationError
-from feelahead.experiments import demo_runs, scenes
+from feelahead.experiments import scenes
 from feelahead.experiments.haptics import command
 from feelahead.experiments.haptics.command import ARMS, ComparisonSettings, Row, link_of, tables
 from feelahead.experiments.haptics.statistics import exact_interval, mcnemar_p, mean_difference_interval, restricted
-from feelahead.experiments.haptics.trial import Arm, Result, Trial, run_trial
+from feelahead.lab.questions import demo as demo_question
+from feelahead.lab.sweep import ask
+from feelahead.lab.trial import Arm, Result, Trial, run_trial
 from operator_side.simulated_person.settings import PersonSettings
 
 pytestmark = pytest.mark.long
@@ -97,7 +99,7 @@ def test_trials_that_are_kept_are_not_run_again(tmp_path: Path, monkeypatch: pyt
 
 def test_a_trial_is_repeatable_and_differs_by_nothing_but_haptics_at_first() -> None:
     def run(arm: Arm) -> Result:
-        return run_trial(Trial("slot", link_of(20.0, 10.0), arm, 3, PersonSettings(), 3.0, tick_period_s=0.004))
+        return run_trial(Trial("slot", link_of(20.0, 10.0), arm, PersonSettings(), 3.0, tick_period_s=0.004), 3)
 
     off = run("off")
     assert run("off") == off
@@ -116,7 +118,7 @@ def test_the_command_prints_tables_and_writes_every_trial(tmp_path: Path, capsys
 
 
 def test_the_demos_runs_have_a_row_each(capsys: pytest.CaptureFixture[str]) -> None:
-    assert demo_runs.try_demo(["--seeds", "2", "--duration", "0.2", "--workers", "1", "--link", ""]) == 0
+    assert ask(demo_question.QUESTION, ["--seeds", "2", "--duration", "0.2", "--workers", "1", "--link", ""]) == 0
     said = capsys.readouterr().out
     assert "link: none" in said
     assert "of 2" in said

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import robot_side.ahead.turns
-from feelahead.approaches.approach import Approach
-from feelahead.approaches.frozen import SITE, frozen_scene
 from feelahead.benchmarks.felt.hulls import Hulls
 from feelahead.benchmarks.felt.ladders import MESHES, ladders
 from feelahead.benchmarks.felt.recorded_ticks import record, scene_of, with_cover
 from feelahead.benchmarks.felt.replay import replay
 from feelahead.benchmarks.felt.turning import COVER_M, LateLaw, Turned, exchanged, turned
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from robot_side.ahead.law import Law
 from robot_side.ahead.swept_law import SweptLaw
 from robot_side.objects.perceived import PerceivedObjects
@@ -78,7 +78,7 @@ def test_everything_is_set_while_it_is_asked_for() -> None:
 
     def cover_m() -> Any:
         asked = Approach(frozen_scene("wall"), 2.0, SITE)
-        return now("feelahead.approaches.approach", "robot_settings")(asked).cover_m
+        return now("feelahead.lab.approaches.approach", "robot_settings")(asked).cover_m
 
     with turned(Turned(period_s=0.02, late_ticks=2, cover_m=0.008, nodes=3)):
         assert [now(f"robot_side.ahead.{name}", "FIELD_PERIOD_S") for name in ("swept_law", "turns")] == [0.02, 0.02]

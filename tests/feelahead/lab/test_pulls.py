@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.messages import Vector2
-from feelahead.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
+from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger

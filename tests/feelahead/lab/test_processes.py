@@ -6,9 +6,9 @@ import signal
 import pytest
 
 from common.errors import FeelaheadError
-from feelahead.approaches import progress as module
-from feelahead.approaches.processes import in_processes
-from feelahead.approaches.progress import progress
+from feelahead.lab.approaches import progress as module
+from feelahead.lab.approaches.processes import in_processes
+from feelahead.lab.progress import progress
 
 
 def whoami(number: int) -> tuple[int, int]:

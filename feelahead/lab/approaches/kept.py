@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.approaches.frozen import frozen_hash
+from feelahead.lab.approaches.frozen import frozen_hash
 
 Records = list[dict[str, Any]]
-_ROOT: Final = Path(__file__).parents[2]
+_ROOT: Final = Path(__file__).parents[3]
 _CODE: Final = ("common", "operator_side", "robot_side", "feelahead")
 
 

@@ -25,7 +25,7 @@ from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.settings import CameraSettings, EncoderSettings
 from robot_side.simulation.joint_reference import MotionLimits
 
-SCENES: Final = Path(__file__).parents[2] / "tests" / "data"
+SCENES: Final = Path(__file__).parents[3] / "tests" / "data"
 SITE: Final = "tool"
 AHEAD: Final = (
     *("wall", "plate", "ball", "post", "rod_2mm", "rod_5mm", "rod_10mm"),

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.approaches.kept import Kept
+from feelahead.lab.approaches.kept import Kept
 
 
 def test_what_was_done_is_kept_and_a_torn_line_is_done_again(tmp_path: Path) -> None:

@@ -11,12 +11,12 @@ from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from common.protocol.messages import Vector2
 from common.reaction import REACTION_S
-from feelahead.approaches.arming import wait_for_pull
-from feelahead.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.approaches.margin_law import MarginLaw
-from feelahead.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
-from feelahead.approaches.spoilt import Spoil, controller
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
+from feelahead.lab.approaches.margin_law import MarginLaw
+from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
+from feelahead.lab.approaches.spoilt import Spoil, controller
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from feelahead.approaches.approach import Approach, PullRun, robot_settings, run_approach
-from feelahead.approaches.frozen import ASIDE
-from feelahead.approaches.laws import Law
-from feelahead.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from feelahead.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
+from feelahead.lab.approaches.approach import Approach, PullRun, robot_settings, run_approach
+from feelahead.lab.approaches.frozen import ASIDE
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
+from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
 from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -103,7 +103,7 @@ def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_predic
     row = "loop_age_ms = 4\nmu_mm = 0\nsigma_mm = 0\n"
     path.write_text(f"[[operator]]\n{row}[[robot]]\n{row}")
     monkeypatch.setattr(
-        "feelahead.approaches.approach.robot_settings",
+        "feelahead.lab.approaches.approach.robot_settings",
         lambda approach: replace(robot_settings(approach), prediction_errors=path),
     )
     near_mm, far_mm = standing_off_mm(""), standing_off_mm(FAR)
@@ -315,7 +315,7 @@ def test_an_approach_does_not_depend_on_those_before_it(law: Law) -> None:
 
 
 def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feelahead.approaches.arming.LONGEST_ARMING_S", 3.0)
+    monkeypatch.setattr("feelahead.lab.approaches.arming.LONGEST_ARMING_S", 3.0)
     for changes, why in (
         ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
         ({"grip": True}, "grip"),

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.approaches import frozen
-from feelahead.approaches.frozen import (
+from feelahead.lab.approaches import frozen
+from feelahead.lab.approaches.frozen import (
     AHEAD,
     ASIDE,
     GRIPPED,

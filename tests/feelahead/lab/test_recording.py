@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from common.errors import FeelaheadError
-from feelahead.approaches.pulls import make_pull
-from feelahead.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
+from feelahead.lab.approaches.pulls import make_pull
+from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
@@ -184,6 +184,6 @@ def test_a_seed_gives_the_same_record_and_another_one_another() -> None:
 
 
 def test_a_link_that_never_arms_the_robot_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feelahead.approaches.arming.LONGEST_ARMING_S", 2.0)
+    monkeypatch.setattr("feelahead.lab.approaches.arming.LONGEST_ARMING_S", 2.0)
     with pytest.raises(FeelaheadError, match=r"not armed within 2 s over --link 'loss 100%'"):
         record_approach("steady", "loss 100%", 0, 0.1)

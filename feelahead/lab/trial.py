@@ -32,13 +32,11 @@ _SETTLES_S: Final = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """What is done; all else being equal, two that differ in `arm` alone are a pair."""
+    """What is done; with the same seed, two that differ in `arm` alone are a pair."""
 
     scene: SceneName
     link: str
     arm: Arm
-    seed: int
-    """Of the scene, the errors of camera and encoders, the link and the person."""
     person: PersonSettings
     duration_s: float
     link_model: LinkModel = "datagram"
@@ -88,12 +86,12 @@ class _Silent:
 class _Watch:
     """What truly happens, tick by tick."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: Trial, seed: int) -> None:
         self.hits = 0
         self.hit_first: str | None = None
         self.fastest_m_s: float | None = None
         self.placing = Placing()
-        self.scene = load_scene(name=trial.scene, seed=trial.seed)
+        self.scene = load_scene(name=trial.scene, seed=seed)
         self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
         self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
@@ -103,14 +101,14 @@ class _Watch:
                 RobotSettings(
                     link=trial.link,
                     link_model=trial.link_model,
-                    seed=trial.seed,
+                    seed=seed,
                     scene=trial.scene,
                     camera=CameraSettings(sd_m=trial.camera_sd_m),
                 ),
                 OperatorSettings(
                     link=trial.link,
                     link_model=trial.link_model,
-                    seed=trial.seed,
+                    seed=seed,
                     haptics=trial.arm != "off",
                     person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
                 ),
@@ -152,9 +150,12 @@ class _Watch:
         return stiff or device.rumble.left > 0.0
 
 
-def run_trial(trial: Trial) -> Result:
-    """Run it until the person is done, or for its duration from the start; the same trial gives the same result."""
-    watch = _Watch(trial)
+def run_trial(trial: Trial, seed: int) -> Result:
+    """Run it until the person is done, or for its duration from the start; the same trial gives the same result.
+
+    The seed draws the scene, the errors of camera and encoders, the link and the person.
+    """
+    watch = _Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person
     assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
     armed_s = done_s = None

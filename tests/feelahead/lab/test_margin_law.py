@@ -5,7 +5,7 @@ import pytest
 
 from common.protocol.messages import TriggerField
 from common.protocol.uniform_field import FAR_M, uniform_field
-from feelahead.approaches.margin_law import MarginLaw
+from feelahead.lab.approaches.margin_law import MarginLaw
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.zones import zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel

@@ -10,10 +10,10 @@ import numpy as np
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
-from feelahead.approaches.arming import wait_for_pull
-from feelahead.approaches.frozen import SITE, frozen_scene
-from feelahead.approaches.pulls import PullKind, make_pull
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.pulls import PullKind, make_pull
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings

@@ -1,0 +1,81 @@
+"""Run cells in several processes of this machine, or on a cluster of dask.distributed, through one interface.
+
+Both are executors of concurrent.futures. LostWorkersError is raised where a process, or the whole cluster, went away.
+"""
+
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Any, cast
+
+from common.errors import ConfigurationError, FeelaheadError
+
+_LOOK_S = 1.0
+_CONNECT_S = "10s"
+
+
+class LostWorkersError(FeelaheadError):
+    """Work was lost because what ran it was ended from outside."""
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor]:
+    """Yield a pool of processes of this machine; none of them outlives this one, not even after kill -9."""
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent, (os.getpid(),))
+    try:
+        # A signal that is ignored when a process starts stays ignored in it: Ctrl-C is for this process to answer.
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            pool.submit(os.getpid)
+        finally:
+            signal.signal(signal.SIGINT, before)
+        yield pool
+    except BaseException as error:
+        for child in multiprocessing.active_children():
+            child.terminate()
+        if isinstance(error, BrokenProcessPool):
+            raise LostWorkersError("a worker process was ended from outside") from error
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """Yield the workers of the dask scheduler at `address`; ConfigurationError where nobody answers there."""
+    try:
+        import distributed  # noqa: PLC0415  # large, and in the extra `experiments`
+        from distributed.comm.core import CommClosedError  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise ConfigurationError("--scheduler: distributed is missing; it is in the extra `experiments`") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # this process says itself what went wrong
+    try:
+        client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, TypeError) as error:
+        raise ConfigurationError(
+            f"--scheduler {address}: no dask scheduler answers there; valid: as tcp://127.0.0.1:8786"
+        ) from error
+    try:
+        yield cast(Executor, client.get_executor(pure=False, retries=2))
+    except (CancelledError, CommClosedError, distributed.KilledWorker) as error:
+        raise LostWorkersError(f"--scheduler {address}: the scheduler or its workers are gone") from error
+    finally:
+        client.close(timeout=1)
+
+
+def _end_with_parent(parent: int) -> None:
+    """End a worker soon after its parent was killed."""
+
+    def watch() -> None:
+        never = threading.Event()
+        while os.getppid() == parent:
+            never.wait(_LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,48 @@
+"""Draw figures with matplotlib: off screen, and the same bytes from the same figures."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import ConfigurationError
+
+PICTURES: Final = (".png", ".svg", ".pdf")
+"""Endings that a picture's name may have."""
+LAW_COLOURS: Final = {
+    "swept": "#0072b2",
+    "swept_robot": "#56b4e9",
+    "paper": "#d55e00",
+    "margin": "#cc79a7",
+    "none": "#777777",
+    "full": "#009e73",
+}
+
+
+@contextmanager
+def figure(path: Path, rows: int = 1, columns: int = 1, title: str = "", **options: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield a figure and its axes, as `matplotlib.pyplot.subplots` makes them, and write it at the end.
+
+    ConfigurationError without matplotlib, and where the file cannot be written.
+    """
+    try:
+        import matplotlib as mpl  # noqa: PLC0415  # slow to load, and only for pictures
+
+        mpl.use("Agg")
+        from matplotlib import pyplot as plt  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise ConfigurationError("--picture: matplotlib is missing; it is in the extra `experiments`") from error
+    with mpl.rc_context({"svg.hashsalt": "feelahead"}):
+        layout: dict[str, Any] = {"dpi": 110, "layout": "constrained"} | options
+        drawn, axes = plt.subplots(rows, columns, **layout)
+        try:
+            yield drawn, axes
+            if title:
+                drawn.suptitle(title, fontsize=9)
+            # Without the date and the library's version, the same figures give the same file.
+            dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+            drawn.savefig(path, metadata=dated.get(path.suffix.lower(), {"Software": None}))
+        except OSError as error:
+            raise ConfigurationError(f"--picture {path}: cannot be written: {error.strerror}") from error
+        finally:
+            plt.close(drawn)

@@ -1,0 +1,84 @@
+"""Finished work, line by line in a file, so that a sweep that was stopped can go on: `--resume FILE.jsonl`."""
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+from common.errors import ConfigurationError, FeelaheadError
+from feelahead.lab.table import Row
+
+
+class Journal:
+    """A file whose first line says what made it, with one line for each finished piece of work.
+
+    A piece is written and synced before the next one. A last line that kill -9 has torn is cut off and its piece run
+    again, so that no row is lost or doubled.
+    """
+
+    def __init__(self, path: Path | None, made_by: Mapping[str, Any]) -> None:
+        """Open or begin the file; ConfigurationError where it holds another run's work or another run writes to it."""
+        self.done: dict[str, list[Row]] = {}
+        self._file: BinaryIO | None = None
+        if path is None:
+            return
+        if path.exists() and not path.is_file():
+            raise ConfigurationError(f"--resume {path}: not a regular file; valid: a file of its own, or a new one")
+        try:
+            self._file = path.open("a+b")
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
+        except OSError as error:
+            raise ConfigurationError(f"--resume {path}: cannot be opened and locked: {error.strerror}") from error
+        try:
+            self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
+        except FeelaheadError:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def keep(self, key: str, rows: list[Row]) -> None:
+        """Write one finished piece; FeelaheadError when the disk does not take it."""
+        self.done[key] = rows
+        self._write(json.dumps({"key": key, "rows": rows}).encode())
+
+    def _load(self, path: Path, file: BinaryIO, first: bytes) -> None:
+        file.seek(0)
+        text = file.read()
+        lines = text.splitlines(keepends=True)
+        torn = lines.pop() if lines and not lines[-1].endswith(b"\n") else b""
+        if not lines and first.startswith(torn):
+            file.truncate(0)
+            self._write(first)
+            return
+        try:
+            made_by, asked = json.loads(lines[0])["made_by"], json.loads(first)["made_by"]
+            other = [name for name, value in asked.items() if made_by.get(name) != value]
+            self.done = {entry["key"]: entry["rows"] for entry in map(json.loads, lines[1:])}
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            raise ConfigurationError(f"--resume {path}: it holds no journal of a sweep; valid: a new file") from error
+        if other:
+            raise ConfigurationError(f"--resume {path}: made by another {' and '.join(other)}; valid: a new file")
+        file.truncate(len(text) - len(torn))
+
+    def _write(self, line: bytes) -> None:
+        if self._file is None:
+            return
+        try:
+            self._file.write(line + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise FeelaheadError(f"--resume {self._file.name}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,105 @@
+"""Does the demo's person grasp, lift and place, and feel what they set down before it touches?
+
+feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Annotated, Any
+
+import tyro
+from msgspec import Meta
+from rich.box import MARKDOWN
+from rich.table import Table as Shown
+from rich.text import Text
+
+from common.emulation.clauses import LinkModel
+from feelahead.lab.approaches.links import require_young_loop
+from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.table import Row, Table
+from feelahead.lab.trial import Trial, run_trial
+from operator_side.simulated_person.settings import PersonSettings
+from robot_side.simulation.built_in_scenes import SceneName
+
+
+@dataclass(frozen=True)
+class DemoSweep(Sweep):
+    """The demo, seed by seed: the same two sides and the same person in virtual time, and what is true of the end."""
+
+    seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 10
+    """Number of seeds."""
+    scene: SceneName = "table"
+    """The scene, one of the demo's."""
+    link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
+    """Emulated links, both ways, in netem's words."""
+    link_model: LinkModel = "datagram"
+    """datagram lets jitter reorder messages, stream keeps them in order."""
+    duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 40.0
+    """The limit of each run, in virtual time."""
+    person: PersonSettings = field(default_factory=PersonSettings)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.person.pull_n is not None:
+            raise ValueError(f"--person.pull-n {self.person.pull_n}: valid: not here, where a task is done")
+        if not self.link:
+            raise ValueError("--link: valid: one value or more")
+        for spec in self.link:
+            require_young_loop(spec, self.link_model)
+
+
+def cells(settings: DemoSweep) -> Iterator[Trial]:
+    """Lay out one cell for each link."""
+    for link in settings.link[: 1 if settings.quick else None]:
+        yield Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
+
+
+def run(cell: Trial, seed: int) -> Iterator[Row]:
+    """Run the person's whole task once."""
+    yield asdict(run_trial(cell, seed))
+
+
+def show(_: DemoSweep, table: Table) -> Iterator[Shown]:
+    """Make a table for each link: a row for each seed, and how many of them did it."""
+    for (link,), runs in table.groups("link"):
+        shown = Shown(title=Text(f"link: {link or 'none'}"), box=MARKDOWN)
+        for heading in (
+            *("seed", "grasped", "lifted, mm", "placed", "felt before touch, s", "mm", "touched at, mm/s", "tilt, °"),
+            *("hits", "finished, s"),
+        ):
+            shown.add_column(heading, justify="right")
+        for one in runs:
+            shown.add_row(
+                str(one["seed"]),
+                _yes(one["grasped"]),
+                f"{one['lifted_mm']:.0f}",
+                _yes(one["placed"]),
+                _number(one["felt_before_s"], 2),
+                _number(one["felt_before_mm"], 0),
+                _number(one["placing_speed_mm_s"], 0),
+                _number(one["tilt_deg"], 1),
+                str(one["hits"]),
+                _number(one["finished_s"], 1),
+            )
+        shown.add_section()
+        shown.add_row(
+            f"of {len(runs)}",
+            str(sum(runs.values("grasped"))),
+            str(sum(lifted > 50.0 for lifted in runs.values("lifted_mm"))),
+            str(sum(runs.values("placed"))),
+            str(sum(early > 0.0 for early in runs.values("felt_before_s"))),
+            *("", "", "", str(sum(runs.values("hits")))),
+            str(len(runs.values("finished_s"))),
+        )
+        yield shown
+
+
+def _yes(done: bool) -> str:
+    return "yes" if done else "NO"
+
+
+def _number(value: Any, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+QUESTION = Question("try demo", DemoSweep, cells, run, show)

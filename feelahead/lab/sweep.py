@@ -1,0 +1,266 @@
+"""The engine of all questions: run each cell of a grid with each seed, and make one tidy table of the rows.
+
+A question says what a cell is, how one is run, and what is shown. The engine does the rest: seeds that depend on no
+order, progress, workers or a cluster, a journal that survives kill -9, CSV and Parquet, goals and figures. The table
+is the same to the byte for any number of workers and after any interruption: rows stand in the order of the grid.
+"""
+
+import contextlib
+import functools
+import hashlib
+import importlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Generic, TypeVar
+
+import msgspec
+import numpy as np
+import tyro
+from msgspec import Meta
+from rich.console import Console, RenderableType
+
+from common.command.command_line import parse_settings
+from common.errors import ConfigurationError, FeelaheadError
+from common.files.output_file import require_output_file, write_json
+from common.limits import check_limits
+from common.recording.provenance import provenance
+from feelahead.lab.executors import LostWorkersError, cluster, processes
+from feelahead.lab.figures import PICTURES
+from feelahead.lab.goals import Goal, show_goals
+from feelahead.lab.journal import Journal
+from feelahead.lab.progress import progress
+from feelahead.lab.table import Row, Table
+
+_ROOT = Path(__file__).parents[2]
+_PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
+_RESTARTS = 3
+"""How often a pool is started again after one of its processes was killed."""
+_WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The flags of every question; a question's own settings inherit them."""
+
+    quick: bool = False
+    """A small grid that shows in a few minutes whether anything is wrong."""
+    seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
+    """The first seed."""
+    seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 1
+    """Number of seeds; each cell is run with each."""
+    workers: Annotated[Annotated[int, Meta(ge=1)] | None, tyro.conf.arg(metavar="N")] = None
+    """Cells at the same time, each in a process of this machine; 2 unless given. 1: in this process."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Run the cells on the dask.distributed cluster of this scheduler instead."""
+    resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
+    """Write each cell there as soon as it is done, and leave out what is there already."""
+    csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
+    """Write the table there, and settings, versions and hashes to FILE.csv.json beside it."""
+    parquet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.parquet")] = None
+    """The same as Parquet."""
+    summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write all figures there, lists included: those of the one run, or of several as `runs`."""
+    picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    """Draw the question's figure."""
+    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Take these settings from a file."""
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+        for name in ("resume", "csv", "parquet", "summary"):
+            require_output_file(f"--{name}", getattr(self, name))
+        require_output_file("--picture", self.picture, PICTURES)
+
+
+S = TypeVar("S", bound=Sweep)
+C = TypeVar("C")
+
+
+def _nothing(*_: Any) -> tuple[()]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Question(Generic[S, C]):
+    """One question; its module holds it as `QUESTION`, and the module's docstring begins with the question itself."""
+
+    name: str
+    """The command: `try approach`, `bench tick`."""
+    settings: type[S]
+    """The grid's parameters, each a flag; the class's docstring is what `--help` says."""
+    cells: Callable[[S], Iterable[C]]
+    """Lay out the grid: frozen dataclasses of plain values, whose scalars become columns."""
+    run: Callable[[C, int], Iterable[Row]]
+    """Run one cell with one seed; its randomness comes from the seed alone, as through `generator`."""
+    show: Callable[[S, Table], Iterable[RenderableType]]
+    """Make what people read: tables, sentences."""
+    draw: Callable[[S, Table, Path], object] | None = None
+    """Make the figure of `--picture`."""
+    goals: Callable[[S, Table], Iterable[Goal]] = _nothing
+    """Hold figures against their limits."""
+    also: Callable[[S, Table], object] = _nothing
+    """Write what the question's own flags ask for."""
+    frozen: Callable[[S], str] = lambda _: ""
+    """Hash what must not change, lest the figures of two runs could not be compared."""
+    failed: Callable[[Row], bool] = lambda _: False
+    """Recognise a row that answers nothing: with one, the exit code is 1."""
+    timed: bool = False
+    """Cells measure time: they take turns in this process alone, and `--workers` is refused."""
+    prepare: Callable[[], object] = _nothing
+    """Do once what each worker would do otherwise, such as compiling kernels."""
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """One cell with one seed."""
+
+    cell: Any
+    seed: int
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Name it in the journal; equal for equal cells, whatever else the grid holds."""
+        return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
+
+
+def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
+    """Answer a question from the command line; return 0 when every cell gave its rows."""
+    settings = parse_settings(question.settings, f"feelahead {question.name}", arguments)
+    if settings.picture is not None and question.draw is None:
+        raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
+    table, failures, left = sweep(question, settings)
+    _write(question, settings, table)  # before anything is printed: a reader may leave early, as `head` does
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
+    if len(table):
+        for shown in question.show(settings, table):
+            console.print(shown)
+        show_goals(console, question.goals(settings, table))
+    for line in failures:
+        console.print(f"failed: {line}")
+    if left:
+        console.print(f"interrupted: {left} runs are left")
+    if frozen := question.frozen(settings):
+        console.print(f"frozen scenes and limits: {frozen}")
+    return 1 if failures or left or any(question.failed(row) for row in table) else 0
+
+
+def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]:
+    """Run all that the journal does not hold; return the table, a line for each failure, and how many runs are left.
+
+    A cell that raises FeelaheadError fails by itself. Ctrl-C ends the sweep with what is done. ConfigurationError for
+    a grid that cannot be run, LostWorkersError when workers were killed again and again.
+    """
+    if question.timed and (settings.scheduler or settings.workers not in (None, 1)):
+        flag = f"--scheduler {settings.scheduler}" if settings.scheduler else f"--workers {settings.workers}"
+        raise ConfigurationError(f"{flag}: {question.name} measures time, in turns and alone; valid: --workers 1")
+    seeds = range(settings.seed, settings.seed + settings.seeds)
+    cells = list(question.cells(settings))
+    order = [_Piece(cell, seed) for cell in cells for seed in seeds]
+    made_by = {"question": question.name, "code": code_hash(), "frozen": question.frozen(settings)}
+    failures: list[str] = []
+    with Journal(settings.resume, made_by) as journal:
+        # Seed by seed, so that an interrupted sweep has something of every cell.
+        todo = sorted((piece for piece in order if piece.key not in journal.done), key=lambda piece: piece.seed)
+        with progress(question.name, float(len(todo) or 1)) as advance, contextlib.suppress(KeyboardInterrupt):
+            for piece, found in _results(question, settings, todo):
+                if isinstance(found, str):
+                    failures.append(f"{piece.key}: {found}")
+                else:
+                    journal.keep(piece.key, found)
+                advance(1.0)
+        rows = [row for piece in order for row in journal.done.get(piece.key, ())]
+        left = sum(piece.key not in journal.done for piece in order) - len(failures)
+    return Table(rows), failures, left
+
+
+def generator(cell: object, seed: int) -> np.random.Generator:
+    """Make the random numbers of one cell and seed: the same in any order, and independent of other cells."""
+    digest = hashlib.sha256(_Piece(cell, seed).key.encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:16], "little"))
+
+
+@functools.cache
+def code_hash() -> str:
+    """Hash the code that figures come from."""
+    digest = hashlib.sha256()
+    for package in _PACKAGES:
+        for path in sorted((_ROOT / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
+    """Run one cell of the question in `module`, here or in a worker; what failed is said as a line."""
+    question: Question[Any, Any] = importlib.import_module(module).QUESTION
+    columns = {name: value for name, value in _plain(cell).items() if not isinstance(value, list | dict)}
+    try:
+        rows = [columns | {"seed": seed} | row for row in question.run(cell, seed)]
+    except ConfigurationError:
+        raise
+    except FeelaheadError as error:
+        return str(error)
+    # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
+    plain: list[Row] = json.loads(json.dumps(rows))
+    return plain
+
+
+def _results(question: Question[S, C], settings: S, todo: Sequence[_Piece]) -> Iterator[tuple[_Piece, list[Row] | str]]:
+    """Yield the pieces with what came of them, as they end."""
+    module = question.run.__module__
+    if not todo:
+        return
+    if question.timed or (settings.scheduler is None and (settings.workers == 1 or len(todo) == 1)):
+        for piece in todo:
+            yield piece, run_piece(module, piece.cell, piece.seed)
+        return
+    if settings.scheduler is None:
+        question.prepare()
+    left, lost = list(todo), 0
+    while left:
+        before = len(left)
+        pool = cluster(settings.scheduler) if settings.scheduler else processes(settings.workers or _WORKERS)
+        try:
+            with pool as executor:
+                futures: dict[Future[list[Row] | str], _Piece] = {
+                    executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
+                }
+                for future in as_completed(futures):
+                    found = future.result()
+                    left.remove(futures[future])
+                    yield futures[future], found
+        except LostWorkersError as error:
+            lost += 1
+            if settings.scheduler or lost > _RESTARTS or len(left) == before:
+                kept = f"run again, --resume {settings.resume} goes on" if settings.resume else "valid: with --resume"
+                raise LostWorkersError(f"{error}; {len(left)} runs are left; {kept}") from error
+
+
+def _write(question: Question[S, C], settings: S, table: Table) -> None:
+    """Write the files that were asked for."""
+    frozen = question.frozen(settings)
+    if settings.summary is not None:
+        runs = list(table)
+        figures = runs[0] if len(runs) == 1 else {"runs": runs}
+        write_json("--summary", settings.summary, figures | ({"frozen": frozen} if frozen else {}))
+    made_by = provenance(settings, 0, "") | {"question": question.name, "code": code_hash(), "frozen": frozen}
+    for flag, path, write in (
+        ("--csv", settings.csv, table.write_csv),
+        ("--parquet", settings.parquet, table.write_parquet),
+    ):
+        if path is not None:
+            write(path)
+            if path.is_file():
+                write_json(flag, path.with_name(path.name + ".json"), made_by)
+    if settings.picture is not None and question.draw is not None and len(table):
+        question.draw(settings, table, settings.picture)
+    question.also(settings, table)
+
+
+def _plain(cell: object) -> dict[str, Any]:
+    """Turn a cell into what JSON has."""
+    plain: dict[str, Any] = msgspec.to_builtins(cell, enc_hook=str)
+    return plain

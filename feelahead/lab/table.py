@@ -1,0 +1,69 @@
+"""One tidy table: a row for each measurement, a column for each setting and figure."""
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from common.errors import ConfigurationError
+from common.files.output_file import output_file
+
+Row = dict[str, Any]
+"""Figures by name, as JSON has them. Lists and tables go to `--summary` alone, the rest also to `--csv`."""
+
+_SCALARS = (str, int, float, bool, type(None))
+
+
+class Table:
+    """Rows in the order of cells, seeds and measurements; never changed."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self.rows: Sequence[Row] = tuple(rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of all scalar figures, in the order of their first appearance."""
+        names = {name: None for row in self.rows for name, value in row.items() if isinstance(value, _SCALARS)}
+        return list(names)
+
+    def values(self, name: str) -> list[Any]:
+        """The figures of one column; rows without it, or with None, are left out."""
+        return [row[name] for row in self.rows if row.get(name) is not None]
+
+    def where(self, **equal: Any) -> "Table":
+        """The rows whose columns have these values."""
+        return Table(row for row in self.rows if all(row.get(name) == value for name, value in equal.items()))
+
+    def groups(self, *names: str) -> Iterator[tuple[tuple[Any, ...], "Table"]]:
+        """The rows by the values of some columns, in the order of their first appearance."""
+        found: dict[tuple[Any, ...], list[Row]] = {}
+        for row in self.rows:
+            found.setdefault(tuple(row.get(name) for name in names), []).append(row)
+        for key, rows in found.items():
+            yield key, Table(rows)
+
+    def write_csv(self, path: Path) -> None:
+        """Write the scalar columns; an absent figure is an empty field."""
+        with output_file("--csv", path) as file:
+            writer = csv.DictWriter(file, self.columns, extrasaction="ignore", lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def write_parquet(self, path: Path) -> None:
+        """Write the scalar columns as Parquet; ConfigurationError without pyarrow."""
+        try:
+            import pyarrow as pa  # noqa: PLC0415  # large, and only asked for by name
+            from pyarrow import parquet  # noqa: PLC0415
+        except ModuleNotFoundError as error:
+            raise ConfigurationError("--parquet: pyarrow is missing; it is in the extra `experiments`") from error
+        columns = {name: [row.get(name) for row in self.rows] for name in self.columns}
+        try:
+            parquet.write_table(pa.table(columns), path)
+        except (OSError, pa.ArrowException) as error:
+            raise ConfigurationError(f"--parquet {path}: cannot be written: {error}") from error
