@@ -71,7 +71,7 @@ pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of cons
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
-	$(BIN)/feelahead try latency --compose --out latency $(ARGS)
+	$(BIN)/feelahead try latency --compose --csv latency.csv --picture latency.png $(ARGS)
 
 soak: $(VENV)/.installed ## one owner and eight observers for ten minutes: does anything grow?
 	$(BIN)/feelahead try soak --observers 8 --minutes 10 $(ARGS)

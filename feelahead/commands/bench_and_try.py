@@ -43,7 +43,7 @@ class Menu:
             )
             return 0
         name, *rest = arguments
-        if name in self.questions:
+        if name in self.questions or name.endswith(".py"):
             return _ask(self.name, name, rest)
         if name not in self.entries:
             valid = ", ".join((*self.questions, *self.entries))
@@ -64,9 +64,18 @@ def _sentence(name: str) -> str:
 
 def _ask(kind: str, name: str, arguments: Sequence[str]) -> int:
     """Answer a question; ConfigurationError names the package that is missing."""
+    module = f"feelahead.lab.questions.{name}"
+    if name.endswith(".py"):
+        path = Path(name)
+        if not path.is_file():
+            raise ConfigurationError(f"{kind} {name}: there is no such file; valid: a question's file")
+        sys.path.insert(0, str(path.absolute().parent))  # a worker process is given the same
+        module = path.stem
     try:
         sweep = import_module("feelahead.lab.sweep")
-        question = import_module(f"feelahead.lab.questions.{name}").QUESTION
+        question = import_module(module).QUESTION
+    except AttributeError as error:
+        raise ConfigurationError(f"{kind} {name}: {error}; valid: a file that holds a QUESTION") from error
     except ModuleNotFoundError as error:
         raise ConfigurationError(
             f"{kind} {name}: {error.name} is not installed; it is in one of the extras robot, operator, experiments,"
@@ -157,7 +166,7 @@ bench = Menu(
 try_out = Menu(
     "try",
     "experiment",
-    ("demo",),
+    ("demo", "haptics", "latency"),
     {
         "approach": Entry(
             "feelahead.experiments.approach.command",
@@ -169,24 +178,6 @@ try_out = Menu(
             "feelahead.experiments.field.command",
             "try_field",
             "how far from things each strength begins, and what a look ahead costs",
-            "pip install 'feelahead[robot,bench]'",
-        ),
-        "haptics": Entry(
-            "feelahead.experiments.haptics.command",
-            "try_haptics",
-            "the same simulated person with and without haptics, where there is something to hit",
-            _BOTH_SIDES,
-        ),
-        "latency": Entry(
-            "feelahead.experiments.latency.command",
-            "try_latency",
-            "a constant finger over links as they are: delays and contacts, and whether emulations of a link agree",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
-        "scenes": Entry(
-            "feelahead.experiments.scenes",
-            "try_scenes",
-            "draw the built-in scenes from above and from the side",
             "pip install 'feelahead[robot,bench]'",
         ),
         "faults": Entry(

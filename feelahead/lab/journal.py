@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
@@ -28,17 +29,15 @@ class Journal:
         if path.exists() and not path.is_file():
             raise ConfigurationError(f"--resume {path}: not a regular file; valid: a file of its own, or a new one")
         try:
-            self._file = path.open("a+b")
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with ExitStack() as stack:
+                self._file = stack.enter_context(path.open("a+b"))
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
+                stack.pop_all()
         except BlockingIOError as error:
             raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
         except OSError as error:
             raise ConfigurationError(f"--resume {path}: cannot be opened and locked: {error.strerror}") from error
-        try:
-            self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
-        except FeelaheadError:
-            self._file.close()
-            raise
 
     def __enter__(self) -> Self:
         return self

@@ -126,6 +126,15 @@ class _Piece:
         """Name it in the journal; equal for equal cells, whatever else the grid holds."""
         return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
 
+    @property
+    def columns(self) -> Row:
+        """Return the scalars of the cell, and the seed."""
+        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
+        return scalars | {"seed": self.seed}
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value}" for name, value in self.columns.items())
+
 
 def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
     """Answer a question from the command line; return 0 when every cell gave its rows."""
@@ -140,7 +149,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
             console.print(shown)
         show_goals(console, question.goals(settings, table))
     for line in failures:
-        console.print(f"failed: {line}")
+        console.print(f"failed: {line}", soft_wrap=True)
     if left:
         console.print(f"interrupted: {left} runs are left")
     if frozen := question.frozen(settings):
@@ -160,7 +169,7 @@ def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]
     seeds = range(settings.seed, settings.seed + settings.seeds)
     cells = list(question.cells(settings))
     order = [_Piece(cell, seed) for cell in cells for seed in seeds]
-    made_by = {"question": question.name, "code": code_hash(), "frozen": question.frozen(settings)}
+    made_by = {"question": question.name, "code": code_hash(question), "frozen": question.frozen(settings)}
     failures: list[str] = []
     with Journal(settings.resume, made_by) as journal:
         # Seed by seed, so that an interrupted sweep has something of every cell.
@@ -168,7 +177,7 @@ def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]
         with progress(question.name, float(len(todo) or 1)) as advance, contextlib.suppress(KeyboardInterrupt):
             for piece, found in _results(question, settings, todo):
                 if isinstance(found, str):
-                    failures.append(f"{piece.key}: {found}")
+                    failures.append(f"{piece}: {found}")
                 else:
                     journal.keep(piece.key, found)
                 advance(1.0)
@@ -184,21 +193,26 @@ def generator(cell: object, seed: int) -> np.random.Generator:
 
 
 @functools.cache
-def code_hash() -> str:
-    """Hash the code that figures come from."""
-    digest = hashlib.sha256()
+def _code_hash(own: Path) -> str:
+    """Hash the code that figures come from: the packages', and the question's own file wherever it lies."""
+    digest = hashlib.sha256(own.read_bytes())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
+def code_hash(question: Question[Any, Any]) -> str:
+    """Hash the code that a question's figures come from."""
+    return _code_hash(Path(question.run.__code__.co_filename))
+
+
 def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
     """Run one cell of the question in `module`, here or in a worker; what failed is said as a line."""
     question: Question[Any, Any] = importlib.import_module(module).QUESTION
-    columns = {name: value for name, value in _plain(cell).items() if not isinstance(value, list | dict)}
+    columns = _Piece(cell, seed).columns
     try:
-        rows = [columns | {"seed": seed} | row for row in question.run(cell, seed)]
+        rows = [columns | row for row in question.run(cell, seed)]
     except ConfigurationError:
         raise
     except FeelaheadError as error:
@@ -246,7 +260,7 @@ def _write(question: Question[S, C], settings: S, table: Table) -> None:
         runs = list(table)
         figures = runs[0] if len(runs) == 1 else {"runs": runs}
         write_json("--summary", settings.summary, figures | ({"frozen": frozen} if frozen else {}))
-    made_by = provenance(settings, 0, "") | {"question": question.name, "code": code_hash(), "frozen": frozen}
+    made_by = provenance(settings, 0, "") | {"question": question.name, "code": code_hash(question), "frozen": frozen}
     for flag, path, write in (
         ("--csv", settings.csv, table.write_csv),
         ("--parquet", settings.parquet, table.write_parquet),

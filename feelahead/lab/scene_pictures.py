@@ -1,8 +1,9 @@
 """Draw the built-in scenes from above and from the side, as they stand before anything moves.
 
-feelahead try scenes --out docs/scenes
+python -m feelahead.lab.scene_pictures --out docs/scenes
 """
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,58 +11,53 @@ from typing import Annotated, Any, Final, get_args
 
 import numpy as np
 import tyro
+from msgspec import Meta
 
 from common.arrays import FloatArray
 from common.command.command_line import parse_settings
+from common.limits import check_limits
+from feelahead.lab.figures import figure
 from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.scene import Scene, load_scene
 
 _GRASP_M: Final = 0.02
 _VIEWS: Final = (("from above", 0, 1), ("from the side", 0, 2))
 _FLOOR_M: Final = -0.1
-"""What lies lower is not drawn."""
+"""Things below this height are not drawn."""
 
 
 @dataclass(frozen=True)
-class ScenesSettings:
-    """Pictures of the built-in scenes: the gripper at its start, and dashed where it grasps."""
+class ScenePictures:
+    """Draw the built-in scenes: the gripper at its start, and dashed where it grasps."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path()
     """One PNG for each scene goes there."""
-    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Whose wall, posts or shelf are drawn."""
+    seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
+    """The seed that draws wall, posts and shelf."""
 
     def __post_init__(self) -> None:
+        check_limits(self)
         if not self.out.is_dir():
-            raise ValueError(f"--out {self.out}: there is no such folder; valid: a folder that is there")
-        if self.seed < 0:
-            raise ValueError(f"--seed {self.seed}: valid: 0 or more")
+            raise ValueError(f"--out {self.out}: there is no such folder; valid: an existing folder")
 
 
 def draw_scene(path: Path, name: SceneName, seed: int) -> None:
     """Write one scene's picture."""
-    import matplotlib as mpl  # noqa: PLC0415  # only pictures need it
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt  # noqa: PLC0415
-
     scene = load_scene(name=name, seed=seed)
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
     target = next(thing for thing in scene.objects if thing.name == "target").geoms[0]
     tool_m, target_m = scene.data.site_xpos[scene.robot.site], scene.data.geom_xpos[target]
     to_grasp_m: FloatArray = target_m - tool_m + np.array([_GRASP_M, 0.0, 0.0])
-    for ax, (view, across, up) in zip(axes, _VIEWS, strict=True):
-        for thing in scene.objects:
-            for geom in thing.geoms:
-                _outline(ax, scene, geom, (across, up), np.zeros(3), tuple(scene.model.geom_rgba[geom]), "-")
-        for geom in scene.robot.gripper_geoms:
-            _outline(ax, scene, int(geom), (across, up), np.zeros(3), (0.25, 0.27, 0.30, 1.0), "-")
-            _outline(ax, scene, int(geom), (across, up), to_grasp_m, None, "--")
-        ax.set(title=view, xlabel="ahead, m", ylabel="to the left, m" if up == 1 else "up, m", aspect="equal")
-        ax.set(xlim=(0.35, 1.1), ylim=(-0.3, 0.3) if up == 1 else (-0.05, 0.4))
-    figure.suptitle(f"{name}, seed {seed}")
-    figure.savefig(path, dpi=80, metadata={"Software": None})
-    plt.close(figure)
+    with figure(path, 1, 2, f"{name}, seed {seed}", figsize=(9, 4), dpi=80) as (_, panels):
+        for ax, (view, across, up) in zip(panels, _VIEWS, strict=True):
+            for thing in scene.objects:
+                for geom in thing.geoms:
+                    colour = tuple(scene.model.geom_rgba[geom])
+                    _outline(ax, scene, geom, (across, up), np.zeros(3), colour, "-")
+            for geom in scene.robot.gripper_geoms:
+                _outline(ax, scene, int(geom), (across, up), np.zeros(3), (0.25, 0.27, 0.30, 1.0), "-")
+                _outline(ax, scene, int(geom), (across, up), to_grasp_m, None, "--")
+            ax.set(title=view, xlabel="ahead, m", ylabel="to the left, m" if up == 1 else "up, m", aspect="equal")
+            ax.set(xlim=(0.35, 1.1), ylim=(-0.3, 0.3) if up == 1 else (-0.05, 0.4))
 
 
 def _outline(
@@ -73,7 +69,7 @@ def _outline(
     colour: tuple[float, ...] | None,
     style: str,
 ) -> None:
-    """The outline of a geom's bounding box, seen along the third axis."""
+    """Outline a geom's bounding box, seen along the third axis."""
     from matplotlib.patches import Polygon  # noqa: PLC0415  # only pictures need it
     from scipy.spatial import ConvexHull  # noqa: PLC0415
 
@@ -85,15 +81,19 @@ def _outline(
         return
     flat = corners[:, axes]
     hull = flat[ConvexHull(flat).vertices]
-    # What is higher hides what is lower, and an outline nothing.
+    # Higher things hide lower ones; an outline hides nothing.
     order = 2.0 + float(corners[:, 2].max()) if colour else 4.0
     face = colour or "none"
     ax.add_patch(Polygon(hull, facecolor=face, edgecolor="black", linestyle=style, linewidth=0.7, zorder=order))
 
 
-def try_scenes(arguments: Sequence[str]) -> int:
+def draw_scenes(arguments: Sequence[str]) -> int:
     """Draw them all."""
-    settings = parse_settings(ScenesSettings, "feelahead try scenes", arguments)
+    settings = parse_settings(ScenePictures, "python -m feelahead.lab.scene_pictures", arguments)
     for name in get_args(SceneName):
         draw_scene(settings.out / f"{name}.png", name, settings.seed)
     return 0
+
+
+if __name__ == "__main__":
+    sys.exit(draw_scenes(sys.argv[1:]))

@@ -1,1 +1,0 @@
-"""The same simulated person with and without haptics, in scenes with something to hit."""

@@ -1,0 +1,159 @@
+"""Does the same simulated person hit less with haptics than without, where there is something to hit?
+
+    feelahead try haptics --scenes wall slot shelf --delays 0 100 200 400 --seeds 30 --csv FILE
+
+Everything runs in virtual time, so the same command prints the same tables. The person is simulated: nothing here is
+a claim about people.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from statistics import fmean, median
+from typing import Annotated
+
+import tyro
+from msgspec import Meta
+from rich.box import MARKDOWN
+from rich.table import Table as Shown
+
+from common.emulation.clauses import LinkModel
+from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
+from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.table import Row, Table
+from feelahead.lab.trial import Arm, Trial, run_trial
+from operator_side.simulated_person.settings import PersonSettings
+from robot_side.simulation.built_in_scenes import SceneName
+
+_ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "reacting": "on, reacts"}
+
+# Beyond a loop age of two seconds the robot side is never armed.
+_Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
+
+
+@dataclass(frozen=True)
+class HapticsSweep(Sweep):
+    """Trials of a person who sees distances wrongly and no obstacle: without haptics, with, and with and noticing.
+
+    They reach for the target in single moves, grasp it, lift it and set it down again. Trials with the same seed differ
+    in nothing but what is felt: the same scene, errors of camera and link, misjudged distances.
+    """
+
+    seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 30
+    """Number of pairs."""
+    scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
+    """wall: behind the target. slot: between two posts. shelf: over an edge. table: clutter beside the way."""
+    delays: Annotated[tuple[_Delay, ...], tyro.conf.arg(metavar="MS...")] = (0.0, 100.0, 200.0, 400.0)
+    """Each way, in milliseconds."""
+    jitter: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MS")] = 10.0
+    """Standard deviation of each delay above 0, in milliseconds."""
+    camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
+    """Standard deviation of the camera's error along each axis, which the law knows."""
+    link_model: LinkModel = "datagram"
+    """datagram lets jitter reorder messages, stream keeps them in order."""
+    duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
+    """The limit of each trial, in virtual time."""
+    tick: Annotated[float, Meta(ge=1.0, le=10.0), tyro.conf.arg(metavar="MS")] = 4.0
+    """Period of the robot side's ticks, in milliseconds; 1 is the real one, and takes more than twice the time."""
+    person: PersonSettings = field(
+        default_factory=lambda: PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.person.pull_n is not None:
+            raise ValueError(f"--person.pull-n {self.person.pull_n}: valid: not here, where a task is done")
+        for name in ("scenes", "delays"):
+            values = getattr(self, name)
+            if not values or len(set(values)) < len(values):
+                raise ValueError(f"--{name} {' '.join(map(str, values))}: valid: one or more, each once")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One arm of one scene and delay."""
+
+    scene: SceneName
+    delay_ms: float
+    arm: Arm
+    trial: Trial
+
+
+def cells(settings: HapticsSweep) -> Iterator[Cell]:
+    """Lay out scenes by delays by arms."""
+    few = 1 if settings.quick else None
+    for scene, delay_ms, arm in product(settings.scenes[:few], settings.delays[:few], _ARMS):
+        yield Cell(
+            scene,
+            delay_ms,
+            arm,
+            Trial(
+                scene,
+                f"delay {delay_ms:g}ms {settings.jitter:g}ms distribution normal" if delay_ms else "",
+                arm,
+                settings.person,
+                settings.duration,
+                settings.link_model,
+                1e-3 * settings.tick,
+                1e-3 * settings.camera_mm,
+            ),
+        )
+
+
+def run(cell: Cell, seed: int) -> Iterator[Row]:
+    """Run one trial."""
+    yield asdict(run_trial(cell.trial, seed))
+
+
+def show(settings: HapticsSweep, table: Table) -> Iterator[Shown]:
+    """Make a table for each scene and delay, with a row for each arm."""
+    for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
+        # As Markdown, for docs/measurements.md.
+        shown = Shown(title=f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs", box=MARKDOWN)
+        for heading in (
+            *("haptics", "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"),
+            *("felt first", "finished, s", "longer by [95 %]"),
+        ):
+            shown.add_column(heading, justify="left" if heading == "haptics" else "right")
+        for arm, words in _ARMS.items():
+            shown.add_row(words, *_figures(pairs, arm, settings.duration))
+        yield shown
+
+
+def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
+    """Compare one arm with the same seeds' trials without haptics."""
+    off = {row["seed"]: row for row in pairs.where(arm="off")}
+    those = [row for row in pairs.where(arm=arm) if row["seed"] in off]
+    if not those:
+        return []
+    hit = [row["hits"] > 0 for row in those]
+    low, high = share_interval(sum(hit), len(hit))
+    speeds = [row["fastest_hit_mm_s"] for row in those if row["fastest_hit_mm_s"] is not None]
+    times = restricted([row["finished_s"] for row in those], limit_s)
+    p = longer = ""
+    if arm != "off":
+        beside = [off[row["seed"]] for row in those]
+        p = f"{mcnemar_p([row['hits'] > 0 for row in beside], hit):.2g}"
+        times_off = restricted([row["finished_s"] for row in beside], limit_s)
+        differences = [time - other for time, other in zip(times, times_off, strict=True)]
+        longer = "{:+.1f} [{:+.1f}, {:+.1f}]".format(fmean(differences), *mean_interval(differences))
+    placed = [row for row in those if row["placed"]]
+    return [
+        f"{sum(hit)}/{len(hit)} [{100 * low:.0f} to {100 * high:.0f} %]",
+        p,
+        str(sum(row["hits"] for row in those)),
+        f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else "",
+        str(sum(row["grasped"] for row in those)),
+        str(len(placed)),
+        str(sum(row["felt_before_s"] is not None for row in placed)),
+        f"{fmean(times):.1f}",
+        longer,
+    ]
+
+
+def restricted(times_s: Sequence[float | None], limit_s: float) -> list[float]:
+    """Cut times at the limit, which also stands for missing ones: their mean is the restricted mean."""
+    return [limit_s if time_s is None else min(time_s, limit_s) for time_s in times_s]
+
+
+QUESTION = Question("try haptics", HapticsSweep, cells, run, show)

@@ -1,0 +1,281 @@
+"""What do links as they are do to a constant finger, and do the emulations of a link agree?
+
+feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture latency.png
+"""
+
+import atexit
+import functools
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
+from itertools import combinations, product
+from pathlib import Path
+from statistics import fmean, median
+from typing import Annotated, Final, Literal
+
+import tyro
+from msgspec import Meta
+from rich.box import MARKDOWN
+from rich.table import Table as Shown
+
+from common.command.live_view import LINK_UP
+from common.emulation.clauses import LinkModel
+from common.emulation.named_links import NAMED_LINKS
+from common.errors import ConfigurationError, FeelaheadError
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.real_time import LINK_S, START_S, run_for
+from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
+from feelahead.lab.approaches.links import require_young_loop
+from feelahead.lab.figures import figure
+from feelahead.lab.intervals import student_interval, welch_interval
+from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.table import Row, Table
+
+Medium = Literal["virtual", "loopback", "containers"]
+_CONTAINERS: Final = "feelahead.containers.medium"
+_DIRECTIONS: Final = ("to_robot", "to_operator")
+_LOOK_S: Final = 0.01
+_COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
+"""Figures on which the media should agree, each with its name, unit and margin."""
+_COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
+_WIDE: Final = 0.7
+"""Of the room that a link has in the figure, for its media."""
+
+
+@dataclass(frozen=True)
+class LatencySweep(Sweep):
+    """A finger that pulls R2 with a constant force towards a wall, over links as they are: what the delay does.
+
+    Each link with and without haptics, over the same seeds, and in several media: virtual time, two processes whose
+    messages are held back by themselves, and containers with the kernel's netem between them. Then, whether the media
+    agree on what the link does. Trials that run in real time take turns.
+    """
+
+    seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 5
+    """Number of trials of each kind."""
+    links: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|SPEC...")] = tuple(NAMED_LINKS)
+    """Links by name, or in netem's words, both ways."""
+    haptics: tuple[Literal["on", "off"], ...] = ("on", "off")
+    """Whether triggers are stiffened."""
+    media: tuple[Literal["virtual", "loopback"], ...] = ("virtual", "loopback")
+    """virtual: in this process, as fast as it goes. loopback: two processes on 127.0.0.1, in real time."""
+    compose: bool = False
+    """And in containers, with the kernel's netem between them."""
+    model: LinkModel = "stream"
+    """How a link is emulated: in order and losing nothing, as TCP does, or as datagrams."""
+    force: Annotated[float, Meta(ge=0.0, le=20.0), tyro.conf.arg(metavar="N")] = 3.0
+    """Newtons on R2: 2 is a light pull, 3.7 a normal one."""
+    duration: Annotated[float, Meta(ge=2.0, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
+    """Of each trial, from the moment that the link is up; the pull begins after 1.3 s and a round trip or two."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("links", "haptics", "media"):
+            values = getattr(self, name)
+            if len(set(values)) < len(values) or not (values or (name == "media" and self.compose)):
+                raise ValueError(f"--{name} {' '.join(values)}: valid: one or more, each once")
+        for link in self.links:
+            require_young_loop(link, self.model)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One link, with or without haptics, in one medium."""
+
+    link: str
+    haptics: str
+    medium: Medium
+    trial: Trial
+
+
+def cells(settings: LatencySweep) -> Iterator[Cell]:
+    """Lay out links by haptics by media."""
+    containers: tuple[Medium, ...] = ("containers",) if settings.compose else ()
+    links = settings.links[: 1 if settings.quick else None]
+    for link, haptics, medium in product(links, settings.haptics, (*settings.media, *containers)):
+        trial = Trial(link, haptics == "on", 0, settings.force, settings.duration, settings.model)
+        yield Cell(link, haptics, medium, trial)
+
+
+def run(cell: Cell, seed: int) -> Iterator[Row]:
+    """Run one trial; delays in milliseconds, losses in per cent."""
+    figures = _MEDIA[cell.medium](replace(cell.trial, seed=seed))
+    row: Row = asdict(figures)
+    for direction in _DIRECTIONS:
+        way = row.pop(direction)
+        share = way.pop("loss_share")
+        way["lost_percent"] = None if share is None else 100.0 * share
+        row |= {f"{direction}_{name}": value for name, value in way.items()}
+    yield row
+
+
+def in_virtual_time(trial: Trial) -> TrialFigures:
+    """Run both cores and the emulated link in this process, as fast as it goes."""
+    both = Loopback(LoopbackSettings(trial.robot_settings(), trial.operator_settings()))
+    while both.operator.status(both.clock.now())["link"] != LINK_UP:
+        if both.clock.now() > LINK_S:
+            raise FeelaheadError(f"no link within {LINK_S:g} s over --link {trial.link!r}")
+        both.run_until(both.clock.now() + _LOOK_S)
+    both.run_until(both.clock.now() + trial.duration_s)
+    return figures_of(both.summary())
+
+
+def on_loopback(trial: Trial) -> TrialFigures:
+    """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for what it sends."""
+    with tempfile.TemporaryDirectory(prefix="feelahead-latency-") as folder:
+        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
+        link = trial.link_arguments()
+        ours = ["--bind=tcp://127.0.0.1:0", *trial.robot_arguments(), *link, f"--summary={summaries['robot']}"]
+        with SideProcess("robot_side", "robot", ours) as robot:
+            heard = robot.wait_for("listening", START_S)
+            theirs = [f"--connect={heard['control']}", f"--view-connect={heard['view']}", *trial.operator_arguments()]
+            theirs += [*link, f"--summary={summaries['operator']}"]
+            with SideProcess("operator_side", "operator", theirs) as operator:
+                run_for(robot, operator, trial.duration_s)
+        robot_said, operator_said = (read_summary(path) for path in summaries.values())
+        return figures_of(merge_summaries(robot_said, operator_said, []))
+
+
+def in_containers(trial: Trial) -> TrialFigures:
+    """Run both sides in containers, in real time; the router between them has the link."""
+    figures: TrialFigures = _containers()(trial)
+    return figures
+
+
+_MEDIA: Final[Mapping[Medium, Callable[[Trial], TrialFigures]]] = {
+    "virtual": in_virtual_time,
+    "loopback": on_loopback,
+    "containers": in_containers,
+}
+
+
+@functools.cache
+def _containers() -> Callable[[Trial], TrialFigures]:
+    """Open the containers once, and leave nothing of them at the end of the process."""
+    try:
+        module = import_module(_CONTAINERS)
+    except ImportError as error:
+        raise ConfigurationError(f"--compose: {error}; valid: in a clone of the repository") from error
+    stack = ExitStack()
+    atexit.register(stack.close)
+    opened: Callable[[Trial], TrialFigures] = stack.enter_context(module.open_medium()).run
+    return opened
+
+
+def show(_: LatencySweep, table: Table) -> Iterator[Shown]:
+    """Make a table of figures, and one of how far the media agree."""
+    shown = Shown(title="latency: a constant finger towards a wall", box=MARKDOWN)
+    for heading in (
+        *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
+        *("to operator, ms", "sd", "p50", "p99", "lost, %"),
+        *("contacts", "mm/s, median (most)", "nearest, mm", "stiffness", "tick p99, us", "stops"),
+    ):
+        shown.add_column(heading, justify="left" if heading in ("link", "haptics", "medium") else "right")
+    for (link, haptics, medium), group in table.groups("link", "haptics", "medium"):
+        speeds = group.values("contact_speed_mm_s")
+        shown.add_row(
+            *(link, haptics, medium, str(len(group))),
+            *(cell for direction in _DIRECTIONS for cell in _delays(group, direction)),
+            f"{len(speeds)}/{len(group)}",
+            f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else "",
+            _mean(group.values("min_distance_mm"), 1),
+            _mean(group.values("stiffness_max"), 2),
+            _mean(group.values("tick_p99_us"), 0),
+            str(sum(group.values("stops"))),
+        )
+    yield shown
+    if len({row["medium"] for row in table}) > 1:
+        yield agreement(table)
+
+
+def _delays(group: Table, direction: str) -> Iterator[str]:
+    means = group.values(f"{direction}_mean_ms")
+    interval = student_interval(means)
+    yield _mean(means, 2) + ("" if interval is None else f" ± {(interval[1] - interval[0]) / 2.0:.2f}")
+    for name, digits in (("sd_ms", 2), ("p50_ms", 1), ("p99_ms", 1), ("lost_percent", 3)):
+        yield _mean(group.values(f"{direction}_{name}"), digits)
+
+
+def _mean(numbers: list[float], digits: int) -> str:
+    return f"{fmean(numbers):.{digits}f}" if numbers else "-"
+
+
+def agreement(table: Table) -> Shown:
+    """Compare each pair of media: two one-sided tests, by Welch's interval over seeds, against a margin."""
+    margins = ", ".join(f"{name} within ±{margin:g} {unit}" for _, name, unit, margin in _COMPARED)
+    title = f"do the media agree? {margins}: the whole 95 % interval (Welch, over seeds) has to lie within"
+    shown = Shown(title=title, box=MARKDOWN)
+    for heading in ("link", "media", "direction", "seeds", *(name for _, name, _, _ in _COMPARED)):
+        shown.add_column(heading)
+    for (link,), group in table.groups("link"):
+        for first, second in combinations(dict.fromkeys(row["medium"] for row in group), 2):
+            for direction in _DIRECTIONS:
+                samples = [
+                    [by_seed(group.where(medium=medium), f"{direction}_{name}") for medium in (first, second)]
+                    for name, *_ in _COMPARED
+                ]
+                verdicts = (
+                    verdict(one, other, margin, unit)
+                    for (one, other), (_, _, unit, margin) in zip(samples, _COMPARED, strict=True)
+                )
+                seeds = f"{len(samples[0][0])}, {len(samples[0][1])}"
+                shown.add_row(link, f"{first} - {second}", direction, seeds, *verdicts)
+    return shown
+
+
+def by_seed(group: Table, name: str) -> list[float]:
+    """Average each seed's trials with and without haptics: an emulated link draws the same in both."""
+    found = (trials.values(name) for _, trials in group.groups("seed"))
+    return [fmean(values) for values in found if values]
+
+
+def verdict(first: list[float], second: list[float], margin: float, unit: str) -> str:
+    """Say whether two media are equivalent within a margin, different beyond it, or neither can be told."""
+    if not first or not second:
+        return "-"
+    interval = welch_interval(first, second)
+    if interval is None:
+        return "not enough trials to tell"
+    low, high = interval
+    if -margin <= low and high <= margin:
+        said = "equivalent"
+    else:
+        apart = f"differs by {fmean(second) - fmean(first):+.2f}"
+        said = apart if low > margin or high < -margin else "not enough trials to tell"
+    return f"{said} [{low:+.2f}, {high:+.2f}] {unit}"
+
+
+def draw(_: LatencySweep, table: Table, path: Path) -> None:
+    """Draw the delay in each direction, a dot a seed with mean and 95 %, and contact speeds."""
+    links, media = (list(dict.fromkeys(row[name] for row in table)) for name in ("link", "medium"))
+    with figure(path, 1, 3, figsize=(13.0, 4.2)) as (_, panels):
+        for (link, medium), group in table.groups("link", "medium"):
+            place = links.index(link) + _WIDE * ((media.index(medium) + 0.5) / len(media) - 0.5)
+            options = {"color": _COLOURS[medium], "label": medium if link == links[0] else ""}
+            for panel, direction in zip(panels, _DIRECTIONS, strict=False):
+                means = by_seed(group, f"{direction}_mean_ms")
+                if not means:
+                    continue
+                low, high = student_interval(means) or (means[0], means[0])
+                panel.plot([place] * len(means), means, ".", color=_COLOURS[medium], alpha=0.35)
+                panel.errorbar(place, fmean(means), (high - low) / 2.0, fmt="o", capsize=4, markersize=4, **options)
+                panel.set(yscale="log", ylabel="ms", title=f"mean delay {direction.replace('_', ' ')}")
+            for row in group:
+                # A stop by the robot side has kept the arm from the wall, and not what was felt.
+                mark, filled = "x" if row["stops"] else "o", row["haptics"] == "on"
+                face = _COLOURS[medium] if filled else "none"
+                panels[2].plot(
+                    place, row["contact_speed_mm_s"] or 0.0, mark, color=_COLOURS[medium], markerfacecolor=face
+                )
+        panels[2].set(ylabel="mm/s", title="first contact (none: 0; x: robot side stopped; hollow: no haptics)")
+        panels[2].set_ylim(-5.0, 1.1 * max(panels[2].get_ylim()[1], 10.0))
+        panels[0].legend()
+        for panel in panels:
+            panel.set_xticks(range(len(links)), links, rotation=20, ha="right")
+
+
+QUESTION = Question("try latency", LatencySweep, cells, run, show, draw, timed=True)

@@ -1,0 +1,61 @@
+"""A question whose cells cost nothing, for tests of the engine; a file can make them wait, fail or be killed."""
+
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.table import Table as Shown
+
+from common.errors import ConfigurationError, FeelaheadError
+from feelahead.lab.sweep import Question, Sweep, generator
+from feelahead.lab.table import Row, Table
+
+
+@dataclass(frozen=True)
+class Counting(Sweep):
+    """Count."""
+
+    numbers: tuple[int, ...] = (1, 2, 3)
+    folder: str = ""
+    """Each cell leaves a file there, and does what a file named after it says: `kill`, `fail`, `refuse`."""
+    wait_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    number: int
+    folder: str
+    wait_s: float
+
+
+def cells(settings: Counting) -> Iterator[Cell]:
+    yield from (Cell(number, settings.folder, settings.wait_s) for number in settings.numbers)
+
+
+def run(cell: Cell, seed: int) -> Iterator[Row]:
+    if cell.folder:
+        order = Path(cell.folder) / f"{cell.number}-{seed}"
+        asked = order.read_text() if order.exists() else ""
+        order.write_text("done")
+        if asked == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if asked == "fail":
+            raise FeelaheadError("as asked")
+        if asked == "refuse":
+            raise ConfigurationError("as asked")
+    if cell.wait_s:
+        signal.sigtimedwait((), cell.wait_s)
+    drawn = generator(cell.number, seed).random(2)
+    yield from (
+        {"part": part, "value": float(value), "none": None, "parts": [1, 2]} for part, value in enumerate(drawn)
+    )
+
+
+def show(_: Counting, table: Table) -> Iterator[Shown]:
+    yield Shown("rows", title=f"{len(table)} rows")
+
+
+QUESTION = Question("try counting", Counting, cells, run, show)
+TIMED = Question("try counting", Counting, cells, run, show, timed=True)

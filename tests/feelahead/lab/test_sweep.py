@@ -1,0 +1,300 @@
+"""The engine: the same table for any workers and after any interruption, and what it says when it cannot go on."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyarrow import parquet
+from scipy.stats import binom
+
+from common.errors import ConfigurationError
+from feelahead.commands.bench_and_try import try_out
+from feelahead.lab.executors import LostWorkersError
+from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, student_interval, welch_interval
+from feelahead.lab.journal import Journal
+from feelahead.lab.progress import progress
+from feelahead.lab.sweep import ask, generator, sweep
+from feelahead.lab.table import Table
+from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting
+from tests.helpers.repository import ROOT
+
+_GRID = ("--numbers", "1", "2", "3", "4", "--seeds", "3")
+_DRIVER = "import sys; from feelahead.lab.sweep import ask; from tests.feelahead.lab.counting import QUESTION; "
+
+
+def _asked(tmp_path: Path, *arguments: str, name: str = "rows.csv") -> bytes:
+    path = tmp_path / name
+    assert ask(QUESTION, [*_GRID, *arguments, "--csv", str(path)]) == 0
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return _asked(tmp_path_factory.mktemp("expected"), "--workers", "1")
+
+
+def _without_folder(content: bytes) -> list[list[str]]:
+    return [[row[0], *row[2:]] for row in csv.reader(content.decode().splitlines())]
+
+
+def test_rows_stand_in_the_order_of_the_grid_with_cells_and_seeds_as_columns(expected: bytes) -> None:
+    rows = list(csv.DictReader(expected.decode().splitlines()))
+    assert list(rows[0]) == ["number", "folder", "wait_s", "seed", "part", "value", "none"]
+    keys = [(int(row["number"]), int(row["seed"]), int(row["part"])) for row in rows]
+    assert keys == sorted(keys)
+    assert len(keys) == 4 * 3 * 2
+
+
+def test_a_cell_draws_the_same_numbers_whatever_else_the_grid_holds(tmp_path: Path, expected: bytes) -> None:
+    path = tmp_path / "rows.csv"
+    assert ask(QUESTION, ["--numbers", "3", "--seed", "1", "--workers", "1", "--csv", str(path)]) == 0
+    assert set(path.read_text().splitlines()[1:]) < set(expected.decode().splitlines())
+    assert generator(Cell(1, "", 0.0), 0).random() != generator(Cell(2, "", 0.0), 0).random()
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_a_journal_cut_anywhere_gives_the_same_table(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("cut")
+    path = folder / "journal.jsonl"
+    grid = Counting(numbers=(1, 2), seeds=2, workers=1, resume=path)
+    whole, _, _ = sweep(QUESTION, grid)
+    content = path.read_bytes()
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    again, failures, left = sweep(QUESTION, grid)
+    assert list(again) == list(whole)
+    assert (failures, left) == ([], 0)
+    # All pieces are there once more, none twice.
+    assert sorted(path.read_bytes().splitlines()) == sorted(content.splitlines())
+
+
+def test_only_missing_cells_are_run_and_a_larger_grid_goes_on(tmp_path: Path) -> None:
+    cells = tmp_path / "cells"
+    cells.mkdir()
+    grid = ["--numbers", "1", "2", "--folder", str(cells), "--workers", "1", "--resume", str(tmp_path / "journal")]
+    assert ask(QUESTION, grid) == 0
+    for done in cells.iterdir():
+        done.write_text("refuse")
+    assert ask(QUESTION, [*grid, "--seeds", "2"]) == 0
+    assert {done.name: done.read_text() for done in cells.iterdir()} == {
+        **{"1-0": "refuse", "2-0": "refuse"},
+        **{"1-1": "done", "2-1": "done"},
+    }
+
+
+@pytest.mark.parametrize("content", ["notes of mine\n", "notes of mine", '{"a": 1}\n', '{"made_by": 3}\n', "[]\n"])
+def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "mine.txt"
+    path.write_text(content)
+    with pytest.raises(ConfigurationError, match=r"--resume .*: (it holds no journal|made by another)"):
+        ask(QUESTION, ["--resume", str(path), "--workers", "1"])
+    assert path.read_text() == content
+
+
+def test_a_journal_of_other_code_or_one_in_use_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    with Journal(path, {"code": "older"}), pytest.raises(ConfigurationError, match="another run writes to it"):
+        ask(QUESTION, ["--resume", str(path)])
+    with pytest.raises(ConfigurationError, match="made by another question and code"):
+        ask(QUESTION, ["--resume", str(path), "--workers", "1"])
+
+
+def test_one_failed_cell_loses_no_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "2-0").write_text("fail")
+    grid = ["--folder", str(tmp_path), "--workers", "1", "--resume", str(tmp_path / "journal")]
+    assert ask(QUESTION, grid) == 1
+    said = capsys.readouterr().out
+    assert "4 rows" in said
+    assert re.search(r"failed: number 2, .*, seed 0: as asked\n", said)
+    # It is tried again next time, and now succeeds.
+    assert ask(QUESTION, grid) == 0
+
+
+def test_bad_input_ends_the_sweep_at_once(tmp_path: Path) -> None:
+    (tmp_path / "1-0").write_text("refuse")
+    with pytest.raises(ConfigurationError, match="as asked"):
+        ask(QUESTION, ["--folder", str(tmp_path), "--workers", "1"])
+    assert not (tmp_path / "2-0").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--workers", "2"], "--workers 2: try counting measures time"),
+        (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1: try counting measures time"),
+        (["--picture", "/a.png"], "--picture /a.png: try counting has no figure"),
+        (["--picture", "/a.bmp"], "ends in .png, .svg, .pdf"),
+        (["--workers", "0"], "workers = 0; valid: at least 1"),
+        (["--seeds", "0"], "seeds = 0; valid: at least 1"),
+        (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or its folder is not there"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(arguments: list[str], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=re.escape(said)):
+        ask(TIMED, arguments)
+
+
+def test_all_files_hold_the_same_rows_and_the_settings_stand_beside_them(tmp_path: Path, expected: bytes) -> None:
+    files = {name: tmp_path / name for name in ("a.csv", "a.parquet", "a.json")}
+    flags = ["--csv", "a.csv", "--parquet", "a.parquet", "--summary", "a.json"]
+    arguments = [str(files.get(flag, flag)) for flag in flags]
+    assert ask(QUESTION, [*_GRID, *arguments, "--workers", "1"]) == 0
+    assert files["a.csv"].read_bytes() == expected
+    rows = json.loads(files["a.json"].read_text())["runs"]
+    assert rows[0]["parts"] == [1, 2]
+    scalars = [{name: value for name, value in row.items() if name != "parts"} for row in rows]
+    assert parquet.read_table(files["a.parquet"]).to_pylist() == scalars
+    beside = json.loads((tmp_path / "a.csv.json").read_text())
+    assert beside["settings"]["numbers"] == [1, 2, 3, 4]
+    assert {"versions", "code", "frozen", "question"} <= beside.keys()
+
+
+def test_tables_select_and_group() -> None:
+    table = Table([{"a": 1, "b": None}, {"a": 2, "c": [1]}, {"a": 1, "b": 3.0}])
+    assert table.columns == ["a", "b"]
+    assert table.values("b") == [3.0]
+    assert len(table.where(a=1)) == 2
+    assert [(key, len(rows)) for key, rows in table.groups("a")] == [((1,), 2), ((2,), 1)]
+
+
+@given(of=st.integers(1, 200), share=st.floats(0.0, 1.0))
+def test_the_exact_interval_leaves_as_much_on_either_side(of: int, share: float) -> None:
+    count = round(share * of)
+    low, high = share_interval(count, of)
+    assert low <= count / of <= high
+    assert count == 0 or binom.sf(count - 1, of, low) == pytest.approx(0.025, abs=1e-6)
+    assert count == of or binom.cdf(count, of, high) == pytest.approx(0.025, abs=1e-6)
+
+
+def test_intervals_of_few_and_of_equal_values_are_told_apart() -> None:
+    # Six lose it and none gains it: 2 / 2^6.
+    assert mcnemar_p([True] * 6 + [False] * 4, [False] * 10) == pytest.approx(2.0 / 2**6)
+    assert mcnemar_p([True, False], [True, False]) == 1.0
+    assert mean_interval([2.0, 2.0]) == student_interval([2.0, 2.0]) == (2.0, 2.0)
+    assert student_interval([1.0]) is welch_interval([1.0], [1.0, 2.0]) is None
+    # Worked out by hand: sd √2 over √2, and t of one degree, 12.7062.
+    assert student_interval([0.0, 2.0]) == pytest.approx((1.0 - 12.7062, 1.0 + 12.7062), rel=1e-5)
+    assert welch_interval([0.0, 0.0], [1.0, 1.0]) == (1.0, 1.0)
+    noise = np.random.default_rng(1).normal(size=30)
+    low, high = mean_interval(noise.tolist())
+    assert high - low == pytest.approx(2 * 1.96 * noise.std() / np.sqrt(30), rel=0.1)
+
+
+def test_the_example_of_the_readme_runs_and_is_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "feelahead" / "lab" / "README.md").read_text(encoding="utf-8")
+    code = text.partition("```python\n")[2].partition("```")[0]
+    assert len(code.splitlines()) <= 40
+    path = tmp_path / "reordered_example.py"
+    path.write_text(code)
+    assert try_out([str(path), "--seeds", "2", "--csv", str(tmp_path / "rows.csv")]) == 0
+    assert "overtaken, of 1000" in capsys.readouterr().out
+    rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
+    assert [row["overtaken"] == "0" for row in rows] == [True, True] + [False] * 6
+
+
+def test_in_a_log_a_line_now_and_then_says_how_far_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 0.0)
+    with progress("baking", 4.0) as advance:
+        advance(1.0)
+        advance(3.0)
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("baking: 25 %, about ")
+    assert second == "baking: 100 %, about 0 min left"
+
+
+# With processes that are killed
+
+
+def _drive(arguments: Sequence[str]) -> "subprocess.Popen[str]":
+    call = f"{_DRIVER} sys.exit(ask(QUESTION, {list(arguments)!r}))"
+    return subprocess.Popen([sys.executable, "-c", call], cwd=ROOT, text=True, stderr=subprocess.PIPE)
+
+
+@contextmanager
+def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
+    """Start a scheduler and workers on loopback, the scheduler first; end them all."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str) -> "subprocess.Popen[str]":
+        call = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
+        started.append(
+            subprocess.Popen(
+                call, cwd=ROOT, text=True, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
+            )
+        )
+        return started[-1]
+
+    def said(process: "subprocess.Popen[str]", pattern: str) -> str:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if found := re.search(pattern, line):
+                return found[1]
+        raise AssertionError(f"the process ended before it said {pattern}")
+
+    try:
+        address = said(start("scheduler", "--host", "127.0.0.1", "--port", "0"), r"Scheduler at: +(tcp://\S+)")
+        for _ in range(workers):
+            said(start("worker", address, "--nthreads", "1", "--no-nanny"), r"(Registered to)")
+        yield address, started
+    finally:
+        for process in reversed(started):
+            process.kill()
+            process.communicate()
+
+
+@pytest.mark.processes
+def test_a_killed_worker_process_costs_no_row(tmp_path: Path, expected: bytes) -> None:
+    assert _asked(tmp_path, "--workers", "2", name="two.csv") == expected
+    (tmp_path / "3-1").write_text("kill")
+    killed = _asked(tmp_path, "--folder", str(tmp_path), "--workers", "2", name="killed.csv")
+    assert _without_folder(killed) == _without_folder(expected)
+
+
+@pytest.mark.processes
+def test_a_worker_that_is_killed_again_and_again_ends_the_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("feelahead.lab.sweep._RESTARTS", 0)
+    (tmp_path / "1-0").write_text("kill")
+    with pytest.raises(LostWorkersError, match=r"a worker process was ended from outside; \d+ runs are left"):
+        ask(QUESTION, ["--folder", str(tmp_path), "--workers", "2"])
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("victim", ["driver", "worker", "scheduler"])
+def test_a_killed_cluster_or_driver_costs_no_row(tmp_path: Path, expected: bytes, victim: str) -> None:
+    journal, slow = tmp_path / "journal", ["--wait-s", "0.1"]
+    arguments = [*_GRID, *slow, "--resume", str(journal)]
+    with _dask(2) as (address, (scheduler, worker, _)):
+        driver = _drive([*arguments, "--scheduler", address])
+        while not journal.exists() or journal.read_bytes().count(b"\n") < 4:
+            assert driver.poll() is None
+        {"driver": driver, "worker": worker, "scheduler": scheduler}[victim].send_signal(signal.SIGKILL)
+        _, complaint = driver.communicate(timeout=60.0)
+        assert driver.returncode == {"driver": -signal.SIGKILL, "worker": 0, "scheduler": 1}[victim]
+        assert victim != "scheduler" or "the scheduler or its workers are gone; " in complaint
+    with _dask(2) as (address, _):
+        resumed = _asked(tmp_path, *slow, "--resume", str(journal), "--scheduler", address)
+    assert resumed.replace(b",0.1,", b",0.0,") == expected
+
+
+@pytest.mark.processes
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "1s")
+    with pytest.raises(ConfigurationError, match=r"--scheduler tcp://127\.0\.0\.1:1: no dask scheduler answers there"):
+        ask(QUESTION, ["--scheduler", "tcp://127.0.0.1:1"])
