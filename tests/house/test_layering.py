@@ -85,11 +85,10 @@ ARROWS = """
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
-    feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides
+    feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
         feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
-        feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/lab/* feelahead/both_sides
         feelahead/benchmarks/* feelahead/experiments/* feelahead/recordings
