@@ -8,6 +8,7 @@ from common.emulation.distribution import DelayTable
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec
 from common.errors import FeelaheadError
+from feelahead.containers.cable import HANDLES
 
 CARRIED: tuple[Literal["haptics", "telemetry"], ...] = ("haptics", "telemetry")
 """The streams that travel between the sides, over one cable here."""
@@ -42,13 +43,13 @@ class Counted:
         return dropped / came if came > 0 else None
 
 
-def count_packets(queues: Iterable[Mapping[str, Any]], interfaces: Mapping[Direction, str]) -> dict[Direction, Counted]:
-    """For each direction what `tc -statistics -json qdisc show` says of the netem on the interface towards it."""
-    by_interface = {queue["dev"]: queue for queue in queues if queue["kind"] == "netem"}
+def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counted]:
+    """For each direction what `tc -statistics -json qdisc show` says of its netem."""
+    netems = {queue["handle"]: queue for queue in queues if queue["kind"] == "netem"}
     return {
-        direction: Counted(by_interface[name]["packets"], by_interface[name]["drops"])
-        for direction, name in interfaces.items()
-        if name in by_interface
+        direction: Counted(netems[handle]["packets"], netems[handle]["drops"])
+        for direction, handle in HANDLES.items()
+        if handle in netems
     }
 
 

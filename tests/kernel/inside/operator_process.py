@@ -8,7 +8,7 @@ import threading
 from collections.abc import Sequence
 
 import operator_side.main
-from tests.kernel.waiting import require, wait_until
+from tests.helpers.waiting import wait_until
 
 
 class Operator:
@@ -61,10 +61,10 @@ class Operator:
         return self._code
 
     def note(self, part: str) -> str:
-        """The first note with `part` in it; CheckError when there is none."""
-        found = [note for note in self.notes if part in note]
-        require(bool(found), f"{part!r} is in none of its notes: {self.notes}")
-        return found[0]
+        """The first note with `part` in it; AssertionError when there is none."""
+        found = next((note for note in self.notes if part in note), None)
+        assert found is not None, f"{part!r} is in none of its notes: {self.notes}"
+        return found
 
     def _read(self) -> None:
         with os.fdopen(self._said, encoding="utf-8", errors="replace") as lines:

@@ -10,7 +10,8 @@ from operator_side.dualsense.reports.controller_state import AT_REST_M_S2, STAND
 from operator_side.dualsense.reports.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
 from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.kernel.evdev import (
+from tests.helpers.waiting import wait_until
+from tests.kernel.inside.evdev import (
     ABS_HAT0X,
     ABS_HAT0Y,
     ABS_RX,
@@ -23,9 +24,8 @@ from tests.kernel.evdev import (
     BTN_TL,
     InputDevice,
 )
-from tests.kernel.kernel_view import KernelView, seen_device
-from tests.kernel.plugged import Plugged
-from tests.kernel.waiting import require, wait_until
+from tests.kernel.inside.kernel_view import KernelView, seen_device
+from tests.kernel.inside.plugged import Plugged
 
 
 def bound(plugged: Plugged) -> KernelView:
@@ -43,28 +43,25 @@ def opened(plugged: Plugged, suffix: str = "") -> Iterator[InputDevice]:
         yield device
 
 
-def binds(plugged: Plugged) -> str:
-    """hid-playstation takes it, and its input devices appear."""
+def test_hid_playstation_takes_it(plugged: Plugged) -> None:
     view = bound(plugged)
-    require(view.driver == "playstation", f"the driver is {view.driver}")
+    assert view.driver == "playstation"
     name = plugged.identity.name
     inputs = set(view.inputs())
-    require(inputs == {name, f"{name} Motion Sensors", f"{name} Touchpad"}, f"input devices: {sorted(inputs)}")
+    assert inputs == {name, f"{name} Motion Sensors", f"{name} Touchpad"}
     hidraw = view.hidraw()
-    require(hidraw is not None and hidraw.exists(), f"hidraw device: {hidraw}")
+    assert hidraw is not None
+    assert hidraw.exists()
     counts = plugged.offered.counts
-    require(counts.features >= 3, f"the driver read {counts.features} features")
-    require(counts.outputs >= 1, "the driver has not set the lights")
-    require(counts.refused == 0, f"{counts.refused} reports were refused")
-    require(plugged.ask(lambda controller: controller.bad_checksums) == 0, "there were wrong checksums")
-    require(not plugged.ask(lambda controller: controller.simple_mode), "it still sends Bluetooth's simple reports")
-    lights = plugged.ask(lambda controller: controller.output.lightbar)
-    require(lights is not None, "the driver has not lit the lightbar")
-    return f"{view.driver}, {hidraw}, {counts.features} features read, lightbar {lights}"
+    assert counts.features >= 3
+    assert counts.outputs >= 1, "the driver has not set the lights"
+    assert counts.refused == 0
+    assert plugged.ask(lambda controller: controller.bad_checksums) == 0, "there were wrong checksums"
+    assert not plugged.ask(lambda controller: controller.simple_mode), "it still sends Bluetooth's simple reports"
+    assert plugged.ask(lambda controller: controller.output.lightbar) is not None
 
 
-def sees_the_hands(plugged: Plugged) -> str:
-    """The kernel sees sticks, triggers, buttons and the directional pad."""
+def test_the_kernel_sees_the_hands(plugged: Plugged) -> None:
     plugged.ask(lambda controller: controller.set_sticks(left=(1.0, 1.0), right=(-1.0, -0.5)))
     plugged.ask(lambda controller: controller.set_buttons(frozenset({Button.CROSS, Button.UP, Button.RIGHT})))
     plugged.ask(lambda controller: controller.set_finger_force(0.0, NORMAL_FINGER_FORCE_N))
@@ -74,16 +71,14 @@ def sees_the_hands(plugged: Plugged) -> str:
             f"the axes stand at {expected}",
             lambda: device.axes(ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ) == expected,
         )
-        require(device.axes(ABS_HAT0X, ABS_HAT0Y) == (1, -1), "the pad does not point up and right")
-        require(device.is_down(BTN_SOUTH) and not device.is_down(BTN_TL), "cross alone is not what is down")
+        assert device.axes(ABS_HAT0X, ABS_HAT0Y) == (1, -1), "the pad does not point up and right"
+        assert (device.is_down(BTN_SOUTH), device.is_down(BTN_TL)) == (True, False)
         plugged.hands_off()
         wait_until("the axes rest", lambda: device.axes(ABS_X, ABS_Y, ABS_Z, ABS_RZ) == (128, 128, 0, 0))
         wait_until("cross is up", lambda: not device.is_down(BTN_SOUTH))
-    return "six axes, the pad and cross"
 
 
-def feels_motion(plugged: Plugged) -> str:
-    """The kernel's calibrated motion sensors say what was put into them."""
+def test_the_kernels_motion_sensors_say_what_was_put_in(plugged: Plugged) -> None:
     turning_rad_s, acceleration_m_s2 = (1.0, -2.0, 0.5), (-3.0, 8.0, 5.0)
     with opened(plugged, " Motion Sensors") as device:
         per_degree_s, per_g = device.axis(ABS_RX).resolution, device.axis(ABS_X).resolution
@@ -106,17 +101,14 @@ def feels_motion(plugged: Plugged) -> str:
             )
 
         comes(turning_rad_s, acceleration_m_s2)
-        detail = f"{', '.join(f'{axis:.3f}' for axis in said()[0])} rad/s"
         comes((0.0, 0.0, 0.0), AT_REST_M_S2)
-        return detail
 
 
 def _near(values: Vector3, expected: Vector3, within: float) -> bool:
     return all(abs(value - goal) <= within for value, goal in zip(values, expected, strict=True))
 
 
-def rumble_spares_the_triggers(plugged: Plugged) -> str:
-    """A rumble by the kernel's force feedback leaves the trigger effects alone."""
+def test_the_kernels_rumble_spares_the_triggers(plugged: Plugged) -> None:
     effects = (Feedback(position=2, strength=5), Feedback(position=4, strength=8))
     write_raw(bound(plugged).hidraw(), plugged, OutputReport(l2=effects[0], r2=effects[1]))
     wait_until("the effects arrive", lambda: plugged.ask(lambda controller: controller.effects) == effects)
@@ -125,19 +117,14 @@ def rumble_spares_the_triggers(plugged: Plugged) -> str:
         wait_until(
             "both motors turn", lambda: plugged.ask(lambda c: c.rumble.left > 0.9 and 0.4 < c.rumble.right < 0.6)
         )
-        require(plugged.ask(lambda controller: controller.effects) == effects, "the rumble changed the triggers")
+        assert plugged.ask(lambda controller: controller.effects) == effects, "the rumble changed the triggers"
     wait_until("the motors rest", lambda: plugged.ask(lambda controller: controller.rumble) == Rumble())
-    require(plugged.ask(lambda controller: controller.effects) == effects, "the rumble's end changed the triggers")
+    assert plugged.ask(lambda controller: controller.effects) == effects, "the rumble's end changed the triggers"
     write_raw(bound(plugged).hidraw(), plugged, OutputReport(l2=Off(), r2=Off()))
     wait_until("the triggers are free", lambda: plugged.ask(lambda controller: controller.released))
-    return "effects stayed through it"
 
 
 def write_raw(hidraw: Path | None, plugged: Plugged, output: OutputReport) -> None:
     """Write an output report to the raw device file, as another program would."""
-    require(hidraw is not None, "there is no hidraw device")
     assert hidraw is not None
     hidraw.write_bytes(build_output_report(output, plugged.variant.transport))
-
-
-DRIVER_CHECKS = (binds, sees_the_hands, feels_motion, rumble_spares_the_triggers)

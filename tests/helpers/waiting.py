@@ -1,4 +1,4 @@
-"""Waiting for what happens in its own time, and complaining when it does not."""
+"""Waiting for what happens in its own time."""
 
 import time
 from collections.abc import Callable
@@ -9,16 +9,6 @@ Value = TypeVar("Value")
 _LOOK_S = 0.02
 
 
-class CheckError(AssertionError):
-    """The machine did not behave as it should; the text says how."""
-
-
-def require(condition: bool, otherwise: str) -> None:
-    """CheckError with the text `otherwise` unless `condition` holds."""
-    if not condition:
-        raise CheckError(otherwise)
-
-
 def wait_until(
     what: str,
     condition: Callable[[], Value | None],
@@ -27,7 +17,7 @@ def wait_until(
 ) -> Value:
     """The first value of `condition` that is not None or False.
 
-    CheckError after `limit_s` names `what`, and what there was `instead`.
+    AssertionError after `limit_s` names `what`, and what there was `instead`.
     """
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:
@@ -35,12 +25,12 @@ def wait_until(
         if value is not None and value is not False:
             return value
         time.sleep(_LOOK_S)
-    raise CheckError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
+    raise AssertionError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
 
 
 def stays(otherwise: str, condition: Callable[[], bool], for_s: float = 1.0) -> None:
-    """CheckError with the text `otherwise` unless `condition` holds for so long."""
+    """AssertionError with the text `otherwise` unless `condition` holds for so long."""
     end_s = time.monotonic() + for_s
     while time.monotonic() < end_s:
-        require(condition(), otherwise)
+        assert condition(), otherwise
         time.sleep(_LOOK_S)

@@ -14,7 +14,7 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.uhid.controller import UhidController, identity
 from operator_side.dualsense.uhid.file import UhidFile, offer
-from tests.kernel.waiting import CheckError, wait_until
+from tests.helpers.waiting import wait_until
 
 Value = TypeVar("Value")
 
@@ -96,7 +96,7 @@ class Plugged:
         self._asked.append(lambda: answers.append(function(self._simulated)))
         wait_until("the controller answers", lambda: bool(answers) or not thread.is_alive())
         if not answers:
-            raise CheckError(f"the controller has died: {self._failure!r}")
+            raise AssertionError(f"the controller has died: {self._failure!r}")
         return answers[0]
 
     def hands_off(self) -> None:

@@ -5,6 +5,8 @@ import os
 from collections.abc import Iterator
 from typing import Final
 
+import pytest
+
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.effects.official import (
     AnyEffect,
@@ -17,7 +19,7 @@ from operator_side.dualsense.effects.official import (
 )
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import find_controller, sightings
-from operator_side.dualsense.reports.controller_state import STANDARD_GRAVITY_M_S2, Button, ControllerState
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.motion_sensors import (
     NOMINAL_ACCELERATION_M_S2,
@@ -27,9 +29,9 @@ from operator_side.dualsense.reports.motion_sensors import (
 from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.kernel.checks_driver import bound
-from tests.kernel.plugged import ADDRESS, CALIBRATION, Plugged
-from tests.kernel.waiting import require, wait_until
+from tests.helpers.waiting import wait_until
+from tests.kernel.inside.driver import bound
+from tests.kernel.inside.plugged import ADDRESS, CALIBRATION, Plugged
 
 _NOBODY: Final = 65534
 _EFFECTS: Final[tuple[tuple[AnyEffect, AnyEffect], ...]] = (
@@ -60,32 +62,24 @@ def newest_state(device: HidDualSense) -> ControllerState | None:
     return None if report is None else parse_input_report(report, device.identity.motion)
 
 
-def finds_it(plugged: Plugged) -> str:
-    """Our driver finds the controller and learns what it is."""
+def test_it_is_found_and_says_what_it_is(plugged: Plugged) -> None:
     hidraw = bound(plugged).hidraw()
     seen = sightings(load_backend())
-    require([sighting.path for sighting in seen] == [str(hidraw).encode()], f"{seen} was found, and not {hidraw}")
+    assert [sighting.path for sighting in seen] == [str(hidraw).encode()]
     found = find_controller(load_backend())
     try:
-        require(found.address == ADDRESS, f"its address is {found.address}")
+        assert found.address == ADDRESS
         transport = plugged.variant.transport
-        require(
-            found.name == f"{plugged.variant.model.title} on {transport.value} ({ADDRESS})",
-            f"it is called {found.name}",
-        )
+        assert found.name == f"{plugged.variant.model.title} on {transport.value} ({ADDRESS})"
     finally:
         found.device.close()
     motion = MotionCalibration.of(CALIBRATION)
     with our_device(plugged) as device:
         said = device.identity
-        require(
-            (said.transport, said.firmware, said.motion) == (transport, SIMULATED_FIRMWARE, motion), f"it says {said}"
-        )
-    return found.name
+        assert (said.transport, said.firmware, said.motion) == (transport, SIMULATED_FIRMWARE, motion)
 
 
-def reads_it(plugged: Plugged) -> str:
-    """Our driver reads sticks, triggers, buttons and motion as they are sent."""
+def test_hands_and_motion_are_read_as_sent(plugged: Plugged) -> None:
     turning_rad_s, acceleration_m_s2 = (1.0, -2.0, 0.5), (-3.0, 8.0, 5.0)
     with our_device(plugged) as device:
         plugged.ask(lambda controller: controller.set_motion(turning_rad_s, acceleration_m_s2))
@@ -99,24 +93,23 @@ def reads_it(plugged: Plugged) -> str:
             return state if state is not None and state.l2 == 1.0 and Button.OPTIONS in state.pressed else None
 
         state = wait_until("the hands are seen", arrived)
-        require(state.left_stick == (1.0, -1.0), f"the left stick is at {state.left_stick}")
-        require(max(abs(a - b) for a, b in zip(state.right_stick, (0.5, 0.25), strict=True)) < 1 / 127, "right stick")
+        assert state.left_stick == (1.0, -1.0)
+        assert max(abs(a - b) for a, b in zip(state.right_stick, (0.5, 0.25), strict=True)) < 1 / 127, "right stick"
         pressed = {Button.L1, Button.OPTIONS, Button.LEFT, Button.L2, Button.R2}
-        require(state.pressed == pressed, f"pressed: {sorted(button.value for button in state.pressed)}")
-        require(0.2 < state.r2 < 0.5 and expected_r2 >= 0.0, f"R2 is at {state.r2}")
+        assert state.pressed == pressed
+        assert 0.2 < state.r2 < 0.5
+        assert expected_r2 >= 0.0
         assert state.gyro_rad_s is not None
         assert state.acceleration_m_s2 is not None
         for read, sent, step in (
             (state.gyro_rad_s, turning_rad_s, NOMINAL_GYRO_RAD_S),
             (state.acceleration_m_s2, acceleration_m_s2, NOMINAL_ACCELERATION_M_S2),
         ):
-            require(all(abs(a - b) <= step for a, b in zip(read, sent, strict=True)), f"{read} was read for {sent}")
+            assert all(abs(a - b) <= step for a, b in zip(read, sent, strict=True))
         plugged.hands_off()
-        return f"{state.gyro_rad_s[0]:.3f} rad/s, {state.acceleration_m_s2[1] / STANDARD_GRAVITY_M_S2:.3f} g"
 
 
-def writes_effects(plugged: Plugged) -> str:
-    """The controller is told exactly the effects that our driver writes, and is released at the end."""
+def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plugged) -> None:
     with our_device(plugged) as device:
         before = plugged.ask(lambda controller: controller.write_count)
         for l2, r2 in _EFFECTS:
@@ -124,62 +117,49 @@ def writes_effects(plugged: Plugged) -> str:
             wait_until(f"{l2}, {r2}", lambda l2=l2, r2=r2: plugged.ask(lambda c: c.effects) == (l2, r2))  # type: ignore[misc]
         device.write(build_output_report(OutputReport(rumble=Rumble(left=1.0, right=0.2))), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
-        require(plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers")
+        assert plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers"
         # Forty more, so that Bluetooth's sequence numbers go round.
         for number in range(40):
             device.write(build_output_report(OutputReport(l2=Feedback(number % 10, 1 + number % 8))), 0.0)
         wait_until("all arrive", lambda: plugged.ask(lambda c: c.write_count) == before + len(_EFFECTS) + 41)
-        require(plugged.offered.counts.refused == 0, f"{plugged.offered.counts.refused} reports were refused")
-        require(plugged.ask(lambda c: c.bad_checksums) == 0, "there were wrong checksums")
+        assert plugged.offered.counts.refused == 0
+        assert plugged.ask(lambda c: c.bad_checksums) == 0, "there were wrong checksums"
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
-    require(plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on")
-    return f"{len(_EFFECTS) + 41} writes"
+    assert plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on"
 
 
-def without_permission(plugged: Plugged) -> str:
-    """Without permission our driver says so and what to do."""
+def test_without_permission_it_says_what_to_do(plugged: Plugged) -> None:
     bound(plugged)
     os.setresuid(_NOBODY, _NOBODY, 0)
     try:
-        find_controller(load_backend()).device.close()
-    except DeviceError as error:
-        require("no permission" in str(error) and "feelahead doctor" in str(error), f"it says: {error}")
-        return "no permission, and what grants it"
+        with pytest.raises(DeviceError, match=r"no permission.*feelahead doctor"):
+            find_controller(load_backend())
     finally:
         os.setresuid(0, 0, 0)
-    require(condition=False, otherwise="the controller was opened without permission")
-    return ""
 
 
-def survives_the_cable(plugged: Plugged) -> str:
-    """Our driver says that an unplugged controller is gone, and finds it when it is back."""
+def test_an_unplugged_one_is_gone_and_found_when_it_is_back(plugged: Plugged) -> None:
     for _ in range(2):
         with our_device(plugged) as device:
             device.write(build_output_report(OutputReport(l2=Feedback(2, 2))), 0.0)
             plugged.unplug()
             wait_until("reading says that it is gone", lambda device=device: _is_gone(device))  # type: ignore[misc]
-            try:
+            with pytest.raises(DeviceError, match="gone"):
                 device.write(build_output_report(OutputReport(l2=Off())), 0.0)
-            except DeviceError as error:
-                require("gone" in str(error), f"writing says: {error}")
-            else:
-                require(condition=False, otherwise="writing to what is gone went well")
-        require(not device.released, "it claims to have released what is gone")
+        assert not device.released, "it claims to have released what is gone"
         wait_until("nothing is found", _finds_nothing)
         plugged.plug_in()
         bound(plugged)
         with our_device(plugged) as device:
-            require(device.identity.address == ADDRESS, f"{device.identity.address} came back")
+            assert device.identity.address == ADDRESS
             wait_until("reports come again", lambda device=device: newest_state(device))  # type: ignore[misc]
-    return "twice"
 
 
 def _is_gone(device: HidDualSense) -> bool:
     try:
         device.read(0.0)
     except DeviceError as error:
-        require("the controller is gone" in str(error), f"it says: {error}")
-        return True
+        return "the controller is gone" in str(error)
     return False
 
 
@@ -191,6 +171,3 @@ def _finds_nothing() -> bool:
     except DeviceError:
         return False  # seen while it goes
     return False
-
-
-DEVICE_CHECKS = (finds_it, reads_it, writes_effects, without_permission, survives_the_cable)

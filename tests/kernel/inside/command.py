@@ -6,13 +6,14 @@ import sys
 import threading
 
 from operator_side.dualsense.effects.official import Feedback
+from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import identity
-from tests.kernel.evdev import ABS_RZ, ABS_X, InputDevice
-from tests.kernel.kernel_view import seen_device
-from tests.kernel.plugged import Variant
-from tests.kernel.waiting import require, wait_until
+from tests.helpers.waiting import wait_until
+from tests.kernel.inside.evdev import ABS_RZ, ABS_X, InputDevice
+from tests.kernel.inside.kernel_view import seen_device
 
 _START_S = 60.0
 # Not all of `feelahead`, whose other commands an emulated processor would load for long.
@@ -21,10 +22,9 @@ _COMMAND = (
 )
 
 
-def lives(variant: Variant) -> str:
-    """feelahead virtual-dualsense: the driver takes it, its hands move, and it says what it is told."""
-    transport = variant.transport
-    told = identity(transport, variant.model, SIMULATED_ADDRESS)
+def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told() -> None:
+    transport = Transport.BLUETOOTH
+    told = identity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
     process = subprocess.Popen(
         [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"],
         stdout=subprocess.PIPE,
@@ -50,13 +50,12 @@ def lives(variant: Variant) -> str:
         process.send_signal(signal.SIGTERM)
         code = process.wait(30.0)
         reader.join(10.0)
-        require(code == 0, f"it ended with code {code}: {lines}")
-        require(lines[-1].startswith("unplugged: "), f"it says last: {lines[-1]}")
+        assert code == 0
+        assert lines[-1].startswith("unplugged: ")
         wait_until("it is gone", lambda: seen_device(told) is None)
     finally:
         process.kill()
         process.wait()
-    return lines[-1].strip()
 
 
 def _left(device: InputDevice) -> bool:
