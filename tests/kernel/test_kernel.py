@@ -32,7 +32,7 @@ def test_its_own_driver_and_ours_drive_a_controller(tmp_path: Path) -> None:
         *(f"HOME={WRITABLE}", f"TMPDIR={WRITABLE}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD=1"),
         *("PYTHONDONTWRITEBYTECODE=1", f"PYTHONPATH={ROOT}", "PYTHONUNBUFFERED=1", "LANG=C.UTF-8"),
         *(sys.executable, "-P", "-m", "pytest", "--rootdir", str(ROOT), "--confcutdir", str(_INSIDE)),
-        *("-v", "-s", "--assert=plain", "--durations=0", "-p", "no:cacheprovider"),
+        *("-v", "-s", "--durations=5", "-p", "no:cacheprovider"),
         *(str(_INSIDE / name) for name in _FILES),
         *shlex.split(os.environ.get("INSIDE", "")),
     ]

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
 from tests.helpers.repository import ROOT
+from tests.helpers.two_machines import two_machines
 
 pytestmark = pytest.mark.processes
 
@@ -68,11 +68,7 @@ class Desk:
 
 @pytest.fixture
 def desk() -> Iterator[Desk]:
-    with contextlib.ExitStack() as stack:
-        try:
-            robot, operator = stack.enter_context(two_machines(ROBOT, OPERATOR))
-        except NotPermittedError as error:
-            pytest.skip(str(error))
+    with two_machines(ROBOT, OPERATOR) as (robot, operator):
         yield Desk(robot.surroundings, operator.surroundings)
 
 

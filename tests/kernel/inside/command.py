@@ -3,7 +3,7 @@
 import signal
 import subprocess
 import sys
-import threading
+from pathlib import Path
 
 from operator_side.dualsense.effects.official import Feedback
 from operator_side.dualsense.reports.models import Model
@@ -22,40 +22,34 @@ _COMMAND = (
 )
 
 
-def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told() -> None:
+def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path: Path) -> None:
     transport = Transport.BLUETOOTH
     told = identity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    lines: list[str] = []
-    assert process.stdout is not None
-    reader = threading.Thread(target=lambda stream=process.stdout: lines.extend(iter(stream.readline, "")), daemon=True)
-    reader.start()
-    try:
-        wait_until("a driver takes it", lambda: "a driver has taken it\n" in lines, _START_S, instead=lambda: lines)
-        view = wait_until("the kernel shows it", lambda: seen_device(told))
-        wait_until("three input devices", lambda: len(view.inputs()) == 3)
-        with InputDevice(view.inputs()[told.name]) as device:
-            wait_until("R2 is pulled", lambda: device.axis(ABS_RZ).value > 200)
-            wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
-        hidraw = view.hidraw()
-        assert hidraw is not None
-        hidraw.write_bytes(build_output_report(OutputReport(r2=Feedback(position=3, strength=6)), transport))
-        said = "R2: Feedback, position 3, strength 6\n"
-        wait_until("it says the effect", lambda: said in lines, instead=lambda: lines)
-        process.send_signal(signal.SIGTERM)
-        code = process.wait(30.0)
-        reader.join(10.0)
-        assert code == 0
-        assert lines[-1].startswith("unplugged: ")
-        wait_until("it is gone", lambda: seen_device(told) is None)
-    finally:
-        process.kill()
-        process.wait()
+    command = [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"]
+    said = tmp_path / "said"
+
+    def lines() -> list[str]:
+        return said.read_text().splitlines()
+
+    with said.open("w") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
+        try:
+            wait_until("a driver takes it", lambda: "a driver has taken it" in lines(), _START_S, instead=lines)
+            view = wait_until("the kernel shows it", lambda: seen_device(told))
+            wait_until("three input devices", lambda: len(view.inputs()) == 3)
+            with InputDevice(view.inputs()[told.name]) as device:
+                wait_until("R2 is pulled", lambda: device.axis(ABS_RZ).value > 200)
+                wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
+            hidraw = view.hidraw()
+            assert hidraw is not None
+            hidraw.write_bytes(build_output_report(OutputReport(r2=Feedback(position=3, strength=6)), transport))
+            told_it = "R2: Feedback, position 3, strength 6"
+            wait_until("it says the effect", lambda: told_it in lines(), instead=lines)
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(30.0) == 0
+            assert lines()[-1].startswith("unplugged: ")
+            wait_until("it is gone", lambda: seen_device(told) is None)
+        finally:
+            process.kill()
 
 
 def _left(device: InputDevice) -> bool:

@@ -1,25 +1,14 @@
-"""Virtual controllers of every kind, and an operator side for each transport."""
+"""Virtual controllers of every kind."""
 
-import signal
 from collections.abc import Iterator
 
 import pytest
 
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
-from tests.kernel.inside.operator_process import Operator
 from tests.kernel.inside.plugged import Plugged, Variant
 
 _VARIANTS = [Variant(transport, model) for transport in Transport for model in Model]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def operators() -> Iterator[dict[Transport, Operator]]:
-    """An operator side for each transport, forked before this process has any thread."""
-    made = {transport: Operator() for transport in Transport}
-    yield made
-    for operator in made.values():
-        operator.end(signal.SIGKILL)
 
 
 @pytest.fixture(scope="session", params=_VARIANTS, ids=lambda variant: variant.name)
