@@ -2,7 +2,6 @@
 
 import base64
 import io
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any, Final
 import numpy as np
 from PIL import Image
 
-from tests.containers.watch import CheckFailedError
+from tests.console.provide import provide_playwright, provided_browser
+from tests.helpers.machines.waiting import wait_until
 
 _ARGUMENTS: Final = (
     "--no-sandbox",  # root has none
@@ -23,7 +23,6 @@ SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 60_000
 """For one step, on a machine that has much else to do."""
-_LOOK_S: Final = 0.02
 _DRAWS_SCENE: Final = "button#drawn[aria-pressed=true]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
@@ -65,10 +64,9 @@ class Browser:
             if not scene and (button := opened.query_selector(_DRAWS_SCENE)) is not None:
                 button.click()
             yield page
-            if page.complaints:
-                raise CheckFailedError(f"the page complained: {'; '.join(page.complaints[:3])}")
+            assert page.complaints == []
         except Error as error:
-            raise CheckFailedError(f"the browser: {str(error).splitlines()[0]}") from error
+            raise AssertionError(f"the browser: {str(error).splitlines()[0]}") from error
         finally:
             context.close()
 
@@ -94,14 +92,13 @@ class Page:
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
-        """Until JavaScript says so; CheckFailedError when it does not."""
+        """Until JavaScript says so; AssertionError when it does not."""
         # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
-        end_s = time.monotonic() + limit_s
-        while not self.ask(script):
-            if time.monotonic() > end_s:
-                self.picture("unexpected")
-                raise CheckFailedError(f"not {what} within {limit_s:g} s")
-            time.sleep(_LOOK_S)
+        try:
+            wait_until(what, lambda: bool(self.ask(script)), limit_s)
+        except AssertionError:
+            self.picture("unexpected")
+            raise
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
         """Until `words` stand there, in any case."""
@@ -198,8 +195,10 @@ def border(pixels: np.ndarray[Any, np.dtype[np.uint8]], width: int = 8) -> np.nd
 
 
 @contextmanager
-def browser(program: str, out: Path) -> Iterator[Browser]:
-    """Chromium, until the context ends; Playwright has been provided."""
+def browser(out: Path) -> Iterator[Browser]:
+    """Chromium, until the context ends; its pictures go to `out`. Skips the test where none can be had."""
+    program = provided_browser()
+    provide_playwright()
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  # not part of our environment
 
     out.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,6 @@ from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from tests.console.browser import Browser, Page
-from tests.containers.watch import CheckFailedError
 from tests.helpers.repository import ROOT
 from tests.helpers.simulated_desk import VIEW
 
@@ -102,7 +101,7 @@ class HandsAlone:
             self.messages.append(message)
             self.pages.receive(1, message, now_s)
         if self.pages.rejected:
-            raise CheckFailedError(f"the page sent what is no message: {self.messages[-1]}")
+            raise AssertionError(f"the page sent what is no message: {self.messages[-1]}")
         if self.pages.stopping(now_s):
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
@@ -151,9 +150,9 @@ class HandsAlone:
         self.expect("You drive")
 
     def expect(self, words: str) -> None:
-        """The page says so of the hands; CheckFailedError otherwise."""
+        """The page says so of the hands; AssertionError otherwise."""
         if words not in (said := self.page.text("#hands_state")):
-            raise CheckFailedError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
+            raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:

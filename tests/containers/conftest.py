@@ -13,7 +13,7 @@ import pytest
 from common.errors import ConfigurationError
 from feelahead.containers.engine import COMPOSE_FILE, Engine, EngineError
 from tests.containers.watch import Compose
-from tests.helpers.debian import cache_folder, install, run_or_skip
+from tests.helpers.machines.debian import cache_folder, install, run_or_skip
 
 _PROJECT: Final = "feelahead-test"
 _LINK: Final = "delay 20ms 2ms distribution normal rate 100mbit"

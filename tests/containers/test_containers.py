@@ -14,7 +14,7 @@ import pytest
 from feelahead.containers.engine import Engine
 from feelahead.containers.medium import PROJECT as TRIALS
 from tests.containers.watch import Compose, Watched, link_up, state_is
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 
 pytestmark = [pytest.mark.containers, pytest.mark.processes]
 

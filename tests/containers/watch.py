@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feelahead.containers.engine import Engine
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 
 Event = dict[str, Any]
 

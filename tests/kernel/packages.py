@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-from tests.helpers.debian import Apt, library_path, only, unpacked
+from tests.helpers.machines.debian import Apt, library_path, only, unpacked
 
 _QEMU: Final = "qemu-system-x86_64"
 _KERNEL_PACKAGE: Final = "linux-image-amd64"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.debian import Apt, library_path, only, unpacked
+from tests.helpers.machines.debian import Apt, library_path, only, unpacked
 from tests.helpers.repository import ROOT
 from tests.kernel.machine import MachineError, follow
 from tests.kernel.ramdisk import RESULT_MARK, module_order

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.two_machines import two_machines
+from tests.helpers.machines.two_machines import two_machines
 from tests.two_hosts.guide import follow
 from tests.two_hosts.lan import Lan, is_armed
 
@@ -33,6 +33,7 @@ def guided() -> Iterator[Lan]:
 @pytest.fixture
 def lan(guided: Lan, request: pytest.FixtureRequest) -> Lan:
     """After a test that has failed, the network as it was and both sides anew."""
-    if request.session.testsfailed:
+    if request.session.testsfailed > guided.mended:
+        guided.mended = request.session.testsfailed
         guided.mend()
     return guided

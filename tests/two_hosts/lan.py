@@ -16,9 +16,9 @@ from typing import Any
 
 from feelahead.both_sides.processes import SideProcess
 from robot_side.compiled.machine_code import machine_code_folder
+from tests.helpers.machines.two_machines import Machine
+from tests.helpers.machines.waiting import wait_until
 from tests.helpers.repository import ROOT
-from tests.helpers.two_machines import Machine
-from tests.helpers.waiting import wait_until
 
 PATIENCE_S = 60.0
 ATTEMPTS = 3
@@ -123,6 +123,8 @@ class Lan:
         """What stands for the guide's words in capitals."""
         self._addresses = (robot.address, operator.address)
         self._sides: dict[str, Side] = {}
+        self.mended = 0
+        """How many failures `mend` has come after."""
         operator.own_files.mkdir(parents=True)
         (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
         self.tell_name(robot.address)
@@ -162,7 +164,8 @@ class Lan:
     def end(self, called: str) -> None:
         """End it as Ctrl-C does; AssertionError unless it ends well."""
         with self._sides.pop(called).process as process:
-            assert process.stop() == 0
+            code = process.stop()
+        assert code == 0, f"the {called} side ended with code {code}"
 
     def kill(self, called: str) -> None:
         """End it with kill -9."""
@@ -192,6 +195,7 @@ class Lan:
         self.tell_name(self._addresses[0])
         self.swallow(False)
         self.restart()
+        self.until("operator", "the link is up", lambda status: status["link"] == "up")
 
     def swallow(self, everything: bool) -> None:
         """Let the robot's host drop all that comes, without a word; or no more."""
@@ -250,13 +254,19 @@ class Lan:
         status = self.until("operator", "the link is up", lambda status: status["link"] == "up")
         print(f"back after {time.monotonic() - began_s:.1f} s")
         assert status["state"] == "disarmed"
+        fresh = self.until("operator", "armed anew", lambda status: is_done(status) or _is_armed_and_shown(status))
+        if is_done(fresh):  # they were at the end of the task
+            self.moving()
         self.until("robot", "armed anew", is_armed)
-        self.until("operator", "armed anew", lambda status: is_armed(status) and "target_centre_mm" in status)
 
 
 def is_armed(status: Status) -> bool:
     """Whether the arm may move, as this side knows."""
     return bool(status["state"] == "armed")
+
+
+def _is_armed_and_shown(status: Status) -> bool:
+    return is_armed(status) and "target_centre_mm" in status
 
 
 def gap_ms(stop: Status) -> float:

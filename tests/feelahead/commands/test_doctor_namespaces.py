@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from tests.helpers.machines.two_machines import two_machines
 from tests.helpers.repository import ROOT
-from tests.helpers.two_machines import two_machines
 
 pytestmark = pytest.mark.processes
 

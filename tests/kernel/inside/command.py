@@ -11,7 +11,7 @@ from operator_side.dualsense.reports.output_report import OutputReport, build_ou
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import identity
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.evdev import ABS_RZ, ABS_X, InputDevice
 from tests.kernel.inside.kernel_view import seen_device
 

@@ -29,7 +29,7 @@ from operator_side.dualsense.reports.motion_sensors import (
 from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.driver import bound
 from tests.kernel.inside.plugged import ADDRESS, CALIBRATION, Plugged
 

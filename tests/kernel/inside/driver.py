@@ -10,7 +10,7 @@ from operator_side.dualsense.reports.controller_state import AT_REST_M_S2, STAND
 from operator_side.dualsense.reports.motion_sensors import NOMINAL_ACCELERATION_M_S2, NOMINAL_GYRO_RAD_S
 from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.evdev import (
     ABS_HAT0X,
     ABS_HAT0Y,

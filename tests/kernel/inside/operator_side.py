@@ -11,7 +11,7 @@ from feelahead.both_sides.processes import SideProcess
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.waiting import stays, wait_until
+from tests.helpers.machines.waiting import stays, wait_until
 from tests.kernel.inside.armless_robot import ArmlessRobot
 from tests.kernel.inside.plugged import Plugged, Variant
 

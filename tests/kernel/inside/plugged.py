@@ -14,7 +14,7 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.uhid.controller import UhidController, identity
 from operator_side.dualsense.uhid.file import UhidFile, offer
-from tests.helpers.waiting import wait_until
+from tests.helpers.machines.waiting import wait_until
 
 Value = TypeVar("Value")
 

@@ -1,19 +1,21 @@
 """Keys, pointers and a gamepad at the page alone, in virtual time: what moves the controller, and what lets it go."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
+
+import pytest
 
 from tests.console.browser import Browser
 from tests.console.hands_alone import HandsAlone, hands_alone
-from tests.containers.watch import check
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
 
 _BUTTONS: Final = 17
 _AXES: Final = (0.0, 0.0, 0.0, 0.0)
-GAP_S: Final = 0.1
-"""Within the robot side's own limit."""
 
 
-def keys_ramp_up_and_let_go_at_once(browser: Browser) -> str:
+def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
     """Space arms and runs; W grows to the level over 0.6 s, and is nothing with the next message once it is up."""
     with hands_alone(browser) as alone:
         alone.run()
@@ -27,19 +29,21 @@ def keys_ramp_up_and_let_go_at_once(browser: Browser) -> str:
         keyboard.up("KeyW")
         alone.let_pass(0.04)
         after = alone.pulled[1]
-        check(0.35 < half < 0.65 and full > 0.97 and after == 0.0, f"{half:.2f}, {full:.2f}, then {after:.2f}")
-        check(alone.runs, "hold-to-run was let go with it")
+        assert 0.35 < half < 0.65
+        assert full > 0.97
+        assert after == 0.0
+        assert alone.runs, "hold-to-run was let go with it"
         keyboard.press("Digit3")
         keyboard.down("ArrowDown")
         alone.let_pass(0.7)
-        check(abs(alone.pulled[0] - 3 / 9) < 0.01 and alone.pulled[1] == 0.0, f"level 3 is {alone.pulled}")
+        assert abs(alone.pulled[0] - 3 / 9) < 0.01
+        assert alone.pulled[1] == 0.0
         keyboard.up("Space")
         alone.let_pass(0.04)
-        check(alone.pulled == (0.0, 0.0) and not alone.runs, "hold-to-run was let go, and it went on")
-    return f"half way after 0.3 s: {half:.2f}, then {full:.2f}, and {after:.2f} once the key was up"
+        assert (alone.pulled, alone.runs) == ((0.0, 0.0), False)
 
 
-def every_key_does_what_it_says(browser: Browser) -> str:
+def test_every_key_does_what_it_says(browser: Browser) -> None:
     """Each key, whatever the layout, moves what the page says, and nothing else."""
     with hands_alone(browser) as alone:
         alone.run()
@@ -60,51 +64,18 @@ def every_key_does_what_it_says(browser: Browser) -> str:
             intent = alone.intent
             keyboard.up(code)
             alone.let_pass(0.04)
-            check(intent is not None, "no report came")
+            assert intent is not None, "no report came"
             meant = getattr(intent, name)
             pairs = zip(_parts(meant), _parts(value), strict=True)
-            check(all(abs(a - b) < 0.02 for a, b in pairs), f"{code}: {name} is {meant}, not {value}")
+            assert all(abs(a - b) < 0.02 for a, b in pairs)
             moved = {
                 part for part in ("l2", "r2", "lateral", "turning", "gripper") if any(_parts(getattr(intent, part)))
             }
-            check(moved <= {name}, f"{code} moves {sorted(moved)}")
-    return f"{len(expected)} keys"
+            assert moved <= {name}
 
 
 def _parts(value: object) -> tuple[float, ...]:
     return tuple(map(float, value)) if isinstance(value, Iterable) else (float(value),)  # type: ignore[arg-type]
-
-
-def _blur(alone: HandsAlone) -> None:
-    alone.page.blur()
-
-
-def _hide(alone: HandsAlone) -> None:
-    alone.page.hide()
-
-
-def _leave(alone: HandsAlone) -> None:
-    alone.page.ask("window.dispatchEvent(new Event('pagehide'))")
-
-
-def _type(alone: HandsAlone) -> None:
-    alone.page.raw.focus("#field")
-
-
-def _look_at_the_scene(alone: HandsAlone) -> None:
-    alone.page.raw.click("#scene")
-
-
-def _press_control(alone: HandsAlone) -> None:
-    alone.page.raw.keyboard.press("Control+KeyJ")
-
-
-def _escape(alone: HandsAlone) -> None:
-    alone.page.raw.keyboard.press("Escape")
-
-
-def _cut(alone: HandsAlone) -> None:
-    alone.hears = False
 
 
 def _freeze(alone: HandsAlone) -> None:
@@ -113,77 +84,77 @@ def _freeze(alone: HandsAlone) -> None:
     alone.hears = True
 
 
-def _stays_released(alone: HandsAlone) -> None:
+ENDS: Final[Mapping[str, Callable[[HandsAlone], object]]] = {
+    "a lost focus": lambda alone: alone.page.blur(),
+    "a hidden tab": lambda alone: alone.page.hide(),
+    "a left page": lambda alone: alone.page.ask("window.dispatchEvent(new Event('pagehide'))"),
+    "a field": lambda alone: alone.page.raw.focus("#field"),
+    "the scene": lambda alone: alone.page.raw.click("#scene"),
+    "the browser's own keys": lambda alone: alone.page.raw.keyboard.press("Control+KeyJ"),
+    "a stop": lambda alone: alone.page.raw.keyboard.press("Escape"),
+    "silence": lambda alone: setattr(alone, "hears", False),
+    "a gap": _freeze,
+}
+
+
+@pytest.mark.parametrize("end", ENDS.values(), ids=ENDS)
+def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsAlone], object]) -> None:
     """Keys that are still down count no more, nor does one that goes down again too soon, however long it is held."""
-    keyboard = alone.page.raw.keyboard
-    check(alone.pulled == (0.0, 0.0) and not alone.runs, f"it goes on with {alone.pulled}")
-    alone.let_pass(0.3)
-    check(not alone.runs, "keys that stayed down were taken for new ones")
-    for code in ("KeyW", "Space"):
-        keyboard.up(code)
-    alone.let_pass(0.5)
-    keyboard.down("Space")
-    alone.let_pass(1.5)
-    check(not alone.runs, "half a second of rest was enough")
-    keyboard.up("Space")
+    with hands_alone(browser) as alone:
+        alone.run()
+        keyboard = alone.page.raw.keyboard
+        keyboard.down("KeyW")
+        alone.let_pass(0.5)
+        assert alone.pulled[1] > 0.2
+        end(alone)
+        alone.let_pass(0.06 if alone.hears else 0.2)
+        assert (alone.pulled, alone.runs) == ((0.0, 0.0), False)
+        alone.let_pass(0.3)
+        assert not alone.runs, "keys that stayed down were taken for new ones"
+        for code in ("KeyW", "Space"):
+            keyboard.up(code)
+        alone.let_pass(0.5)
+        keyboard.down("Space")
+        alone.let_pass(1.5)
+        assert not alone.runs, "half a second of rest was enough"
 
 
-_ENDS: Final[tuple[Callable[[HandsAlone], None], ...]] = (
-    _blur, _hide, _leave, _type, _look_at_the_scene, _press_control, _escape, _cut, _freeze,
-)  # fmt: skip
-
-
-def whatever_takes_the_keys_lets_go(browser: Browser) -> str:
-    """A lost focus, a hidden tab, a left page, a field, the scene, the browser's own keys, a stop, silence."""
-    for end in _ENDS:
-        with hands_alone(browser) as alone:
-            alone.run()
-            alone.page.raw.keyboard.down("KeyW")
-            alone.let_pass(0.5)
-            check(alone.pulled[1] > 0.2, f"{end.__name__}: nothing moved before")
-            end(alone)
-            alone.let_pass(0.2 if end is _cut else 0.06)
-            _stays_released(alone)
-    return f"{len(_ENDS)} ways"
-
-
-def driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> str:
+def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
     """Keys do nothing before the button; Enter on it does; keys that are down then keep it from beginning."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         keyboard.down("Space")
         keyboard.down("KeyW")
         alone.let_pass(1.5)
-        check(alone.messages == [], f"a page that only looks says {alone.messages}")
+        assert alone.messages == []
         alone.page.raw.focus("#drive")
         keyboard.press("Enter")
         alone.let_pass(0.6)
         alone.expect("All keys up")
-        check(alone.page.text("#hands_rest") == "still 1.0 s", "the second began before the keys were up")
+        assert alone.page.text("#hands_rest") == "still 1.0 s", "the second began before the keys were up"
         keyboard.up("KeyW")
         keyboard.up("Space")
         keyboard.down("KeyW")
         alone.let_pass(2.0)
         alone.expect("All keys up")
-        check(not alone.runs, "it ran without a rest")
+        assert not alone.runs, "it ran without a rest"
         keyboard.up("KeyW")
         alone.let_pass(0.62)
-        check(alone.page.text("#hands_rest") == "still 0.4 s", f"it says {alone.page.text('#hands_rest')!r}")
+        assert alone.page.text("#hands_rest") == "still 0.4 s"
         alone.let_pass(0.58)
         alone.expect("Ready")
         alone.page.raw.focus("#other")
         keyboard.down("Space")
         alone.let_pass(0.2)
-        check(alone.runs and alone.page.ask("window.clicked") == 0, "Space pressed a button instead")
+        assert (alone.runs, alone.page.ask("window.clicked")) == (True, 0), "Space pressed a button instead"
         keyboard.up("Space")
-        check(alone.page.ask("window.clicked") == 0, "Space pressed a button when it came up")
+        assert alone.page.ask("window.clicked") == 0, "Space pressed a button when it came up"
         alone.page.raw.click("#drive")
         alone.let_pass(0.06)
-        check(alone.pages.driver is None, "it still drives")
-    return "by the button, after a second of rest"
+        assert alone.pages.driver is None, "it still drives"
 
 
-def escape_is_sent_until_it_is_confirmed(browser: Browser) -> str:
+def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
     """Esc stops in a field, for who only looks, and goes on until the state says so."""
     with hands_alone(browser) as alone:
         alone.page.raw.focus("#field")
@@ -191,22 +162,23 @@ def escape_is_sent_until_it_is_confirmed(browser: Browser) -> str:
         alone.page.raw.keyboard.press("Escape")
         alone.let_pass(1.0)
         stops = [message["hands"]["stop"] for message in alone.messages]
-        check(len(stops) >= 45 and all(stops), f"{len(stops)} messages in a second")
-        check("not confirmed" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped"))
+        assert len(stops) >= 45
+        assert all(stops)
+        assert "not confirmed" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped")
         alone.facts = {}
         alone.let_pass(0.1)
-        check("STOPPED" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped"))
+        assert "STOPPED" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped")
         before = len(alone.messages)
         alone.let_pass(0.5)
-        check(len(alone.messages) <= before + 1 and not alone.messages[-1]["hands"]["stop"], "it never ends")
+        assert len(alone.messages) <= before + 1
+        assert not alone.messages[-1]["hands"]["stop"]
         alone.facts = {"status": {"state": "armed", "link": "up", "owner": "observing"}}
         alone.page.raw.click("#stop")
         alone.let_pass(0.1)
-        check("Only the owner" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped"))
-    return f"{len(stops)} messages in the second before it was confirmed"
+        assert "Only the owner" in alone.page.text("#hands_stopped"), alone.page.text("#hands_stopped")
 
 
-def pointer_and_gamepad_drive(browser: Browser) -> str:
+def test_pointer_and_gamepad_drive(browser: Browser) -> None:
     """A pointer that drags, and a gamepad's travel as it is; both let go at once."""
     with hands_alone(browser) as alone:
         alone.drive()
@@ -219,10 +191,10 @@ def pointer_and_gamepad_drive(browser: Browser) -> str:
         mouse.move(x, y - 45)
         alone.let_pass(0.06)
         dragged = alone.pulled[1]
-        check(abs(dragged - 0.5) < 0.05, f"half of the way is {dragged:.2f}")
+        assert abs(dragged - 0.5) < 0.05
         mouse.up()
         alone.let_pass(0.06)
-        check(alone.pulled == (0.0, 0.0) and not alone.runs, "the pointer is up, and it goes on")
+        assert (alone.pulled, alone.runs) == ((0.0, 0.0), False)
         alone.page.pretend_gamepad(_AXES, (0.0,) * _BUTTONS)
         alone.let_pass(1.3)
         held = [0.0] * _BUTTONS
@@ -232,24 +204,24 @@ def pointer_and_gamepad_drive(browser: Browser) -> str:
         held[7] = 0.62
         alone.page.pretend_gamepad((0.0, 0.0, 0.0, -1.0), tuple(held))
         alone.let_pass(0.06)
-        check(alone.intent is not None and abs(alone.pulled[1] - 0.6) < 0.01, f"0.62 is {alone.pulled[1]:.3f}")
-        check(alone.intent is not None and alone.intent.turning[1] > 0.97, "up is down")
+        assert alone.intent is not None
+        assert abs(alone.pulled[1] - 0.6) < 0.01
+        assert alone.intent.turning[1] > 0.97
         held[1] = 1.0
         alone.page.pretend_gamepad(_AXES, tuple(held))
         alone.let_pass(0.06)
-        check(alone.state == "stopped" and not alone.runs, "its stop button did not stop")
-    return f"half of the drag is {dragged:.2f}"
+        assert (alone.state, alone.runs) == ("stopped", False)
 
 
-def what_cannot_be_done_is_said(browser: Browser) -> str:
+def test_what_cannot_be_done_is_said(browser: Browser) -> None:
     """A real controller drives, another page drives, tuning is not permitted: each in words."""
     with hands_alone(browser, may_drive=False) as alone:
         alone.expect("A real controller drives")
-        check(alone.page.ask("document.getElementById('drive').disabled"), "the button can be pressed")
+        assert alone.page.ask("document.getElementById('drive').disabled"), "the button can be pressed"
         alone.facts = {"may_tune": False}
         alone.let_pass(0.06)
-        check("--permit-tuning" in alone.page.text("#tuning_reason"), alone.page.text("#tuning_reason"))
-        check(alone.page.ask("document.querySelectorAll('#tuning input:disabled').length") == 4, "sliders move")
+        assert "--permit-tuning" in alone.page.text("#tuning_reason"), alone.page.text("#tuning_reason")
+        assert alone.page.ask("document.querySelectorAll('#tuning input:disabled').length") == 4, "sliders move"
     with hands_alone(browser, person=True) as alone:
         other = {"page": "another", "number": 0, "driving": True}
         alone.pages.receive(2, {"hands": other}, alone.now_ms / 1000)
@@ -257,21 +229,21 @@ def what_cannot_be_done_is_said(browser: Browser) -> str:
         alone.expect("Another page drives")
         alone.let_pass(0.3)
         alone.drive()
-        check(alone.page.raw.is_visible("#give_back"), "the person cannot go on")
+        assert alone.page.raw.is_visible("#give_back"), "the person cannot go on"
         alone.page.raw.click("#give_back")
         alone.let_pass(0.06)
-        check(alone.pages.driver is None, "it still drives")
+        assert alone.pages.driver is None, "it still drives"
         given = [message["hands"]["give_back"] for message in alone.messages]
-        check(given.count(True) == 1 and given[-1] is False, f"given back {given.count(True)} times")
-    return "in words"
+        assert given.count(True) == 1
+        assert given[-1] is False
 
 
-def sliders_tune(browser: Browser) -> str:
+def test_sliders_tune(browser: Browser) -> None:
     """Keys move the sliders, the wish is sent once they rest, and what holds is written beside it."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         alone.let_pass(2.5)
-        check("0.99" in alone.page.text("#tune_probability_now"), alone.page.text("#tune_probability_now"))
+        assert "0.99" in alone.page.text("#tune_probability_now"), alone.page.text("#tune_probability_now")
         alone.page.raw.focus("#tune_probability")
         keyboard.press("ArrowLeft")
         keyboard.press("ArrowLeft")
@@ -283,23 +255,10 @@ def sliders_tune(browser: Browser) -> str:
         keyboard.press("ArrowRight")
         alone.let_pass(0.4)
         wishes = [message["tune"] for message in alone.messages if "tune" in message]
-        check(wishes == [{"probability": 0.95}, {"link": "delay 20ms loss 0.5%"}], f"sent {wishes}")
-        check("the run has" in alone.page.text("#tune_delay_now"), alone.page.text("#tune_delay_now"))
+        assert wishes == [{"probability": 0.95}, {"link": "delay 20ms loss 0.5%"}]
+        assert "the run has" in alone.page.text("#tune_delay_now"), alone.page.text("#tune_delay_now")
         asked = {"asked": "delay 20ms 4ms distribution normal loss 0.5%"}
         alone.facts = {"probability": 0.95, "to_robot": asked}
         alone.let_pass(2.5)
         shown = [alone.page.text(f"#tune_{name}_now") for name in ("probability", "delay", "jitter", "loss")]
-        check(shown == ["0.95", "20 ms", "4 ms", "0.5 %"], f"shown {shown}")
-    return f"{wishes}"
-
-
-CHECKS: Final[tuple[Callable[[Browser], str], ...]] = (
-    keys_ramp_up_and_let_go_at_once,
-    every_key_does_what_it_says,
-    whatever_takes_the_keys_lets_go,
-    driving_begins_on_purpose_and_after_a_rest,
-    escape_is_sent_until_it_is_confirmed,
-    pointer_and_gamepad_drive,
-    what_cannot_be_done_is_said,
-    sliders_tune,
-)
+        assert shown == ["0.95", "20 ms", "4 ms", "0.5 %"]

@@ -7,15 +7,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from urllib.parse import urlsplit
 
-from tests.console.stage import DRAWN, Stage
-from tests.containers.watch import check
+import pytest
+
+from tests.console.browser import Browser
+from tests.console.run import DRAWN, Run
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
 
 _PAGE = b"<!doctype html><title>another site</title><p>another site</p>"
 
 
-def wrong_addresses_are_refused(stage: Stage) -> str:
+def test_wrong_addresses_are_refused(demo: Run) -> None:
     """No token, another token, another Host, another Origin: nothing is told."""
-    right = urlsplit(stage.run.address)
+    right = urlsplit(demo.address)
     port, host = right.port or 0, f"127.0.0.1:{right.port}"
     token = right.path.strip("/")
     wrong = "x" * len(token)
@@ -39,17 +44,16 @@ def wrong_addresses_are_refused(stage: Stage) -> str:
         answer = connection.getresponse()
         content = answer.read()
         answers[name] = answer.status
-        check(name == "the right address" or token.encode() not in content, f"{name}: the token is told")
+        assert name == "the right address" or token.encode() not in content
         connection.close()
-    check(answers.pop("the right address") == 200, "the right address is refused")
+    assert answers.pop("the right address") == 200, "the right address is refused"
     let_in = [name for name, status in answers.items() if status < 400]
-    check(not let_in, f"let in with {', '.join(let_in)}")
-    return f"{len(answers)} wrong ones refused"
+    assert not let_in
 
 
-def another_site_is_refused(stage: Stage) -> str:
+def test_another_site_is_refused(browser: Browser, demo: Run) -> None:
     """A page of another origin that knows the whole address gets neither content nor a WebSocket nor a frame."""
-    with _another_site() as elsewhere, stage.browser.page(elsewhere) as page:
+    with _another_site() as elsewhere, browser.page(elsewhere) as page:
         script = """async (address) => {
             const live = address.replace('http', 'ws') + 'live';
             const opened = await new Promise((resolve) => {
@@ -61,13 +65,12 @@ def another_site_is_refused(stage: Stage) -> str:
             const image = await fetch(address, { mode: 'no-cors' }).then((answer) => answer.type, () => 'refused');
             return { opened, read, image };
         }"""
-        seen = page.ask(script, stage.run.address)
+        seen = page.ask(script, demo.address)
         page.complaints.clear()  # the refusals themselves
-        check(not seen["opened"], "its WebSocket was let in")
-        check(not seen["read"], "it could read the page")
-    with stage.browser.page(stage.run.address) as page:
+        assert not seen["opened"], "its WebSocket was let in"
+        assert not seen["read"], "it could read the page"
+    with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn for whoever may see it")
-    return "neither WebSocket nor page for another site"
 
 
 @contextmanager
