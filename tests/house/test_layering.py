@@ -91,8 +91,8 @@ ARROWS = """
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*
-    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/approaches feelahead/both_sides
-        feelahead/benchmarks/* feelahead/experiments/* feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/both_sides feelahead/benchmarks/*
+        feelahead/experiments/* feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of
