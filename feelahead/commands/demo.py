@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 import tyro
+from msgspec import Meta
 
 from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import LINK_UP, Value
@@ -21,6 +22,7 @@ from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
+from common.limits import check_limits
 from common.protocol.messages import Compensation
 from common.recording.side import Recorder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
@@ -75,7 +77,7 @@ class DemoSettings(RunOptions):
     """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
     """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
-    console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
+    console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
     """Where the console's page is on this machine; 0: any port that is free."""
     tui: bool = False
     """The whole terminal instead of a line, for machines without a browser."""
@@ -86,8 +88,7 @@ class DemoSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.console_port <= 65535:
-            raise ValueError(f"--console-port {self.console_port}: valid: 0 to 65535")
+        check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.scene is not None and self.model is not None:

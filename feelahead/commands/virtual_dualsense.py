@@ -6,10 +6,12 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.limits import check_limits
 from operator_side.dualsense.effects.official import AnyEffect
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
@@ -38,14 +40,13 @@ class VirtualDualSenseSettings:
     """What it seems to be connected by."""
     edge: bool = False
     """A DualSense Edge."""
-    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Unplug it after this long; without it, at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
     """Nobody touches it, or somebody pulls R2 and L2 in turn and moves the left stick round."""
 
     def __post_init__(self) -> None:
-        if self.duration is not None and not 0.0 < self.duration < 1e6:
-            raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
+        check_limits(self)
 
 
 def virtual_dualsense(arguments: Sequence[str]) -> int:

@@ -9,15 +9,15 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.view_messages import VIEW_NAMES
+from common.recording.images import read_image
 from common.recording.reading import Recording
-from feelahead.recordings.pictures import Picture, pictures
 from feelahead.recordings.tables import Table, Tables
 
 FRAMES_HZ: Final = 30
@@ -39,9 +39,18 @@ _ACTION: Final = {
 }
 
 
+class Picture(NamedTuple):
+    """One of a camera's."""
+
+    time_s: float
+    """Since the recording began"""
+    jpeg: bytes
+
+
 def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     """Write the dataset; how many frames. ConfigurationError for a recording without an arm or commands."""
     import pyarrow  # noqa: PLC0415
+    from PIL import Image  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
     joined = tables.joined(FRAMES_HZ)
@@ -64,7 +73,8 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
         if found:
             shown = _newest(found, times_s)
             key = f"observation.images.{view}"
-            height, width = found[0].height, found[0].width
+            with Image.open(io.BytesIO(found[0].jpeg)) as first_picture:
+                width, height = first_picture.size
             features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
             columns[key] = pyarrow.array(
                 [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
@@ -91,6 +101,13 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     (folder / "meta" / "info.json").write_text(json.dumps(_info(recording, features, count), indent=4) + "\n")
     (folder / "meta" / "stats.json").write_text(json.dumps(stats, indent=4) + "\n")
     return count
+
+
+def pictures(recording: Recording, view: str) -> list[Picture]:
+    """All that a camera took, in order."""
+    first_ns = recording.began_ns()
+    messages = recording.messages([f"/camera/{view}"])
+    return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:

@@ -122,24 +122,6 @@ class Page:
         answer = self._tools.send("Page.captureScreenshot", {"format": "png", **clip})
         return base64.b64decode(answer["data"])
 
-    def updates_per_second(self, selector: str, seconds: float = 3.0) -> float:
-        """How often what stands there, or one of its attributes, changes: drawn frames in which it did."""
-        script = """async ([selector, seconds]) => {
-            let changed = 0, fresh = false;
-            const observer = new MutationObserver(() => { fresh = true; });
-            const all = { attributes: true, childList: true, characterData: true, subtree: true };
-            observer.observe(document.querySelector(selector), all);
-            const began = performance.now();
-            while (performance.now() - began < 1000 * seconds) {
-                await new Promise(requestAnimationFrame);
-                changed += fresh;
-                fresh = false;
-            }
-            observer.disconnect();
-            return 1000 * changed / (performance.now() - began);
-        }"""
-        return float(self.ask(script, [selector, seconds]))
-
     def press(self, key: str) -> None:
         """Down and up."""
         self.raw.keyboard.press(key)

@@ -27,7 +27,6 @@ def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
             before = page.pixels(f"#{view} canvas")
             assert before.std() > _LEAST_DETAIL
             _wait_for_change(page, view, before)
-            print(f"{view} {page.updates_per_second(f'#{view}'):.0f} updates/s")
         # How old on a busy machine is for a benchmark to say; at some moment both have to be fresh.
         end_s = time.monotonic() + _PATIENCE_S
         while _oldest_ms(page) >= _OLDEST_MS:
