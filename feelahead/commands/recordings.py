@@ -33,11 +33,11 @@ class ReplaySettings:
     """Compute every stiffness, command and report to the controller anew from the recorded inputs, and compare. Exit
     code 1 where they differ by more than another processor may: 1 of 8 in strength, 1e-12 m in ways."""
     speed: Annotated[float, Meta(ge=0.01, le=1000.0)] = 1.0
-    """How many times as fast as it was to show it."""
+    """The playing speed, 1 being the recorded one."""
     tui: bool = False
     """On the whole terminal, instead of the console's page."""
     console_port: Annotated[int, Meta(ge=0, le=65535)] = 0
-    """Where the page is on this machine; 0: any port that is free."""
+    """The page's port on this machine; 0: any that is free."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -54,10 +54,9 @@ class ExportSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     format: Literal["csv", "parquet", "lerobot", "mcap"] = "csv"
-    """What to make of it."""
+    """The format to write."""
     out: Path | None = None
-    """Where: a folder that is not there yet or empty, or for mcap a file; unless given, beside the recording, named
-    after it."""
+    """A new or empty folder, or for mcap a file; unless given, beside the recording, named after it."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class PlotSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     out: Path | None = None
-    """Where: a file that ends in .png, .svg or .pdf; beside the recording as .png unless given."""
+    """A file that ends in .png, .svg or .pdf; beside the recording as .png unless given."""
 
 
 def _open(path: Path | None) -> Recording:

@@ -37,13 +37,13 @@ class VirtualDualSenseSettings:
     """
 
     transport: Literal["usb", "bluetooth"] = "usb"
-    """What it seems to be connected by."""
+    """The transport that it seems to use."""
     edge: bool = False
     """A DualSense Edge."""
     duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Unplug it after this long; without it, at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
-    """Nobody touches it, or somebody pulls R2 and L2 in turn and moves the left stick round."""
+    """none: no hands; pulling: R2 and L2 in turn, and the left stick round."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -113,15 +113,15 @@ class _Narrated:
         self._shown = self._told()
 
     def read(self, now_s: float) -> bytes | None:
-        """As the controller's own."""
+        """Pass on the controller's own answer."""
         return self._controller.read(now_s)
 
     def get_feature(self, report_id: int) -> bytes:
-        """As the controller's own."""
+        """Pass on the controller's own answer."""
         return self._controller.get_feature(report_id)
 
     def write(self, report: bytes, now_s: float) -> None:
-        """As the controller's own, and say what is new."""
+        """Pass the report to the controller, and say the changes."""
         self._controller.write(report, now_s)
         told = self._told()
         for part, doing in told.items():
@@ -145,7 +145,7 @@ class _Narrated:
 
 
 def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
-    """What the hands do after `time_s`: the forces on L2 and R2 in N, and the left stick (x, y)."""
+    """The hands at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
     turns = time_s / PULL_PERIOD_S
     pull_n = NORMAL_FINGER_FORCE_N * (1.0 - math.cos(2.0 * math.tau * turns)) / 2.0
     stick = (_STICK_RADIUS * math.cos(math.tau * turns), _STICK_RADIUS * math.sin(math.tau * turns))

@@ -12,9 +12,9 @@ PORTS: Final = "5555, 5556"
 _SEGMENTING: Final = "tbf rate 2gbit burst {burst} limit 10mb"
 """Cuts what a sender left to its interface to cut: netem is to see packets as a wire has them."""
 _HEADERS_BYTES: Final = 100
-"""Of the frame, around what the interface's limit counts."""
+"""The frame's bytes that the interface's limit does not count."""
 HANDLES: Final[Mapping[Direction, str]] = {direction: f"{n}:" for n, direction in enumerate(get_args(Direction), 2)}
-"""By which each direction's netem is told from the other's."""
+"""Handles that distinguish the two directions' netem."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class End:
     number: int
     """The kernel's; another one when the interface went and came back."""
     address: str
-    """With the length of the network's prefix."""
+    """The address with the network's prefix length."""
     mtu: int = 1500
 
 
@@ -36,7 +36,7 @@ class Cable:
     robot: End
     operator: End
     robot_address: str
-    """Of the robot side itself."""
+    """The robot side's own address."""
 
     def rules(self) -> str:
         """For nft, which applies all or nothing: pass the ports on, under our own address, and nothing else."""

@@ -17,7 +17,7 @@ from feelahead.containers.engine import Engine
 from feelahead.containers.netem import Counted, count_packets
 
 PROJECT: Final = "feelahead-latency"
-"""How the projects' names begin, one for each link."""
+"""The prefix of the projects' names, one project a link."""
 _BUILD_LIMIT_S: Final = 1500.0
 _SIDES: Final = ("robot", "operator")
 
@@ -87,7 +87,7 @@ class ContainerMedium:
         return {"LINK": trial.link, "LINK_MODEL": trial.link_model, "RESTART": "no"}
 
     def _packets(self, engine: Engine) -> Mapping[Direction, Counted]:
-        """What netem has counted so far."""
+        """Read netem's counters."""
         return count_packets(json.loads(self._in_router(engine, "tc -statistics -json qdisc show")))
 
     def _in_router(self, engine: Engine, command: str) -> str:

@@ -20,7 +20,7 @@ class BeyondNetemError(FeelaheadError):
 
 
 def netem_words(link: LinkSpec) -> dict[Direction, str]:
-    """For each direction the arguments of `tc qdisc ... netem`; BeyondNetemError where they would mean something else.
+    """Return each direction's arguments of `tc qdisc ... netem`; BeyondNetemError where netem cannot do it.
 
     netem sees packets, not messages and not streams: both ports of a direction share one cable.
     """
@@ -35,7 +35,7 @@ class Counted:
     dropped: int
 
     def lost_share_since(self, before: "Counted") -> float | None:
-        """Of everything that came since `before`; None where nothing did, or netem was set up anew meanwhile."""
+        """The share lost since `before`; None where nothing came, or netem was set up again."""
         if self.sent < before.sent or self.dropped < before.dropped:
             return None
         dropped = self.dropped - before.dropped
@@ -44,7 +44,7 @@ class Counted:
 
 
 def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counted]:
-    """For each direction what `tc -statistics -json qdisc show` says of its netem."""
+    """Read each direction's netem from `tc -statistics -json qdisc show`."""
     netems = {queue["handle"]: queue for queue in queues if queue["kind"] == "netem"}
     return {
         direction: Counted(netems[handle]["packets"], netems[handle]["drops"])

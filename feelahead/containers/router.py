@@ -48,7 +48,7 @@ class RouterSettings:
     robot: Annotated[str, tyro.conf.arg(metavar="HOST")] = "robot-side"
     """The robot side's name or address in its own network."""
     said: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/emulated")
-    """Where to write what the sides have to emulate themselves: nothing, or the link."""
+    """The file that tells the sides what to emulate themselves: nothing, or the link."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """These settings from a file."""
 
@@ -75,13 +75,13 @@ def command(arguments: Sequence[str]) -> int:
 
 
 class Router:
-    """What is set up at the moment, and what has to be."""
+    """The routing and the link, set up again after each change."""
 
     def __init__(self, settings: RouterSettings) -> None:
         self._settings = settings
         self._cable: Cable | None = None
         self._words: Mapping[Direction, str] | None = None
-        """For netem; None: the sides emulate the link."""
+        """The words for netem; None: the sides emulate the link."""
         try:
             words = netem_words(LinkSpec.parse(settings.link))
             for direction, said in words.items():
@@ -117,7 +117,7 @@ class Router:
 
 
 def run_system(words: Sequence[str], given: str | None = None) -> str:
-    """What it prints; `given`: what it reads. CommandFailedError when it fails."""
+    """Run a system's command; `given`: its input. CommandFailedError when it fails."""
     try:
         done = subprocess.run(words, input=given, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -27,7 +27,7 @@ _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _STRENGTHS: Final = 8
 _ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
-"""So many give their statistics."""
+"""The number of pictures in the statistics."""
 _ACTION: Final = {
     "l2": "command.l2",
     "r2": "command.r2",
@@ -138,7 +138,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
 
 
 def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """From where on there is something of everything that the format wants in every frame."""
+    """Find the first row that has every column which the format requires."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:
         needed += vectors["observation.stiffness"].values()
@@ -177,7 +177,7 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
-    """Of each colour, 0 to 1, as (3, 1, 1)."""
+    """Statistics of each colour, 0 to 1, (3, 1, 1)."""
     from PIL import Image  # noqa: PLC0415
 
     step = max(1, len(shown) // _SAMPLED_PICTURES)
@@ -189,7 +189,7 @@ def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
 
 
 def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """What the `datasets` library is told of a column."""
+    """The `datasets` library's description of a column."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     if feature["shape"] == [1]:

@@ -72,7 +72,7 @@ class Browser:
 
 
 class Page:
-    """What a person does at a page and sees of it. `raw`: Playwright's own page, for all else."""
+    """A person at a page. `raw`: Playwright's own page, for all else."""
 
     def __init__(self, raw: Any, out: Path) -> None:
         self.raw = raw
@@ -84,15 +84,15 @@ class Page:
         raw.on("pageerror", lambda error: self.complaints.append(str(error)))
 
     def text(self, selector: str) -> str:
-        """What stands there."""
+        """The text of an element."""
         return str(self.raw.text_content(selector) or "").strip()
 
     def ask(self, script: str, argument: object = None) -> Any:
-        """What a piece of JavaScript says."""
+        """Evaluate a piece of JavaScript."""
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
-        """Until JavaScript says so; AssertionError when it does not."""
+        """Wait until a piece of JavaScript is true; AssertionError when it does not become so."""
         # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
         try:
             wait_until(what, lambda: bool(self.ask(script)), limit_s)
@@ -101,7 +101,7 @@ class Page:
             raise
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
-        """Until `words` stand there, in any case."""
+        """Wait until an element has these words, in any case."""
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
         self.wait(script, f"{words!r} in {selector}", limit_s)
 

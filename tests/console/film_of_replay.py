@@ -20,7 +20,7 @@ from tests.console.pictures_of_recording import record_demo
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
 _DRAWN_S: Final = 0.3
-"""Until the scene, which is another site's, has drawn what the page shows."""
+"""The time that the scene, another site's page, needs to draw."""
 _START_S: Final = 60.0
 _SIZE: Final = (960, 540)
 _QUALITY: Final = 40

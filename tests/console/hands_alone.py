@@ -73,7 +73,7 @@ class HandsAlone:
     person: bool = False
     pages: DrivingPage = field(default_factory=DrivingPage)
     facts: dict[str, Any] = field(default_factory=dict)
-    """What differs from a robot that is there, is owned from here, and permits tuning"""
+    """Changes to the facts of a robot that is owned from here and permits tuning"""
     now_ms: float = 0.0
     state: str = "disarmed"
     hears: bool = True
@@ -156,7 +156,7 @@ class HandsAlone:
 
     @property
     def pulled(self) -> tuple[float, float]:
-        """What the controller's triggers mean by now: retreat and advance."""
+        """The triggers' meaning: retreat and advance."""
         return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
 
     @property

@@ -61,7 +61,7 @@ def _settle(page: Page) -> None:
 
 
 def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
-    """Of the approach, the moment when R2 resists most: looks are too slow to wait for one."""
+    """Keep the moment of the approach when R2 resists most: looks are too slow to wait for one."""
     most = 0
     run.wait_until("near", lambda run: max(run.facts[-1]["r2"]["zones"]) > 0, 60.0)
     while _doing(run) in ("advancing", "grasping"):
@@ -78,7 +78,7 @@ def _doing(run: Run) -> str:
 
 
 def _keep(page: Page, folder: Path, path: Path) -> None:
-    """What is seen now, in few colours."""
+    """Keep the page as it looks, in few colours."""
     page.picture(path.stem)
     with Image.open(folder / path.name) as whole:
         whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -52,7 +52,7 @@ def record_demo(recording: Path, duration_s: float) -> list[dict[str, Any]]:
 
 
 def _feelahead(*arguments: str) -> str:
-    """What it wrote; AssertionError with its last words where it failed."""
+    """Run a command and return its output; AssertionError with its last words where it failed."""
     command = [sys.executable, "-P", "-m", "feelahead", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False, cwd=ROOT)
     if done.returncode != 0:

@@ -16,7 +16,7 @@ _NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 
 
 def provided_browser() -> str:
-    """Where a Chromium is; in CI, root gets Debian's. Skips the test where none can be had."""
+    """Find a Chromium; in CI, root gets Debian's. Skips the test where none can be had."""
     found = next(filter(None, map(shutil.which, _NAMES)), None)
     if found is None:
         install((_NAMES[0], "fonts-dejavu-core"), _NAMES[0])

@@ -29,7 +29,7 @@ class Run:
         self.address = ""
         """The console's, with its token."""
         self.process_ids: dict[str, int] = {}
-        """By side."""
+        """Process ids by side."""
         self.facts: deque[Event] = deque(maxlen=_KEPT)
         """The newest last, ten a second."""
         self.notes: list[str] = []
@@ -49,7 +49,7 @@ class Run:
         self._demo.check()
 
     def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
-        """How long it took in seconds; AssertionError when it does not come."""
+        """Wait, and return the seconds that it took; AssertionError when it does not come."""
         began_s = time.monotonic()
 
         def looked() -> bool:
@@ -61,7 +61,7 @@ class Run:
 
     @property
     def status(self) -> Event:
-        """Of the newest facts."""
+        """The status in the newest facts."""
         return dict(self.facts[-1]["status"]) if self.facts else {}
 
     @contextmanager

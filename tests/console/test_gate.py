@@ -1,4 +1,4 @@
-"""Nobody gets in without the token, and no other web site with it."""
+"""The gate: refused without the token, and for another web site with it."""
 
 import http.client
 import http.server

@@ -85,12 +85,12 @@ def _newest(run: Run) -> dict[str, Any]:
 
 
 def is_armed(run: Run) -> bool:
-    """By the newest facts."""
+    """Armed, by the newest facts."""
     return run.status.get("state") == "armed"
 
 
 def pull(run: Run) -> float:
-    """How far R2 is pulled, as the newest facts have it."""
+    """R2's travel, by the newest facts."""
     return float(_newest(run)["r2"]["travel"] or 0.0)
 
 

@@ -70,7 +70,7 @@ def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
 
 
 def _inside(page: Page, selector: str, size: tuple[int, int]) -> tuple[float, float]:
-    """Its width and height; AssertionError unless it lies within the page."""
+    """Return its width and height; AssertionError unless it lies within the page."""
     box = page.raw.locator(selector).bounding_box() or dict.fromkeys(("x", "y", "width", "height"), 0.0)
     x, y, width, height = box["x"], box["y"], box["width"], box["height"]
     assert width > 0

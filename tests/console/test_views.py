@@ -1,4 +1,4 @@
-"""What is drawn, and whether it is true."""
+"""The page draws both views, the scene, triggers and words, and they are true."""
 
 import re
 import time
@@ -45,7 +45,7 @@ def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
 
 
 def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
-    """What stands beside the triggers, and how high their zones are drawn, is what the operator side wrote."""
+    """The zones' numbers and heights equal those that the operator side wrote."""
     with browser.page(fresh_demo.address) as page:
         page.wait("document.querySelectorAll('#r2 .zones b').length == 10", "drawn the zones")
         fresh_demo.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
@@ -92,7 +92,7 @@ def test_words_agree(browser: Browser, demo: Run) -> None:
 
 
 def _wait_for_change(page: Page, view: str, before: Any) -> None:
-    """Until some of the view has changed; the arm moves most of the time."""
+    """Wait until some of the view has changed; the arm moves most of the time."""
     end_s = time.monotonic() + 15.0
     while time.monotonic() < end_s:
         after = page.pixels(f"#{view} canvas")

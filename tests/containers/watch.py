@@ -15,7 +15,7 @@ Event = dict[str, Any]
 
 @dataclass(frozen=True)
 class Compose:
-    """What runs on an engine."""
+    """A run on an engine."""
 
     engine: Engine
     settings: Mapping[str, str]
@@ -39,7 +39,7 @@ class Watched:
         self.new_events()
 
     def new_events(self) -> list[Event]:
-        """What it said that nobody has heard yet, of what `--status json` prints."""
+        """Return the events that `--status json` printed since the last call."""
         lines = [line for line in self._engine.docker("logs", self.container).splitlines() if line.startswith("{")]
         new, self._seen = lines[self._seen :], len(lines)
         said, self._waiting = [*self._waiting, *map(json.loads, new)], []

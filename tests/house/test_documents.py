@@ -1,4 +1,4 @@
-"""What the documents tell people to type exists and parses, and what they show is true."""
+"""Commands in the documents exist and parse, and the examples are true."""
 
 import os
 import re
@@ -42,7 +42,7 @@ COMMANDS = {
 }
 OTHERS = re.compile("cd|cp|echo|git|install|journalctl|mkdir|nft|python3|systemctl|systemd-sysusers|ufw")
 NOT_TYPED = ("advancing  L2/R2 pull", "FEELAHEAD_")
-"""How lines begin that a program prints, or that stand in a file."""
+"""Prefixes of lines that a program prints, or that stand in a file."""
 KEY = "5a" * 32
 PLACEHOLDERS = {
     r"\bROBOT-KEY\b|\bOPERATOR-KEY\b": KEY,
@@ -54,7 +54,7 @@ PLACEHOLDERS = {
     r"--(config|peer-header) \S+": "",  # files that must be there
 }
 TAILS = {"allow": ["anna", KEY], "revoke": ["anna"], "make": ["robot"], "show": ["robot"]}
-"""What `feelahead keys` takes with an action, of which the text gives the name alone."""
+"""Arguments for actions of `feelahead keys` that the text names alone."""
 
 
 class ParsedError(Exception):
@@ -129,7 +129,7 @@ def require_known(split: Sequence[str]) -> None:
             ended = int(shown.code or 0)
         assert ended == 0, split
     else:
-        assert OTHERS.fullmatch(program), f"{program!r} is neither ours nor known; if it is to be typed, add it to OTHERS"
+        assert OTHERS.fullmatch(program), f"{program!r} is neither ours nor known; if people type it, add it to OTHERS"
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -142,9 +142,7 @@ def test_every_command_is_known(name: str) -> None:
 
 
 @pytest.mark.usefixtures("parse")
-@pytest.mark.parametrize(
-    "command", ["feelahead-robot --probabilty 1", "make demmo", "make demo ARGS='--durration 3'"]
-)
+@pytest.mark.parametrize("command", ["feelahead-robot --probabilty 1", "make demmo", "make demo ARGS='--durration 3'"])
 def test_a_misspelt_command_is_found(command: str) -> None:
     with pytest.raises((AssertionError, ConfigurationError)):
         require_known(filled(command))
@@ -185,7 +183,7 @@ def test_the_python_in_the_readme_runs() -> None:
 
 @pytest.mark.processes
 def test_an_arm_of_ones_own(tmp_path: Path) -> None:
-    """As the README's command, on a port and for a time that do for a test."""
+    """Run the README's command, on a port and for a time that suit a test."""
     [command] = [line for line in indented(README) if "my_arm.xml" in line]
     program, *arguments = filled(command.replace("pinch", "tool"))
     assert program == "feelahead-robot"

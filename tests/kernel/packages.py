@@ -17,11 +17,11 @@ _KERNEL_PACKAGE: Final = "linux-image-amd64"
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the virtual machine is made of."""
+    """The parts of the virtual machine."""
 
     qemu: Path
     qemu_environment: dict[str, str]
-    """What QEMU needs in its environment to find its libraries."""
+    """QEMU's environment, for its libraries."""
     firmware: Path | None
     """The folder of QEMU's firmware; None where QEMU knows it by itself."""
     kernel: Path

@@ -1,4 +1,4 @@
-"""What is measured in the machine and compared outside of it."""
+"""Links that are measured in the machine and compared outside of it."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ class Case:
     model: LinkModel = "datagram"
     messages: int = 6000
     judged: bool = True
-    """Else it is shown: the model is known to differ."""
+    """False: shown alone, because the model is known to differ."""
 
     @property
     def file(self) -> str:
@@ -25,7 +25,7 @@ class Case:
 _NORMAL = "delay 20ms 5ms distribution normal"
 
 PATH_CASE = Case("path", "delay 20ms", messages=2000)
-"""How much later than due messages arrive: the path's own time, which is none of netem's."""
+"""Measures the path's own time, which is none of netem's."""
 CASES = (
     Case("normal", _NORMAL),
     Case("uniform", "delay 20ms 5ms"),

@@ -1,4 +1,4 @@
-"""What the kernel's netem does to messages in User-Mode Linux, beside our model, which is given the same send times."""
+"""The kernel's netem in User-Mode Linux, beside our model with the same send times."""
 
 import dataclasses
 from pathlib import Path
@@ -17,11 +17,11 @@ from tests.netem.uml import provide, run_machine
 pytestmark = [pytest.mark.netem, pytest.mark.processes]
 
 ATTEMPTS = 3
-"""What misses is recorded again: one run in a hundred lies beyond a band of 99 %, and a busy host spoils some."""
+"""A miss is recorded again: one run in a hundred lies beyond a band of 99 %, and a busy host spoils some."""
 SEEDS, PAIRS = 20, 100
 STREAM_MEAN_MS, STREAM_SD_MS = 2.0, 1.0
 QUIET_SHARE = 0.05
-"""Of messages that the host held up: with more of them a miss says nothing."""
+"""The share of messages that the host held up, beyond which a miss says nothing."""
 HEADERS_BYTES = 42
 
 

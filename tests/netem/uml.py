@@ -40,13 +40,13 @@ sleep 10
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the machine is made of."""
+    """The parts of the machine."""
 
     kernel: Path
     modules: Path
     """The kernel's own folder of modules."""
     environment: dict[str, str]
-    """What `ip` and `tc` need to be found, and to find their libraries and tables."""
+    """The environment in which `ip` and `tc`, their libraries and tables are found."""
 
 
 def provide() -> Parts:
@@ -83,7 +83,7 @@ def _first(root: Path, *places: str) -> Path:
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """What is started here keeps to one processor, and goes before all else there where that is permitted.
+    """Keep children to one processor, with real-time priority where that is permitted.
 
     The machine's parts wake each other all the time: on two processors it takes three times as long.
     """

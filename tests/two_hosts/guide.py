@@ -32,12 +32,12 @@ class Step:
     command: str
 
     def filled_in(self, words: Mapping[str, str]) -> str:
-        """With what stands for the words in capitals; KeyError for one that the guide has not told yet."""
+        """Replace the words in capitals; KeyError for one that the guide has not given yet."""
         return _PLACEHOLDER.sub(lambda match: words[match[0]], self.command)
 
 
 def steps(path: Path = GUIDE) -> list[Step]:
-    """Its commands, in their order; AssertionError for one without a machine."""
+    """Read its commands, in order; AssertionError for one without a machine."""
     found: list[Step] = []
     named: list[str] = []
     paragraph = ""

@@ -24,7 +24,7 @@ PATIENCE_S = 60.0
 ATTEMPTS = 3
 MOST_GAP_MS = 1000.0
 NAME = "robot.lan"
-"""What the operator's host calls the robot's."""
+"""The robot's name on the operator's host."""
 NOBODY = "198.18.0.99"
 """An address without a machine."""
 _CLOCK_AHEAD_S = 100_000
@@ -62,7 +62,7 @@ class Host:
         return replace(self, home=self.home.with_name(f"{self.home.name}-{name}"))
 
     def run(self, command: str, *, codes: tuple[int, ...] = (0,)) -> str:
-        """What a shell there prints; AssertionError when it ends with another code."""
+        """Run a shell command there; AssertionError when it ends with another code."""
         done = subprocess.run(
             [*self.surroundings(), "sh", "-c", command],
             capture_output=True,
@@ -120,17 +120,17 @@ class Lan:
         self.doctor: str | None = None
         """The guide's command line that looks at the way."""
         self.words: dict[str, str] = {"ROBOT": NAME}
-        """What stands for the guide's words in capitals."""
+        """Values of the guide's words in capitals."""
         self._addresses = (robot.address, operator.address)
         self._sides: dict[str, Side] = {}
         self.mended = 0
-        """How many failures `mend` has come after."""
+        """The session's failures at the last `mend`."""
         operator.own_files.mkdir(parents=True)
         (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
         self.tell_name(robot.address)
 
     def tell_name(self, address: str | None) -> None:
-        """What the operator's host takes the robot's name for; None: it does not know, and no name server answers."""
+        """Set the robot's address on the operator's host; None: unknown, and no name server answers."""
         names = "127.0.0.1 localhost\n" + (f"{address} {NAME}\n" if address else "")
         # In its place: the running programs have this very file for /etc/hosts.
         with (self.operator_host.machine.own_files / "hosts").open("w", encoding="ascii") as hosts:

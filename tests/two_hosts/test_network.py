@@ -1,4 +1,4 @@
-"""What a network does to a link: cables, addresses, firewalls, small packets, name servers."""
+"""A network's faults on a link: cables, addresses, firewalls, small packets, name servers."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Who else comes, and sides that die, start in the other order, or have their wall clock set."""
+"""Second operators, and sides that die, start in the other order, or have their wall clock set."""
 
 import json
 import time

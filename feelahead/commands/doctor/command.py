@@ -27,7 +27,7 @@ _WIDTH_WITHOUT_TERMINAL: Final = 120
 
 @dataclass(frozen=True)
 class DoctorSettings:
-    """What is missing on this machine, and the command that mends it.
+    """Say what is missing on this machine, and the command that mends it.
 
     Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
     without, "missing" is what does not work as it is.
@@ -46,13 +46,13 @@ class DoctorSettings:
     compile: bool = False
     """Compile the robot side's kernels now."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where a robot side should listen: look at the way there."""
+    """Look at the way to a robot side that should listen there."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where it should publish what the screen shows; the port after the control port unless given."""
+    """The robot side's view port; the port after the control port unless given."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """As for feelahead-operator: the folder with the operator's key."""
+    """The folder with the operator's key, like feelahead-operator's."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
-    """With --keys: the robot side's public key."""
+    """The robot side's public key; needs --keys."""
 
     def __post_init__(self) -> None:
         for name in ("view_connect", "keys", "robot_key"):

@@ -1,4 +1,4 @@
-"""What a real controller needs, hidapi, permission, and to be there; and what a virtual one needs."""
+"""Checks of a real controller (hidapi, permission, connection) and of a virtual one."""
 
 import importlib.metadata
 import os
@@ -21,10 +21,10 @@ _UHID: Final = "/dev/uhid"
 
 @dataclass(frozen=True)
 class HidFacts:
-    """What is installed under the names that hidapi goes by."""
+    """The packages installed under hidapi's names."""
 
     version: str | None
-    """Of the package hidapi; None where it is not installed."""
+    """The package hidapi's; None where it is not installed."""
     packages_of_hid: tuple[str, ...]
     """All that install a module called `hid`."""
     trouble: str | None

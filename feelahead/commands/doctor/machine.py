@@ -1,4 +1,4 @@
-"""What this machine has and grants: Python, packages, compiled kernels, rendering, priority, ports."""
+"""Checks of this machine: Python, packages, compiled kernels, rendering, priority, ports."""
 
 import json
 import os
@@ -35,7 +35,7 @@ _PURPOSES: Final = {
 }
 COMPILE: Final = "feelahead doctor --compile"
 RENDERING: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""As robot_side/cameras tries them."""
+"""The order of robot_side/cameras."""
 RENDERING_PACKAGES: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 PORTS: Final = {
     5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
@@ -71,12 +71,12 @@ _REALTIME: Final = "import json; from common.realtime.priority import make_realt
 
 @dataclass(frozen=True)
 class KernelFacts:
-    """How many kernels there are, and how many of them are not compiled."""
+    """Counts of kernels, and of those not compiled."""
 
     kernels: int
     missing: int
     folder: str
-    """Where their machine code is kept."""
+    """The folder of their machine code."""
     writable: bool
 
 
@@ -191,7 +191,7 @@ def realtime_notes() -> list[str]:
 
 
 def port_troubles() -> dict[int, str | None]:
-    """For each default port why it cannot be bound on loopback; None if it can."""
+    """Try each default port on loopback: the reason why it cannot be bound, or None."""
     return {port: _trouble_at(port) for port in PORTS}
 
 

@@ -1,4 +1,4 @@
-"""What the demo passes on to the two sides, and what it says when something ends early."""
+"""The demo's arguments to the two sides, and its words when something ends early."""
 
 import json
 import os

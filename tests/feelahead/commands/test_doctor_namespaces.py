@@ -58,7 +58,7 @@ class Desk:
                 process.communicate(timeout=LIMIT_S)
 
     def doctor(self, connect: str = CONTROL) -> dict[str, Any]:
-        """What the doctor says on the operator's machine."""
+        """Run the doctor on the operator's machine."""
         program = [*self.operator, sys.executable, "-m", "feelahead", "doctor", "--json", "--connect", connect]
         done = subprocess.run(program, check=False, capture_output=True, text=True, cwd=ROOT, timeout=LIMIT_S)
         told: dict[str, Any] = json.loads(done.stdout)

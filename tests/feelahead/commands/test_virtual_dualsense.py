@@ -30,7 +30,7 @@ INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
 
 
 def lived(kernel: FakeKernel, settings: VirtualDualSenseSettings) -> list[str]:
-    """What a controller says in its life."""
+    """Run a controller's life; return its lines."""
     lines: list[str] = []
     live(settings, kernel, kernel.clock, lambda: False, lines.append)
     return lines

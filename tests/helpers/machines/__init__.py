@@ -1,1 +1,1 @@
-"""What the suites that need a machine share."""
+"""Helpers of the suites that need a machine."""

@@ -36,7 +36,7 @@ def install(packages: Sequence[str], program: str) -> None:
 
 
 def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None, folder: Path | None = None) -> str:
-    """What a command prints that provides something; skips the test with its last word where it fails."""
+    """Run a command that provides something; skips the test with its last words where it fails."""
     environment = os.environ | dict(settings or {})
     try:
         done = subprocess.run(
@@ -68,7 +68,7 @@ class Apt:
         self._archives = folder / "archives"
 
     def run(self, program: str, *words: str) -> str:
-        """What `apt-get` or `apt-cache` says; skips the test where it fails."""
+        """Run `apt-get` or `apt-cache`; skips the test where it fails."""
         return run_or_skip([program, *self._options, *words], {"LC_ALL": "C"}, self._archives)
 
     def missing_for(self, package: str) -> list[str]:
@@ -114,7 +114,7 @@ def _download(cache: Path, packages: Callable[[Apt], list[str]]) -> None:
 
 
 def library_path(root: Path) -> dict[str, str]:
-    """What programs from unpacked packages need in their environment to find their libraries."""
+    """The environment in which programs of unpacked packages find their libraries."""
     folders = {str(path.parent) for place in _LIBRARIES for path in (root / place).rglob("*.so*")}
     return {"LD_LIBRARY_PATH": ":".join(sorted(folders))}
 

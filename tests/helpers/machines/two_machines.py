@@ -15,7 +15,7 @@ import pytest
 
 _PREFIX_BITS = 24
 _FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
-"""Of the namespaces, and of the files that `ip` puts into their places in each."""
+"""Folders of the namespaces, and of the files that `ip` mounts in each."""
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Machine:
 
     namespace: str
     device: str
-    """Its end of the cable."""
+    """The device at this end of the cable."""
     address: str
 
     @property
@@ -34,7 +34,7 @@ class Machine:
 
     @property
     def own_files(self) -> Path:
-        """What lies in this folder is /etc's of the same name to programs that are started there afterwards."""
+        """The folder whose files replace /etc's of the same name for programs started there."""
         return Path("/etc/netns") / self.namespace
 
     def unplug(self) -> None:
@@ -42,11 +42,11 @@ class Machine:
         self.set_link("down")
 
     def plug_in(self) -> None:
-        """And in again."""
+        """Plug the cable in."""
         self.set_link("up")
 
     def set_link(self, *words: str) -> None:
-        """As `ip link set DEVICE` does."""
+        """Run `ip link set DEVICE WORDS`."""
         _ip("-n", self.namespace, "link", "set", self.device, *words)
 
     def readdress(self, address: str) -> None:
@@ -87,7 +87,7 @@ def _connect(one: Machine, other: Machine) -> None:
 
 
 def _delete_left_behind() -> None:
-    """What is left of runs that were killed: the names end with a process that is no more."""
+    """Delete namespaces of killed runs: the names end with a process that is gone."""
     for folder in _FOLDERS:
         for left in folder.glob("feelahead-*-*"):
             owner = left.name.rpartition("-")[2]

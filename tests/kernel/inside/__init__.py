@@ -1,1 +1,1 @@
-"""What pytest runs inside the machine: the kernel's driver and ours on a virtual controller."""
+"""Tests that pytest runs inside the machine: the kernel's driver and ours on a virtual controller."""

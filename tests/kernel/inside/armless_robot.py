@@ -25,7 +25,7 @@ class ArmlessRobot(ServingRobot):
 
     @property
     def flags(self) -> list[str]:
-        """How an operator side finds it."""
+        """The operator side's flags to find it."""
         return [f"--connect={self.control}", f"--view-connect={self.view}"]
 
     @property

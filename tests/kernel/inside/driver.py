@@ -1,4 +1,4 @@
-"""What the kernel's own driver makes of the virtual controller, seen as games see it."""
+"""The kernel's own driver on the virtual controller, seen like games see it."""
 
 import contextlib
 import math

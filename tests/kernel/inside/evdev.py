@@ -24,7 +24,7 @@ _EV_FF, _FF_RUMBLE, _NEW_EFFECT = 0x15, 0x50, -1
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Where it stands, and what that means."""
+    """An axis's value and range."""
 
     value: int
     minimum: int

@@ -1,4 +1,4 @@
-"""What the kernel shows of a controller under /sys."""
+"""The kernel's view of a controller under /sys."""
 
 from pathlib import Path
 

@@ -29,7 +29,7 @@ CALIBRATION: Final = CalibrationReport(
     acceleration_plus=(8250, 8200, 8100),
     acceleration_minus=(-8130, -8190, -8240),
 )
-"""As unlike for each axis as real ones are, but for the gyroscope's bias: Linux 6.1 takes it off, later ones do not."""
+"""Differs for each axis like real ones, but for the gyroscope's bias: Linux 6.1 subtracts it, later ones do not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Lines for people."""
         return f"{self.model.title} on {self.transport.value}"
 
 
@@ -88,7 +88,7 @@ class Plugged:
             raise failure
 
     def ask(self, function: Callable[[SimulatedDualSense], Value]) -> Value:
-        """What `function` says of the simulated controller, in the thread that it lives in."""
+        """Call `function` on the simulated controller in its own thread."""
         answers: deque[Value] = deque()
         thread = self._thread
         if thread is None:
