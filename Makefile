@@ -46,24 +46,28 @@ quick: $(VENV)/.installed $(VENV)/.test-models ## the same without the tests tha
 	@$(MAKE) --no-print-directory --jobs=2 types $(VENV)/.kernels
 	$(PYTEST) -m "not processes and not install and not long" $(ARGS)
 
-# Needs a Debian machine or container and, the first time, a network; it says so and is skipped elsewhere.
-test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
-	$(BIN)/python -m tests.kernel $(ARGS)
+# Each needs a machine of its own; pytest says what is missing, and skips it. ARGS="-k words" chooses tests.
+SUITE = $(BIN)/python -m pytest -s -v
 
-# Needs root and iproute2; it says so and is skipped elsewhere.
+# Needs Debian's packages of a kernel and QEMU, unpacked into a cache; ARGS go to the pytest inside the machine.
+test-kernel: export INSIDE = $(ARGS)
+test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
+	$(SUITE) -m kernel tests/kernel
+
+# Needs root and iproute2.
 test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, followed on two hosts in network namespaces
-	$(BIN)/python -m tests.two_hosts $(ARGS)
+	$(SUITE) -m two_hosts tests/two_hosts $(ARGS)
 
 test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
-	$(BIN)/python -m tests.netem $(ARGS)
+	$(SUITE) -m netem tests/netem $(ARGS)
 
-# Needs Docker; in CI, root gets Debian's for the time being. It says so and is skipped elsewhere.
+# Needs Docker; in CI, root gets Debian's for the time being.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
-	$(BIN)/python -m tests.containers $(ARGS)
+	$(SUITE) -m containers tests/containers $(ARGS)
 
-# Needs Chromium; in CI, root gets Debian's. It says so and is skipped elsewhere.
+# Needs Chromium; in CI, root gets Debian's.
 test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real browser, clicked through; its pictures: console-pictures
-	$(BIN)/python -m tests.console $(ARGS)
+	$(SUITE) -m console tests/console $(ARGS)
 
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
 pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console, terminal view and plot, made anew

@@ -1,1 +1,1 @@
-"""What people type after `feelahead`."""
+"""Commands that people type after `feelahead`."""

@@ -1,4 +1,4 @@
-"""What a person sees while a controller is calibrated."""
+"""The screen while a controller is calibrated."""
 
 from rich.console import Group, RenderableType
 from rich.progress_bar import ProgressBar
@@ -11,11 +11,11 @@ from operator_side.hands.travel_calibration import StickRest, TravelCalibration,
 
 _BAR = 40
 _STEPS = len(Step) - 1
-"""What a person has to do."""
+"""The steps that a person has to do."""
 
 
 def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) -> RenderableType:
-    """What to do now, and live bars of what the controller reports."""
+    """Draw the present step, and live bars of the controller's report."""
     number = list(Step).index(procedure.step) + 1
     table = Table.grid(padding=(0, 2))
     for name, raw in (("L2", state.l2), ("R2", state.r2)):

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 import tyro
+from msgspec import Meta
 
 from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import LINK_UP, Value
@@ -21,6 +22,7 @@ from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
+from common.limits import check_limits
 from common.protocol.messages import Compensation
 from common.recording.side import Recorder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
@@ -37,7 +39,7 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "haptics"),
     ("to_operator", "telemetry"),
 )
-"""What the two sides send to each other."""
+"""The streams between the two sides."""
 _ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
 
 
@@ -52,19 +54,19 @@ class DemoSettings(RunOptions):
     """
 
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
-    """What stands around the built-in arm's target. table: a cluttered table, unless given. wall: a wall 10 to 60 mm
+    """The things around the built-in arm's target. table: a cluttered table, unless given. wall: a wall 10 to 60 mm
     behind it. slot: two posts on the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front
     edge has to be reached over. The last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
-    """How long to run from the moment that the link is up."""
+    """The run's length, from the moment that the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
+    """The share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength is due."""
     law: Literal["swept", "paper"] = "swept"
-    """How what is ahead is felt: in time to let go, along each trigger; or by the paper's plain law."""
+    """The law of what is felt ahead. swept: in time to let go, along each trigger; paper: the paper's plain law."""
     compensation: Compensation = "operator"
-    """Who reckons with the delay: the operator side by the commands under way, or the robot side by v t_d (eq. 8)."""
+    """The side that reckons with the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""
     haptics: bool = True
     """Whether the triggers are stiffened; without, the same person sees only."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
@@ -75,8 +77,8 @@ class DemoSettings(RunOptions):
     """Real-time scheduling and locked memory for both sides, where that is permitted."""
     console: bool = True
     """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
-    console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
-    """Where the console's page is on this machine; 0: any port that is free."""
+    console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
+    """The port of the console's page on this machine; 0: any that is free."""
     tui: bool = False
     """The whole terminal instead of a line, for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -86,8 +88,7 @@ class DemoSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.console_port <= 65535:
-            raise ValueError(f"--console-port {self.console_port}: valid: 0 to 65535")
+        check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.scene is not None and self.model is not None:
@@ -196,7 +197,7 @@ def _operator_arguments(
 
 
 def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
-    """Only what somebody asked for: the sides' own files are to count where nothing was."""
+    """Pass on the flags that were given: elsewhere the sides' own files count."""
     arguments = [
         f"--{name.replace('_', '-')}={getattr(settings, name)}"
         for name in ("link", "link_model", "link_correlation", "asymmetry", "seed")
@@ -287,7 +288,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
 
 
 def _placed(placing: Mapping[str, Any]) -> str:
-    """What came of setting it down."""
+    """Say how the target was set down."""
     if not placing["placed"]:
         return "not placed"
     felt = "not felt before it was touched"

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
+from common.limits import check_limits
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 
@@ -30,18 +32,15 @@ class ReplaySettings:
     check: bool = False
     """Compute every stiffness, command and report to the controller anew from the recorded inputs, and compare. Exit
     code 1 where they differ by more than another processor may: 1 of 8 in strength, 1e-12 m in ways."""
-    speed: float = 1.0
-    """How many times as fast as it was to show it."""
+    speed: Annotated[float, Meta(ge=0.01, le=1000.0)] = 1.0
+    """The playing speed, 1 being the recorded one."""
     tui: bool = False
     """On the whole terminal, instead of the console's page."""
-    console_port: int = 0
-    """Where the page is on this machine; 0: any port that is free."""
+    console_port: Annotated[int, Meta(ge=0, le=65535)] = 0
+    """The page's port on this machine; 0: any that is free."""
 
     def __post_init__(self) -> None:
-        if not 0.01 <= self.speed <= 1000.0:
-            raise ValueError(f"--speed {self.speed}: valid: 0.01 to 1000")
-        if not 0 <= self.console_port <= 65535:
-            raise ValueError(f"--console-port {self.console_port}: valid: 0 to 65535")
+        check_limits(self)
 
 
 @dataclass(frozen=True)
@@ -55,10 +54,9 @@ class ExportSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     format: Literal["csv", "parquet", "lerobot", "mcap"] = "csv"
-    """What to make of it."""
+    """The format to write."""
     out: Path | None = None
-    """Where: a folder that is not there yet or empty, or for mcap a file; unless given, beside the recording, named
-    after it."""
+    """A new or empty folder, or for mcap a file; unless given, beside the recording, named after it."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class PlotSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     out: Path | None = None
-    """Where: a file that ends in .png, .svg or .pdf; beside the recording as .png unless given."""
+    """A file that ends in .png, .svg or .pdf; beside the recording as .png unless given."""
 
 
 def _open(path: Path | None) -> Recording:
@@ -98,17 +96,13 @@ def replay(arguments: Sequence[str]) -> int:
     """Show or check."""
     settings = parse_settings(ReplaySettings, "feelahead replay", arguments)
     with _recording(settings.file) as recording:
-        return _replay(settings, recording)
+        if settings.check:
+            return _check(recording)
+        from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415
 
-
-def _replay(settings: ReplaySettings, recording: Recording) -> int:
-    if settings.check:
-        return _check(recording)
-    from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415
-
-    if settings.tui:
-        return play_in_terminal(recording, settings.speed)
-    return play_on_page(recording, settings.speed, settings.console_port)
+        if settings.tui:
+            return play_in_terminal(recording, settings.speed)
+        return play_on_page(recording, settings.speed, settings.console_port)
 
 
 def _check(recording: Recording) -> int:
@@ -116,17 +110,16 @@ def _check(recording: Recording) -> int:
         from feelahead.recordings.replay import replay_operator, replay_robot  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise ConfigurationError(f"replay: {error.name} is not installed; {_BOTH_SIDES}") from error
-    within, made = True, 0
-    for side, make in (("robot", replay_robot), ("operator", replay_operator)):
-        if side in recording.headers:
-            compared = make(recording)
-            within &= compared.within
-            made += compared.made
-            sys.stdout.write("\n".join(compared.lines()) + "\n")
-    if not made:
-        sys.stdout.write("nothing was compared: it holds nothing to make anew\n")
-        return 1
-    sys.stdout.write("the same, within what is promised\n" if within else "NOT the same\n")
+    sides = {"robot": replay_robot, "operator": replay_operator}
+    compared = [make(recording) for side, make in sides.items() if side in recording.headers]
+    said = [line for one in compared for line in one.lines()]
+    within = all(one.within for one in compared)
+    if not sum(one.made for one in compared):
+        said.append("nothing was compared: it holds nothing to make anew")
+        within = False
+    else:
+        said.append("the same, within what is promised" if within else "NOT the same")
+    sys.stdout.write("\n".join(said) + "\n")
     return 0 if within else 1
 
 
@@ -134,33 +127,31 @@ def export(arguments: Sequence[str]) -> int:
     """Write the files."""
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
     with _recording(settings.file) as recording:
-        return _export(settings, recording)
+        if settings.format == "mcap":
+            from common.recording.mending import mend  # noqa: PLC0415
+
+            out = settings.out or recording.path.with_name(f"{recording.path.stem}-whole.mcap")
+            said = f"{out}: {mend(recording.path, out)} messages"
+        else:
+            if settings.format != "csv":
+                require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")
+            beside = recording.path.with_name(f"{recording.path.stem}-{settings.format}")
+            folder = _empty_folder(settings.out or beside)
+            said = f"{folder}: {_export(settings.format, recording, folder)}"
+    sys.stdout.write(f"{said}\n")
+    return 0
 
 
-def _export(settings: ExportSettings, recording: Recording) -> int:
-    if settings.format == "mcap":
-        from common.recording.mending import mend  # noqa: PLC0415
-
-        out = settings.out or recording.path.with_name(f"{recording.path.stem}-whole.mcap")
-        sys.stdout.write(f"{out}: {mend(recording.path, out)} messages\n")
-        return 0
-    if settings.format in ("parquet", "lerobot"):
-        require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")
-    folder = _empty_folder(settings.out or recording.path.with_name(f"{recording.path.stem}-{settings.format}"))
+def _export(kind: str, recording: Recording, folder: Path) -> str:
+    """Write a folder of tables, and say what was written."""
+    from feelahead.recordings.export_tables import export_csv, export_parquet  # noqa: PLC0415
+    from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
     from feelahead.recordings.tables import read_tables  # noqa: PLC0415
 
     tables = read_tables(recording)
-    if settings.format == "lerobot":
-        from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
-
-        count = export_lerobot(recording, tables, folder)
-        sys.stdout.write(f"{folder}: 1 episode, {count} frames\n")
-        return 0
-    from feelahead.recordings.export_tables import export_csv, export_parquet  # noqa: PLC0415
-
-    written = (export_csv if settings.format == "csv" else export_parquet)(tables, folder)
-    sys.stdout.write(f"{folder}: {', '.join(written)}\n")
-    return 0
+    if kind == "lerobot":
+        return f"1 episode, {export_lerobot(recording, tables, folder)} frames"
+    return ", ".join((export_csv if kind == "csv" else export_parquet)(tables, folder))
 
 
 def _empty_folder(path: Path) -> Path:
@@ -178,19 +169,15 @@ def plot(arguments: Sequence[str]) -> int:
     """Draw the page."""
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
     with _recording(settings.file) as recording:
-        return _plot(settings, recording)
+        out = recording.path.with_suffix(".png") if settings.out is None else settings.out
+        if out.suffix not in (".png", ".svg", ".pdf"):
+            raise ConfigurationError(f"--out {out}: valid: a file that ends in .png, .svg or .pdf")
+        if not out.absolute().parent.is_dir():
+            raise ConfigurationError(f"--out {out}: its folder is not there; valid: a file's path")
+        require_packages("plot", "matplotlib", extra="experiments")
+        from feelahead.recordings.plot import plot_run  # noqa: PLC0415
+        from feelahead.recordings.tables import read_tables  # noqa: PLC0415
 
-
-def _plot(settings: PlotSettings, recording: Recording) -> int:
-    out = recording.path.with_suffix(".png") if settings.out is None else settings.out
-    if out.suffix not in (".png", ".svg", ".pdf"):
-        raise ConfigurationError(f"--out {out}: valid: a file that ends in .png, .svg or .pdf")
-    if not out.absolute().parent.is_dir():
-        raise ConfigurationError(f"--out {out}: its folder is not there; valid: a file's path")
-    require_packages("plot", "matplotlib", extra="experiments")
-    from feelahead.recordings.plot import plot_run  # noqa: PLC0415
-    from feelahead.recordings.tables import read_tables  # noqa: PLC0415
-
-    plot_run(recording, read_tables(recording), out)
+        plot_run(recording, read_tables(recording), out)
     sys.stdout.write(f"{out}\n")
     return 0

@@ -24,7 +24,7 @@ from operator_side.terminal_view.status import TerminalStatus
 _PROGRAM: Final = "feelahead replay"
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 0.25
-"""In one step: a machine that was suspended misses nothing."""
+"""The longest step: a machine that was suspended misses nothing."""
 _STATE_PERIOD_S: Final = 0.1
 
 
@@ -103,7 +103,7 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
 
 
 def _passing(goes_on: Callable[[float], bool]) -> Iterator[float]:
-    """What time has passed, again and again, as long as `goes_on(seconds)` says so, which lets that much pass."""
+    """Yield the time passed at each step, as long as `goes_on(seconds)` holds; it waits that long."""
     clock = MonotonicClock()
     before_s = clock.now()
     while goes_on(_STEP_S):

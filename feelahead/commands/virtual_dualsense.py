@@ -6,10 +6,12 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.limits import check_limits
 from operator_side.dualsense.effects.official import AnyEffect
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
@@ -35,17 +37,16 @@ class VirtualDualSenseSettings:
     """
 
     transport: Literal["usb", "bluetooth"] = "usb"
-    """What it seems to be connected by."""
+    """The transport that it seems to use."""
     edge: bool = False
     """A DualSense Edge."""
-    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Unplug it after this long; without it, at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
-    """Nobody touches it, or somebody pulls R2 and L2 in turn and moves the left stick round."""
+    """none: no hands; pulling: R2 and L2 in turn, and the left stick round."""
 
     def __post_init__(self) -> None:
-        if self.duration is not None and not 0.0 < self.duration < 1e6:
-            raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
+        check_limits(self)
 
 
 def virtual_dualsense(arguments: Sequence[str]) -> int:
@@ -112,15 +113,15 @@ class _Narrated:
         self._shown = self._told()
 
     def read(self, now_s: float) -> bytes | None:
-        """As the controller's own."""
+        """Pass on the controller's own answer."""
         return self._controller.read(now_s)
 
     def get_feature(self, report_id: int) -> bytes:
-        """As the controller's own."""
+        """Pass on the controller's own answer."""
         return self._controller.get_feature(report_id)
 
     def write(self, report: bytes, now_s: float) -> None:
-        """As the controller's own, and say what is new."""
+        """Pass the report to the controller, and say the changes."""
         self._controller.write(report, now_s)
         told = self._told()
         for part, doing in told.items():
@@ -144,7 +145,7 @@ class _Narrated:
 
 
 def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
-    """What the hands do after `time_s`: the forces on L2 and R2 in N, and the left stick (x, y)."""
+    """The hands at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
     turns = time_s / PULL_PERIOD_S
     pull_n = NORMAL_FINGER_FORCE_N * (1.0 - math.cos(2.0 * math.tau * turns)) / 2.0
     stick = (_STICK_RADIUS * math.cos(math.tau * turns), _STICK_RADIUS * math.sin(math.tau * turns))

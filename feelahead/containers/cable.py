@@ -3,16 +3,18 @@
 import ipaddress
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from common.emulation.spec import Direction
 
-PORTS: Final = (5555, 5556)
+PORTS: Final = "5555, 5556"
 """Control and view."""
 _SEGMENTING: Final = "tbf rate 2gbit burst {burst} limit 10mb"
 """Cuts what a sender left to its interface to cut: netem is to see packets as a wire has them."""
 _HEADERS_BYTES: Final = 100
-"""Of the frame, around what the interface's limit counts."""
+"""The frame's bytes that the interface's limit does not count."""
+HANDLES: Final[Mapping[Direction, str]] = {direction: f"{n}:" for n, direction in enumerate(get_args(Direction), 2)}
+"""Handles that distinguish the two directions' netem."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +24,8 @@ class End:
     name: str
     number: int
     """The kernel's; another one when the interface went and came back."""
-    mac: str
     address: str
-    """With the length of the network's prefix."""
+    """The address with the network's prefix length."""
     mtu: int = 1500
 
 
@@ -35,27 +36,17 @@ class Cable:
     robot: End
     operator: End
     robot_address: str
-    """Of the robot side itself."""
-
-    @property
-    def mtu(self) -> int:
-        """The largest packet of either network, in bytes."""
-        return max(self.robot.mtu, self.operator.mtu)
-
-    def leaves(self) -> dict[Direction, str]:
-        """The interface by which each direction leaves the router."""
-        return {"to_robot": self.robot.name, "to_operator": self.operator.name}
+    """The robot side's own address."""
 
     def rules(self) -> str:
         """For nft, which applies all or nothing: pass the ports on, under our own address, and nothing else."""
-        ports = ", ".join(map(str, PORTS))
         return f"""
             table ip feelahead
             delete table ip feelahead
             table ip feelahead {{
                 chain there {{
                     type nat hook prerouting priority dstnat;
-                    iifname "{self.operator.name}" tcp dport {{ {ports} }} dnat to {self.robot_address}
+                    iifname "{self.operator.name}" tcp dport {{ {PORTS} }} dnat to {self.robot_address}
                 }}
                 chain under_our_address {{
                     type nat hook postrouting priority srcnat;
@@ -63,34 +54,36 @@ class Cable:
                 }}
                 chain only_these {{
                     type filter hook forward priority filter; policy drop;
-                    iifname "{self.operator.name}" oifname "{self.robot.name}" tcp dport {{ {ports} }} accept
+                    iifname "{self.operator.name}" oifname "{self.robot.name}" tcp dport {{ {PORTS} }} accept
                     iifname "{self.robot.name}" ct state established accept
                 }}
             }}
             """
 
+    def delays(self, words: Mapping[Direction, str]) -> list[list[str]]:
+        """The commands that delay what leaves towards each side."""
+        ends: Mapping[Direction, End] = {"to_robot": self.robot, "to_operator": self.operator}
+        mtu = max(self.robot.mtu, self.operator.mtu)
+        return [line for direction, end in ends.items() for line in delay(end.name, direction, words[direction], mtu)]
 
-def delays(leaves: Mapping[Direction, str], words: Mapping[Direction, str], mtu: int = 1500) -> list[list[str]]:
-    """The commands that delay what leaves towards each side: a cutter, and netem behind it."""
-    commands = []
-    for direction, interface in leaves.items():
-        queue = ["tc", "qdisc", "replace", "dev", interface]
-        cutter = _SEGMENTING.format(burst=mtu + _HEADERS_BYTES).split()
-        commands.append([*queue, "root", "handle", "1:", *cutter])
-        commands.append([*queue, "parent", "1:", "handle", "2:", "netem", *words[direction].split()])
-    return commands
+
+def delay(interface: str, direction: Direction, words: str, mtu: int = 1500) -> list[list[str]]:
+    """The commands that delay what leaves by an interface: a cutter, and netem behind it."""
+    queue = ["tc", "qdisc", "replace", "dev", interface]
+    cutter = _SEGMENTING.format(burst=mtu + _HEADERS_BYTES).split()
+    netem = ["parent", "1:", "handle", HANDLES[direction], "netem", *words.split()]
+    return [[*queue, "root", "handle", "1:", *cutter], [*queue, *netem]]
 
 
 def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> Cable | None:
     """The cable among what `ip -json address` shows; None unless there is one interface with an address each way."""
-    robots: list[End] = []
-    others: list[End] = []
+    ends: dict[bool, list[End]] = {True: [], False: []}
     for shown in interfaces:
         for held in shown["addr_info"]:
-            if held["family"] != "inet" or shown["ifname"] == "lo":
-                continue
-            address = f"{held['local']}/{held['prefixlen']}"
-            end = End(shown["ifname"], shown["ifindex"], shown["address"], address, shown["mtu"])
-            near = ipaddress.ip_address(robot_address) in ipaddress.ip_interface(end.address).network
-            (robots if near else others).append(end)
-    return Cable(robots[0], others[0], robot_address) if len(robots) == len(others) == 1 else None
+            if held["family"] == "inet" and shown["ifname"] != "lo":
+                end = End(shown["ifname"], shown["ifindex"], f"{held['local']}/{held['prefixlen']}", shown["mtu"])
+                near = ipaddress.ip_address(robot_address) in ipaddress.ip_interface(end.address).network
+                ends[near].append(end)
+    if len(ends[True]) != 1 or len(ends[False]) != 1:
+        return None
+    return Cable(ends[True][0], ends[False][0], robot_address)

@@ -38,11 +38,11 @@ class Engine:
         self._compose = self._find_compose()
 
     def docker(self, *words: str) -> str:
-        """What `docker WORDS` prints; EngineError when it fails."""
+        """Run `docker WORDS` and return its output; EngineError when it fails."""
         return self._run(["docker", *words], self._environment, _LIMIT_S)
 
     def compose(self, *words: str, settings: Mapping[str, str] | None = None, limit_s: float = _LIMIT_S) -> str:
-        """What `docker compose WORDS` prints, for this project; `settings`: the variables of compose.yaml."""
+        """Run `docker compose WORDS` for this project; `settings`: the variables of compose.yaml."""
         project = ["--project-name", self.project, "--file", str(COMPOSE_FILE)]
         return self._run([*self._compose, *project, *words], self._environment | dict(settings or {}), limit_s)
 
@@ -62,7 +62,7 @@ class Engine:
         return found[0]
 
     def inspect(self, container: str) -> dict[str, Any]:
-        """What the engine knows of a container."""
+        """Return `docker inspect` of a container."""
         [known] = json.loads(self.docker("inspect", container))
         return dict(known)
 
@@ -79,7 +79,7 @@ class Engine:
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """What commands of the engine have to run in."""
+        """The environment of the engine's commands."""
         return self._environment
 
     def _find_compose(self) -> list[str]:

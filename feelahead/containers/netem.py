@@ -8,6 +8,7 @@ from common.emulation.distribution import DelayTable
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec
 from common.errors import FeelaheadError
+from feelahead.containers.cable import HANDLES
 
 CARRIED: tuple[Literal["haptics", "telemetry"], ...] = ("haptics", "telemetry")
 """The streams that travel between the sides, over one cable here."""
@@ -19,7 +20,7 @@ class BeyondNetemError(FeelaheadError):
 
 
 def netem_words(link: LinkSpec) -> dict[Direction, str]:
-    """For each direction the arguments of `tc qdisc ... netem`; BeyondNetemError where they would mean something else.
+    """Return each direction's arguments of `tc qdisc ... netem`; BeyondNetemError where netem cannot do it.
 
     netem sees packets, not messages and not streams: both ports of a direction share one cable.
     """
@@ -34,7 +35,7 @@ class Counted:
     dropped: int
 
     def lost_share_since(self, before: "Counted") -> float | None:
-        """Of everything that came since `before`; None where nothing did, or netem was set up anew meanwhile."""
+        """The share lost since `before`; None where nothing came, or netem was set up again."""
         if self.sent < before.sent or self.dropped < before.dropped:
             return None
         dropped = self.dropped - before.dropped
@@ -42,13 +43,13 @@ class Counted:
         return dropped / came if came > 0 else None
 
 
-def count_packets(queues: Iterable[Mapping[str, Any]], interfaces: Mapping[Direction, str]) -> dict[Direction, Counted]:
-    """For each direction what `tc -statistics -json qdisc show` says of the netem on the interface towards it."""
-    by_interface = {queue["dev"]: queue for queue in queues if queue["kind"] == "netem"}
+def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counted]:
+    """Read each direction's netem from `tc -statistics -json qdisc show`."""
+    netems = {queue["handle"]: queue for queue in queues if queue["kind"] == "netem"}
     return {
-        direction: Counted(by_interface[name]["packets"], by_interface[name]["drops"])
-        for direction, name in interfaces.items()
-        if name in by_interface
+        direction: Counted(netems[handle]["packets"], netems[handle]["drops"])
+        for direction, handle in HANDLES.items()
+        if handle in netems
     }
 
 

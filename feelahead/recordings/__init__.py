@@ -1,1 +1,1 @@
-"""What is done with a recording afterwards: computed anew, shown, exported, drawn."""
+"""Recordings computed again, shown, exported, drawn."""

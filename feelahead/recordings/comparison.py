@@ -1,4 +1,4 @@
-"""What came out of a core the second time beside the first: equal bit for bit, or by how much not."""
+"""Compare a core's second output with the first: equal bit for bit, or the largest difference."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -19,11 +19,11 @@ _NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 @dataclass
 class Comparison:
-    """Of one side."""
+    """One side's comparison."""
 
     side: str
     counted: str
-    """What `made` counts"""
+    """The name of the things that `made` counts"""
     made: int = 0
     equal: int = 0
     others: int = 0
@@ -32,9 +32,9 @@ class Comparison:
     worst_eighths: float = 0.0
     """The largest difference of a strength; infinite where a message is missing or another one"""
     worst_m: float = 0.0
-    """And of a way"""
+    """The largest difference of a distance"""
     notes: list[str] = field(default_factory=list)
-    """What a person should know"""
+    """Notes for people"""
 
     @property
     def within(self) -> bool:
@@ -60,7 +60,7 @@ class Comparison:
         self.worst_m = max(self.worst_m, metres)
 
     def lines(self) -> list[str]:
-        """For people."""
+        """Lines for people."""
         difference = "none"
         if not math.isfinite(self.worst_eighths):
             difference = "messages that are missing or say something else"
@@ -95,7 +95,7 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
-    """What this run is made from that the recorded one was not: then bits may differ."""
+    """Name the origins in which this run differs from the recorded one: then bits may differ."""
     differing = [name for name in present if recorded.get(name) != present[name]]
     return [
         f"recorded with {_difference(recorded.get(name), present[name], name)}: bits may differ" for name in differing

@@ -9,15 +9,15 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.view_messages import VIEW_NAMES
+from common.recording.images import read_image
 from common.recording.reading import Recording
-from feelahead.recordings.pictures import Picture, pictures
 from feelahead.recordings.tables import Table, Tables
 
 FRAMES_HZ: Final = 30
@@ -27,7 +27,7 @@ _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _STRENGTHS: Final = 8
 _ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
-"""So many give their statistics."""
+"""The number of pictures in the statistics."""
 _ACTION: Final = {
     "l2": "command.l2",
     "r2": "command.r2",
@@ -39,9 +39,18 @@ _ACTION: Final = {
 }
 
 
+class Picture(NamedTuple):
+    """One of a camera's."""
+
+    time_s: float
+    """Since the recording began"""
+    jpeg: bytes
+
+
 def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     """Write the dataset; how many frames. ConfigurationError for a recording without an arm or commands."""
     import pyarrow  # noqa: PLC0415
+    from PIL import Image  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
     joined = tables.joined(FRAMES_HZ)
@@ -64,7 +73,8 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
         if found:
             shown = _newest(found, times_s)
             key = f"observation.images.{view}"
-            height, width = found[0].height, found[0].width
+            with Image.open(io.BytesIO(found[0].jpeg)) as first_picture:
+                width, height = first_picture.size
             features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
             columns[key] = pyarrow.array(
                 [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
@@ -91,6 +101,13 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     (folder / "meta" / "info.json").write_text(json.dumps(_info(recording, features, count), indent=4) + "\n")
     (folder / "meta" / "stats.json").write_text(json.dumps(stats, indent=4) + "\n")
     return count
+
+
+def pictures(recording: Recording, view: str) -> list[Picture]:
+    """All that a camera took, in order."""
+    first_ns = recording.began_ns()
+    messages = recording.messages([f"/camera/{view}"])
+    return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:
@@ -121,7 +138,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
 
 
 def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """From where on there is something of everything that the format wants in every frame."""
+    """Find the first row that has every column which the format requires."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:
         needed += vectors["observation.stiffness"].values()
@@ -160,7 +177,7 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
-    """Of each colour, 0 to 1, as (3, 1, 1)."""
+    """Statistics of each colour, 0 to 1, (3, 1, 1)."""
     from PIL import Image  # noqa: PLC0415
 
     step = max(1, len(shown) // _SAMPLED_PICTURES)
@@ -172,7 +189,7 @@ def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
 
 
 def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """What the `datasets` library is told of a column."""
+    """The `datasets` library's description of a column."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     if feature["shape"] == [1]:

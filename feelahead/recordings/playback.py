@@ -14,7 +14,7 @@ FASTEST: Final = 1000.0
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a person wants of it; None: as it is."""
+    """A person's wish; None: no change."""
 
     paused: bool | None = None
     speed: float | None = None
@@ -29,13 +29,13 @@ class Playback:
         """Since the recording began"""
         self.length_s = recording.length_s()
         self.speed = speed
-        """How many times as fast as it was"""
+        """The playing speed, 1 being the recorded one"""
         self.paused = True
         self._recording = recording
         self._coming = seen(recording)
         self._jumped: list[Seen] = []
         self._newest: dict[str, Seen] = {}
-        """What is shown now, by name"""
+        """The things on show, by name"""
 
     @property
     def over(self) -> bool:
@@ -58,7 +58,7 @@ class Playback:
             self.paused = wish.paused
 
     def advance(self, passed_s: float) -> list[Seen]:
-        """What is to be shown after `passed_s` more seconds: after a jump the newest of each name, as it was then."""
+        """Advance by `passed_s` seconds; return what is due. After a jump that is the newest of each name."""
         due, self._jumped = self._jumped, []
         if not self.paused:
             self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
@@ -72,7 +72,7 @@ class Playback:
         self._jumped = _newest((*self._newest.values(), *self._jumped))
 
     def state(self) -> dict[str, Any]:
-        """For the page."""
+        """The state for the page."""
         return {"at_s": self.at_s, "length_s": self.length_s, "speed": self.speed, "paused": self.paused}
 
     def _jump(self, to_s: float) -> None:
@@ -91,5 +91,5 @@ class Playback:
 
 
 def _newest(many: Iterable[Seen]) -> list[Seen]:
-    """Of each name; the facts first, by whose clock pictures are old or not."""
+    """Keep the newest of each name; facts first, because pictures age by their clock."""
     return sorted({one.name: one for one in many}.values(), key=lambda one: one.kind != FACTS)

@@ -61,7 +61,7 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
             1,
             sharex=True,
             figsize=_INCHES,
-            height_ratios=[1.3, 1.1, 1.1, 1, 1, 1, 1],
+            height_ratios=_HEIGHTS,
             layout="constrained",
         )
         for axis, draw in zip(axes, panels, strict=True):

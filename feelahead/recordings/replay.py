@@ -42,13 +42,13 @@ class _Given:
         """Nothing moves."""
 
     def state(self, now_s: float) -> ArmState:
-        """As recorded."""
+        """Return the recorded one."""
         if self.newest_state is None:
             raise ConfigurationError(f"no state of the arm was recorded before {now_s}")
         return self.newest_state
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """As recorded."""
+        """Return the recorded one."""
         if self.newest_frame is None:
             raise ConfigurationError(f"no frame was recorded before {now_s}")
         return self.newest_frame
@@ -109,7 +109,7 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.STOPPED: lambda core, _, now_s: core.stop_button.press(now_s),
     Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
 }
-"""What an entry of the operator side was, that is no question to its core."""
+"""Inputs of the operator side's core, by the kind of entry."""
 
 
 def replay_operator(recording: Recording) -> Comparison:
@@ -144,6 +144,6 @@ def replay_operator(recording: Recording) -> Comparison:
 
 
 def _compare_rest(compared: Comparison, made: deque[bytes], *, report: bool = False) -> None:
-    """What was made and had not been recorded."""
+    """Compare the outputs that had not been recorded."""
     while made:
         compared.take(None, made.popleft(), report=report)

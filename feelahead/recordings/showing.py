@@ -26,7 +26,7 @@ class Seen(NamedTuple):
     kind: bytes
     """FACTS: OperatorFacts as JSON. VIEW: a view payload. ROBOT: the robot side's status as JSON."""
     name: str
-    """What it is: of each name the newest is as good as all"""
+    """The name: the newest of each replaces all earlier ones"""
     content: bytes
 
 
@@ -48,7 +48,7 @@ def seen(recording: Recording) -> Iterator[Seen]:
 
 
 def _view(message: Message, pictures: dict[tuple[str, int], bytes]) -> tuple[str, bytes]:
-    """Its name, and the payload as it crossed the wire."""
+    """Return the view's name and its payload as sent."""
     try:
         view = decode_view(message.content)
     except RemoteProtocolError:

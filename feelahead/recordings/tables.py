@@ -19,7 +19,7 @@ JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9
 _NO_ZONES: Final = (0.0,) * 10
 _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
-"""What a joined table has no use for."""
+"""Columns that a joined table leaves out."""
 _TOPICS: Final = (
     "/stiffness",
     "/command",
@@ -68,7 +68,7 @@ class Table:
         return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=np.float64)
 
     def sorted(self) -> "Table":
-        """In order of time: two sides' messages come a little out of it."""
+        """Sort by time: two sides' messages arrive slightly out of order."""
         order = np.argsort(np.array(self.times_s), kind="stable")
         return Table([self.times_s[i] for i in order], [self.rows[i] for i in order])
 
@@ -83,7 +83,7 @@ class Tables:
     """All of a recording, but its pictures."""
 
     began_s: float
-    """On the wall clock"""
+    """The recording's start on the wall clock"""
     duration_s: float
     by_name: Mapping[str, Table]
 

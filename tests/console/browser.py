@@ -2,7 +2,6 @@
 
 import base64
 import io
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any, Final
 import numpy as np
 from PIL import Image
 
-from tests.containers.watch import CheckFailedError
+from tests.console.provide import provide_playwright, provided_browser
+from tests.helpers.machines.waiting import wait_until
 
 _ARGUMENTS: Final = (
     "--no-sandbox",  # root has none
@@ -23,7 +23,6 @@ SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 60_000
 """For one step, on a machine that has much else to do."""
-_LOOK_S: Final = 0.02
 _DRAWS_SCENE: Final = "button#drawn[aria-pressed=true]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
@@ -65,16 +64,15 @@ class Browser:
             if not scene and (button := opened.query_selector(_DRAWS_SCENE)) is not None:
                 button.click()
             yield page
-            if page.complaints:
-                raise CheckFailedError(f"the page complained: {'; '.join(page.complaints[:3])}")
+            assert page.complaints == []
         except Error as error:
-            raise CheckFailedError(f"the browser: {str(error).splitlines()[0]}") from error
+            raise AssertionError(f"the browser: {str(error).splitlines()[0]}") from error
         finally:
             context.close()
 
 
 class Page:
-    """What a person does at a page and sees of it. `raw`: Playwright's own page, for all else."""
+    """A person at a page. `raw`: Playwright's own page, for all else."""
 
     def __init__(self, raw: Any, out: Path) -> None:
         self.raw = raw
@@ -86,25 +84,24 @@ class Page:
         raw.on("pageerror", lambda error: self.complaints.append(str(error)))
 
     def text(self, selector: str) -> str:
-        """What stands there."""
+        """The text of an element."""
         return str(self.raw.text_content(selector) or "").strip()
 
     def ask(self, script: str, argument: object = None) -> Any:
-        """What a piece of JavaScript says."""
+        """Evaluate a piece of JavaScript."""
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
-        """Until JavaScript says so; CheckFailedError when it does not."""
+        """Wait until a piece of JavaScript is true; AssertionError when it does not become so."""
         # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
-        end_s = time.monotonic() + limit_s
-        while not self.ask(script):
-            if time.monotonic() > end_s:
-                self.picture("unexpected")
-                raise CheckFailedError(f"not {what} within {limit_s:g} s")
-            time.sleep(_LOOK_S)
+        try:
+            wait_until(what, lambda: bool(self.ask(script)), limit_s)
+        except AssertionError:
+            self.picture("unexpected")
+            raise
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
-        """Until `words` stand there, in any case."""
+        """Wait until an element has these words, in any case."""
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
         self.wait(script, f"{words!r} in {selector}", limit_s)
 
@@ -124,24 +121,6 @@ class Page:
             clip = {"clip": {**box, "scale": 1}}
         answer = self._tools.send("Page.captureScreenshot", {"format": "png", **clip})
         return base64.b64decode(answer["data"])
-
-    def updates_per_second(self, selector: str, seconds: float = 3.0) -> float:
-        """How often what stands there, or one of its attributes, changes: drawn frames in which it did."""
-        script = """async ([selector, seconds]) => {
-            let changed = 0, fresh = false;
-            const observer = new MutationObserver(() => { fresh = true; });
-            const all = { attributes: true, childList: true, characterData: true, subtree: true };
-            observer.observe(document.querySelector(selector), all);
-            const began = performance.now();
-            while (performance.now() - began < 1000 * seconds) {
-                await new Promise(requestAnimationFrame);
-                changed += fresh;
-                fresh = false;
-            }
-            observer.disconnect();
-            return 1000 * changed / (performance.now() - began);
-        }"""
-        return float(self.ask(script, [selector, seconds]))
 
     def press(self, key: str) -> None:
         """Down and up."""
@@ -198,8 +177,10 @@ def border(pixels: np.ndarray[Any, np.dtype[np.uint8]], width: int = 8) -> np.nd
 
 
 @contextmanager
-def browser(program: str, out: Path) -> Iterator[Browser]:
-    """Chromium, until the context ends; Playwright has been provided."""
+def browser(out: Path) -> Iterator[Browser]:
+    """Chromium, until the context ends; its pictures go to `out`. Skips the test where none can be had."""
+    program = provided_browser()
+    provide_playwright()
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  # not part of our environment
 
     out.mkdir(parents=True, exist_ok=True)

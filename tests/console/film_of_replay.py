@@ -16,13 +16,11 @@ from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
 from tests.console.browser import Page, browser
 from tests.console.pictures_of_recording import record_demo
-from tests.containers.debian import Say
-from tests.containers.watch import CheckFailedError
 
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
 _DRAWN_S: Final = 0.3
-"""Until the scene, which is another site's, has drawn what the page shows."""
+"""The time that the scene, another site's page, needs to draw."""
 _START_S: Final = 60.0
 _SIZE: Final = (960, 540)
 _QUALITY: Final = 40
@@ -35,18 +33,16 @@ WebGLRenderingContext.prototype.getParameter = function (name) {
 """A page that draws by software asks for four drawings a second; this one has the time for all."""
 
 
-def make_film(program: str, folder: Path, paths: Sequence[Path], say: Say) -> None:
+def make_film(folder: Path, paths: Sequence[Path]) -> None:
     """20 s of a demo at 10 pictures a second, as a WebP."""
     (path,) = paths
     recording = folder / "film.mcap"
     record_demo(recording, _DURATION_S)
-    say("a demo is recorded")
-    with browser(program, folder) as one, Console("film", live=False) as console:
+    with browser(folder) as one, Console("film", live=False) as console:
         _until(console, lambda: console.address is not None)
         with one.page(str(console.address), scene=True, script=_HAS_GRAPHICS) as page:
             _until(console, lambda: console.pages > 0)
             pictures = list(_pictures(console, page, Playback(open_recording(recording))))
-    say(f"{len(pictures)} pictures")
     first, *others = pictures
     duration_ms = round(1e3 * _PERIOD_S)
     first.save(path, save_all=True, append_images=others, duration=duration_ms, loop=0, quality=_QUALITY, method=4)
@@ -74,5 +70,5 @@ def _until(console: Console, holds: Callable[[], bool]) -> None:
     while not holds():
         console.receive()
         if console.gone or time.monotonic() > end_s:
-            raise CheckFailedError(f"no page of the console within {_START_S:g} s: {console.take_notes()}")
+            raise AssertionError(f"no page of the console within {_START_S:g} s: {console.take_notes()}")
         time.sleep(0.01)

@@ -17,7 +17,6 @@ from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from tests.console.browser import Browser, Page
-from tests.containers.watch import CheckFailedError
 from tests.helpers.repository import ROOT
 from tests.helpers.simulated_desk import VIEW
 
@@ -74,7 +73,7 @@ class HandsAlone:
     person: bool = False
     pages: DrivingPage = field(default_factory=DrivingPage)
     facts: dict[str, Any] = field(default_factory=dict)
-    """What differs from a robot that is there, is owned from here, and permits tuning"""
+    """Changes to the facts of a robot that is owned from here and permits tuning"""
     now_ms: float = 0.0
     state: str = "disarmed"
     hears: bool = True
@@ -102,7 +101,7 @@ class HandsAlone:
             self.messages.append(message)
             self.pages.receive(1, message, now_s)
         if self.pages.rejected:
-            raise CheckFailedError(f"the page sent what is no message: {self.messages[-1]}")
+            raise AssertionError(f"the page sent what is no message: {self.messages[-1]}")
         if self.pages.stopping(now_s):
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
@@ -151,13 +150,13 @@ class HandsAlone:
         self.expect("You drive")
 
     def expect(self, words: str) -> None:
-        """The page says so of the hands; CheckFailedError otherwise."""
+        """The page says so of the hands; AssertionError otherwise."""
         if words not in (said := self.page.text("#hands_state")):
-            raise CheckFailedError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
+            raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:
-        """What the controller's triggers mean by now: retreat and advance."""
+        """The triggers' meaning: retreat and advance."""
         return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
 
     @property

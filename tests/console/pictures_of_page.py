@@ -8,11 +8,8 @@ from typing import Final
 from PIL import Image
 
 from tests.console.browser import Page, browser
-from tests.console.checks_of_hands import is_armed, pull, take_over
-from tests.console.run import Run, running
-from tests.console.stage import DRAWN
-from tests.containers.debian import Say
-from tests.containers.watch import check
+from tests.console.run import DRAWN, Run, running
+from tests.console.test_hands import is_armed, pull, take_over
 
 _COLORS: Final = 256
 _STIFF: Final = 1
@@ -22,25 +19,18 @@ _PULLED: Final = 0.2
 _CALM_S: Final = 1.0
 _SETTLES_S: Final = 60.0
 _LOOK_S: Final = 0.1
-_DRAWING: Final = """async (seconds) => {
-    const began = performance.now();
-    let drawn = 0;
-    for (; performance.now() - began < 1000 * seconds; drawn++) await new Promise(requestAnimationFrame);
-    return 1000 * drawn / (performance.now() - began);
-}"""
 
 
-def make_first_minute(program: str, folder: Path, paths: Sequence[Path], say: Say) -> None:
+def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
     """Open, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
     opened, near, carrying, driving, stopped = paths
-    with browser(program, folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
+    with browser(folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
         _settle(page)
         _keep(page, folder, opened)
         _keep_stiffest(page, run, folder, near)
         run.wait_until("carrying", lambda run: _doing(run) == "carrying", 60.0)
         _keep(page, folder, carrying)
-        say(f"drawn {page.ask(_DRAWING, 3.0):.0f} times a second")
-    with browser(program, folder) as one, running(()) as run, one.page(run.address) as page:
+    with browser(folder) as one, running(()) as run, one.page(run.address) as page:
         run.wait_until("advancing", lambda run: _doing(run) == "advancing", 60.0)
         take_over(page, run)
         with page.held("Space"):
@@ -63,7 +53,7 @@ def _settle(page: Page) -> None:
         page.wait("!document.querySelector('#scene iframe').hidden", "a scene", 60.0)
     calm_since_s = began_s = time.monotonic()
     while time.monotonic() - calm_since_s < _CALM_S:
-        check(time.monotonic() - began_s < _SETTLES_S, f"no calm {_CALM_S:g} s within {_SETTLES_S:g} s")
+        assert time.monotonic() - began_s < _SETTLES_S
         if not page.ask(_FRESH):
             calm_since_s = time.monotonic()
         time.sleep(_LOOK_S)
@@ -71,7 +61,7 @@ def _settle(page: Page) -> None:
 
 
 def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
-    """Of the approach, the moment when R2 resists most: looks are too slow to wait for one."""
+    """Keep the moment of the approach when R2 resists most: looks are too slow to wait for one."""
     most = 0
     run.wait_until("near", lambda run: max(run.facts[-1]["r2"]["zones"]) > 0, 60.0)
     while _doing(run) in ("advancing", "grasping"):
@@ -80,7 +70,7 @@ def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
             most = meets
             _keep(page, folder, path)
         run.look()
-    check(most >= _STIFF, f"R2 met {most} of 8 on the way to the target")
+    assert most >= _STIFF
 
 
 def _doing(run: Run) -> str:
@@ -88,7 +78,7 @@ def _doing(run: Run) -> str:
 
 
 def _keep(page: Page, folder: Path, path: Path) -> None:
-    """What is seen now, in few colours."""
+    """Keep the page as it looks, in few colours."""
     page.picture(path.stem)
     with Image.open(folder / path.name) as whole:
         whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(path, optimize=True)

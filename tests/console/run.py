@@ -10,13 +10,15 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from feelahead.both_sides.processes import StartedSide
-from tests.containers.watch import CheckFailedError
+from tests.helpers.machines.waiting import wait_until
 
 Event = dict[str, Any]
+STATE: Final = "document.body.dataset.state"
+DRAWN: Final = "['overview', 'first_person'].every((view) => document.getElementById(view).dataset.frames > 2)"
+"""Both cameras' pictures have come."""
 _START_S: Final = 300.0
 """The first start compiles the overlap kernels."""
 _KEPT: Final = 400
-_LOOK_S: Final = 0.02
 
 
 class Run:
@@ -27,7 +29,7 @@ class Run:
         self.address = ""
         """The console's, with its token."""
         self.process_ids: dict[str, int] = {}
-        """By side."""
+        """Process ids by side."""
         self.facts: deque[Event] = deque(maxlen=_KEPT)
         """The newest last, ten a second."""
         self.notes: list[str] = []
@@ -47,19 +49,19 @@ class Run:
         self._demo.check()
 
     def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
-        """How long it took in seconds; CheckFailedError when it does not come."""
+        """Wait, and return the seconds that it took; AssertionError when it does not come."""
         began_s = time.monotonic()
-        while True:
+
+        def looked() -> bool:
             self.look()
-            if holds(self):
-                return time.monotonic() - began_s
-            if time.monotonic() - began_s > limit_s:
-                raise CheckFailedError(f"not {what} within {limit_s:g} s; newest: {self.status} {self.notes[-3:]}")
-            time.sleep(_LOOK_S)
+            return bool(holds(self))
+
+        wait_until(what, looked, limit_s, instead=lambda: (self.status, self.notes[-3:]))
+        return time.monotonic() - began_s
 
     @property
     def status(self) -> Event:
-        """Of the newest facts."""
+        """The status in the newest facts."""
         return dict(self.facts[-1]["status"]) if self.facts else {}
 
     @contextmanager

@@ -1,26 +1,30 @@
-"""What a container says, event by event, and waiting for what it is to say."""
+"""The containers of a run, and what each says, event by event."""
 
 import json
 import os
 import signal
-import time
-from collections.abc import Callable
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 from feelahead.containers.engine import Engine
+from tests.helpers.machines.waiting import wait_until
 
 Event = dict[str, Any]
-_LOOK_S: Final = 0.25
 
 
-class CheckFailedError(Exception):
-    """What was to be shown did not show; the text says what and what was there instead."""
+@dataclass(frozen=True)
+class Compose:
+    """A run on an engine."""
 
+    engine: Engine
+    settings: Mapping[str, str]
+    """The variables of compose.yaml."""
 
-def check(holds: bool, text: str) -> None:
-    """CheckFailedError unless it holds."""
-    if not holds:
-        raise CheckFailedError(text)
+    def existing(self, which: str) -> set[str]:
+        """The containers, networks and volumes that a filter of the engine lets through."""
+        kinds = (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
+        return {one for kind in kinds for one in self.engine.docker(*kind, "--quiet", "--filter", which).split()}
 
 
 class Watched:
@@ -32,28 +36,30 @@ class Watched:
         self.container = engine.container(service)
         self._seen = 0
         self._waiting: list[Event] = []
+        self.new_events()
 
     def new_events(self) -> list[Event]:
-        """What it said that nobody has heard yet, of what `--status json` prints."""
+        """Return the events that `--status json` printed since the last call."""
         lines = [line for line in self._engine.docker("logs", self.container).splitlines() if line.startswith("{")]
         new, self._seen = lines[self._seen :], len(lines)
         said, self._waiting = [*self._waiting, *map(json.loads, new)], []
         return said
 
     def wait_for(self, what: str, holds: Callable[[Event], bool], limit_s: float = 60.0) -> list[Event]:
-        """Everything that it says up to the first event that holds; CheckFailedError when none does in time."""
+        """Everything that it says up to the first event that holds; AssertionError when none does in time."""
         heard: list[Event] = []
-        end_s = time.monotonic() + limit_s
-        while time.monotonic() < end_s:
+
+        def found() -> bool:
             said = self.new_events()
             for number, event in enumerate(said, 1):
                 heard.append(event)
                 if holds(event):
                     self._waiting = said[number:]
-                    return heard
-            time.sleep(_LOOK_S)
-        last = {name: heard[-1].get(name) for name in ("link", "state", "text")} if heard else "nothing"
-        raise CheckFailedError(f"{self.service}: not {what} within {limit_s:g} s; the last it said: {last}")
+                    return True
+            return False
+
+        wait_until(f"{self.service}: {what}", found, limit_s, instead=lambda: heard[-1:])
+        return heard
 
     def kill(self) -> None:
         """kill -9 its first process, as the system would when memory runs out."""

@@ -35,11 +35,12 @@ class ServingRobot:
         answers: bool = True,
         publishes: bool = True,
         version: int = PROTOCOL_VERSION,
+        safety: SafetySettings | None = None,
     ) -> None:
         self.session = OperatorSession(
-            lambda: LinkEnd("robot", 7, "a robot's"), Safety(SafetySettings(lease_s=LEASE_S))
+            lambda: LinkEnd("robot", 7, "a robot's"), Safety(safety or SafetySettings(lease_s=LEASE_S))
         )
-        self.sockets = RobotSockets(bind, keys=keys, insecure=insecure)
+        self.sockets = RobotSockets(bind, keys=keys, insecure=insecure, heartbeat_timeout_s=30.0)
         self.control, self.view = self.sockets.control_endpoint, self.sockets.view_endpoint
         self.payloads: list[bytes] = []
         self._answers, self._publishes, self._version = answers, publishes, version
@@ -69,10 +70,14 @@ class ServingRobot:
                     self.session.receive(peer, payload, now_s)
                 else:
                     self.sockets.send(peer, msgpack.packb([self._version, "what nobody here knows"]))
+            self.tick(now_s)
             for answer in self.session.take_answers(now_s):
                 self.sockets.send(answer.peer, answer.payload)
             if self._publishes:
                 self.sockets.publish(b"telemetry", self._telemetry(now_s))
+
+    def tick(self, now_s: float) -> None:
+        """Do more than answer, where a test needs that; `now_s`: the turn's time."""
 
     def _telemetry(self, now_s: float) -> bytes:
         message = Telemetry(

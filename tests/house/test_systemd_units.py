@@ -19,7 +19,6 @@ INSTALLED = "/opt/feelahead/bin/"
 ANALYZE = shutil.which("systemd-analyze")
 EXPOSURE = {"feelahead-robot": 2.0, "feelahead-operator": 7.0}
 """At most so much, from 0 to 10, by systemd's own measure."""
-USER = {"feelahead-robot": [], "feelahead-operator": ["--user"]}
 
 needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not installed here")
 
@@ -40,7 +39,7 @@ def analyzed(name: str, folder: Path, *arguments: str) -> subprocess.CompletedPr
     unit = folder / f"{name}.service"
     unit.write_text(text)
     return subprocess.run(
-        [str(ANALYZE), *USER[name], "--no-pager", *arguments, str(unit)],
+        [str(ANALYZE), *["--user"] * (name == "feelahead-operator"), "--no-pager", *arguments, str(unit)],
         capture_output=True,
         text=True,
         timeout=60,
@@ -50,15 +49,10 @@ def analyzed(name: str, folder: Path, *arguments: str) -> subprocess.CompletedPr
 
 
 @needs_systemd
-@pytest.mark.parametrize("name", USER)
-def test_systemd_finds_nothing_wrong(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", EXPOSURE)
+def test_systemd_finds_nothing_wrong_and_little_left_open(name: str, tmp_path: Path) -> None:
     verified = analyzed(name, tmp_path, "verify")
     assert (verified.returncode, verified.stderr) == (0, "")
-
-
-@needs_systemd
-@pytest.mark.parametrize("name", USER)
-def test_little_is_left_open(name: str, tmp_path: Path) -> None:
     judged = analyzed(name, tmp_path, "security", "--offline=true")
     if "Unknown option" in judged.stderr or "unrecognized option" in judged.stderr:
         pytest.skip("this systemd-analyze judges no unit files")
@@ -86,27 +80,20 @@ def command_line(name: str, **replaced: str) -> list[str]:
     return line
 
 
-def run(module: str, line: list[str]) -> subprocess.CompletedProcess[str]:
+@pytest.mark.parametrize(
+    ("side", "given", "folder"),
+    [
+        ("robot", {"FEELAHEAD_BIND": "tcp://127.0.0.1:0", "FEELAHEAD_FLAGS": "--seed 3 --realtime"}, "/etc"),
+        ("operator", {"FEELAHEAD_CONNECT": "tcp://127.0.0.1:9", "FEELAHEAD_FLAGS": "--device simulated"}, "%E"),
+    ],
+)
+def test_a_side_takes_its_flags(keys: KeyFolder, side: str, given: dict[str, str], folder: str) -> None:
+    words = command_line(f"feelahead-{side}", **given)
+    line = [word.replace(f"{folder}/feelahead/keys", str(keys.path)) for word in words]
+    assert line != words
     # Of a flag that is given twice the last one holds.
-    command = [sys.executable, "-P", "-m", module, *line, "--duration", "0.5", "--status", "none"]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-
-
-def test_the_robot_side_takes_its_flags(keys: KeyFolder) -> None:
-    line = command_line("feelahead-robot", FEELAHEAD_BIND="tcp://127.0.0.1:0", FEELAHEAD_FLAGS="--seed 3 --realtime")
-    line = [word.replace("/etc/feelahead/keys", str(keys.path)) for word in line]
-    assert str(keys.path) in line
-    ended = run("robot_side", line)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
-
-
-def test_the_operator_side_takes_its_flags(keys: KeyFolder) -> None:
-    line = command_line(
-        "feelahead-operator", FEELAHEAD_CONNECT="tcp://127.0.0.1:9", FEELAHEAD_FLAGS="--device simulated"
-    )
-    line = [word.replace("%E/feelahead/keys", str(keys.path)) for word in line]
-    assert str(keys.public_path("robot")) in line
-    ended = run("operator_side", line)
+    command = [sys.executable, "-P", "-m", f"{side}_side", *line, "--duration", "0.5", "--status", "none"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
 
 

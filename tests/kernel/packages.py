@@ -7,22 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tests.kernel.debian import library_path, missing_for, only, provide_from, run_package_tool
-from tests.kernel.skipped import SkippedError
+import pytest
+
+from tests.helpers.machines.debian import Apt, library_path, only, unpacked
 
 _QEMU: Final = "qemu-system-x86_64"
-_QEMU_PACKAGE = "qemu-system-x86"
-_KERNEL_PACKAGE = "linux-image-amd64"
-_BUSYBOX_PACKAGE = "busybox-static"
+_KERNEL_PACKAGE: Final = "linux-image-amd64"
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the virtual machine is made of."""
+    """The parts of the virtual machine."""
 
     qemu: Path
     qemu_environment: dict[str, str]
-    """What QEMU needs in its environment to find its libraries."""
+    """QEMU's environment, for its libraries."""
     firmware: Path | None
     """The folder of QEMU's firmware; None where QEMU knows it by itself."""
     kernel: Path
@@ -31,9 +30,9 @@ class Parts:
     busybox: Path
 
 
-def provide(cache: Path) -> Parts:
-    """Find the parts in `cache`, or download and unpack them there; SkippedError when they cannot be had."""
-    return provide_from(cache, _names, _found)
+def provide() -> Parts:
+    """Find the parts, or download and unpack them; skips the test where they cannot be had."""
+    return unpacked("kernel", _packages, _found)
 
 
 def _found(root: Path) -> Parts:
@@ -43,29 +42,20 @@ def _found(root: Path) -> Parts:
     busybox = next((path for path in (root / "bin/busybox", root / "usr/bin/busybox") if path.exists()), None)
     if busybox is None:
         raise FileNotFoundError("busybox")
-    installed = shutil.which(_QEMU)
-    if installed is not None:
+    if (installed := shutil.which(_QEMU)) is not None:
         return Parts(Path(installed), {}, None, kernel, modules, busybox)
     qemu, environment = root / "usr/bin" / _QEMU, library_path(root)
-    started = subprocess.run(
-        [str(qemu), "--version"], capture_output=True, env=os.environ | environment, timeout=60, check=False
-    )
+    started = subprocess.run([str(qemu), "--version"], capture_output=True, env=os.environ | environment, check=False)
     if started.returncode != 0:
         raise FileNotFoundError(f"{_QEMU}: {started.stderr.decode(errors='replace').strip()}")
     return Parts(qemu, environment, root / "usr/share", kernel, modules, busybox)
 
 
-def _names(cache: Path) -> list[str]:
-    names = [_kernel_name(cache), _BUSYBOX_PACKAGE]
-    if shutil.which(_QEMU) is None:
-        names += missing_for(cache, _QEMU_PACKAGE)
-    return names
-
-
-def _kernel_name(cache: Path) -> str:
-    """The package of the newest stock kernel, which the package of no version depends on."""
-    for line in run_package_tool(cache, "apt-cache", ["depends", _KERNEL_PACKAGE]).splitlines():
-        kind, _, name = line.strip().partition(": ")
-        if kind == "Depends" and name.startswith("linux-image-"):
-            return name
-    raise SkippedError(f"{_KERNEL_PACKAGE} depends on no linux-image here: the kernel comes from Debian")
+def _packages(apt: Apt) -> list[str]:
+    depends = apt.run("apt-cache", "depends", _KERNEL_PACKAGE).split()
+    # The package of no version depends on the newest stock kernel.
+    kernels = [name for name in depends if name.startswith("linux-image-") and name != _KERNEL_PACKAGE]
+    if not kernels:
+        pytest.skip(f"{_KERNEL_PACKAGE} depends on no linux-image here: the kernel comes from Debian")
+    qemu = [] if shutil.which(_QEMU) else apt.missing_for("qemu-system-x86")
+    return [kernels[0], "busybox-static", *qemu]

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playstation", "uhid", "evdev")
-"""With what each depends on."""
+"""Modules; their dependencies are added."""
 RESULT_MARK: Final = "kernel test: exit code "
-"""How the line begins that says how the test program ended."""
+"""The prefix of the line with the test program's exit code."""
 WRITABLE: Final = "/dev/shm"  # noqa: S108  # the guest's own, in memory
 """The one folder that the guest can write to."""
 

@@ -3,12 +3,11 @@
 import csv
 import ctypes
 import os
-import platform
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.netem.cases import CASES
+from tests.netem.cases import CASES, PATH_CASE
 from tests.netem.exchanges import Recording, exchange_datagrams, exchange_stream
 from tests.netem.namespaces import join_namespaces, set_netem
 
@@ -18,11 +17,10 @@ _FINIT_MODULE = 313
 
 def main(folder: Path, modules: Sequence[str], names: Sequence[str]) -> int:
     """Record each case of `names` into `folder`."""
-    print(f"Linux {platform.release()} in User-Mode Linux, Python {platform.python_version()}")
     for module in modules:
         _load(module)
     join_namespaces()
-    for case in CASES:
+    for case in (PATH_CASE, *CASES):
         if case.name not in names:
             continue
         set_netem(case.netem)

@@ -6,20 +6,23 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.kernel.debian import library_path, missing_for, only, provide_from
+import pytest
+
+from tests.helpers.machines.debian import Apt, library_path, only, unpacked
+from tests.helpers.repository import ROOT
 from tests.kernel.machine import MachineError, follow
 from tests.kernel.ramdisk import RESULT_MARK, module_order
-from tests.kernel.skipped import SkippedError
+from tests.netem.cases import Case
 
-_PROJECT = Path(__file__).parents[2]
 _MODULES = ("veth", "sch_netem")
 _MEMORY = "256M"
 _EXCHANGE = "/mnt"
 _BOOTED = "netem test: booted"
+_LIMIT_S = 120.0
 
 _INIT = """\
 #!/bin/sh
@@ -37,39 +40,36 @@ sleep 10
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the machine is made of."""
+    """The parts of the machine."""
 
     kernel: Path
     modules: Path
     """The kernel's own folder of modules."""
     environment: dict[str, str]
-    """What `ip` and `tc` need to be found, and to find their libraries and tables."""
+    """The environment in which `ip` and `tc`, their libraries and tables are found."""
 
 
-def provide(cache: Path) -> Parts:
-    """The installed parts, or those in `cache`, downloaded when need be; SkippedError when they cannot be had."""
+def provide() -> Parts:
+    """The installed parts, or downloaded ones; skips the test where they cannot be had."""
     try:
         return _found(Path("/"))
     except FileNotFoundError:
-        return provide_from(cache, _names, _found)
+        return unpacked("netem", _packages, _found)
 
 
-def _names(cache: Path) -> list[str]:
-    return [name for package in ("user-mode-linux", "iproute2") for name in missing_for(cache, package)]
+def _packages(apt: Apt) -> list[str]:
+    return [name for package in ("user-mode-linux", "iproute2") for name in apt.missing_for(package)]
 
 
 def _found(root: Path) -> Parts:
     """The parts in `root`, or on the system; FileNotFoundError when one is in neither."""
     kernel = _first(root, "usr/bin/linux.uml")
     modules = only(kernel.parents[1] / "lib/uml/modules", "*")
-    tools = {
-        str(_first(root, f"usr/sbin/{name}", f"sbin/{name}", f"usr/bin/{name}", f"bin/{name}").parent)
-        for name in ("tc", "ip")
-    }
-    environment = {"PATH": ":".join([*sorted(tools), "/usr/sbin", "/usr/bin", "/sbin", "/bin"])}
-    environment["TC_LIB_DIR"] = str(
-        _first(root, "usr/lib/x86_64-linux-gnu/tc/normal.dist", "usr/lib/tc/normal.dist").parent
-    )
+    places = ("usr/sbin", "sbin", "usr/bin", "bin")
+    tools = {str(_first(root, *(f"{place}/{name}" for place in places)).parent) for name in ("tc", "ip")}
+    tables = _first(root, "usr/lib/x86_64-linux-gnu/tc/normal.dist", "usr/lib/tc/normal.dist").parent
+    path = ":".join([*sorted(tools), "/usr/sbin", "/usr/bin", "/sbin", "/bin"])
+    environment = {"PATH": path, "TC_LIB_DIR": str(tables)}
     return Parts(kernel, modules, environment if root == Path("/") else environment | library_path(root))
 
 
@@ -83,7 +83,7 @@ def _first(root: Path, *places: str) -> Path:
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """What is started here keeps to one processor, and goes before all else there where that is permitted.
+    """Keep children to one processor, with real-time priority where that is permitted.
 
     The machine's parts wake each other all the time: on two processors it takes three times as long.
     """
@@ -98,22 +98,14 @@ def _alone() -> Iterator[None]:
         os.sched_setaffinity(0, processors)
 
 
-def run_machine(parts: Parts, folder: Path, names: Sequence[str], limit_s: float, say: Callable[[str], None]) -> int:
-    """Boot, record the cases `names` into `folder`, pass each line to `say`, and return the exit code.
-
-    SkippedError when it does not boot here; MachineError when there is no exit code after `limit_s`.
-    """
+def run_machine(parts: Parts, folder: Path, cases: Sequence[Case]) -> None:
+    """Boot and record `cases` into `folder`; skips the test where it does not boot here."""
     said: list[str] = []
-
-    def hear(line: str) -> None:
-        said.append(line)
-        if _BOOTED in said and line != _BOOTED:
-            say(line)
-
     modules = [str(path) for path in module_order(parts.modules, _MODULES).values()]
-    variables = parts.environment | {"PYTHONPATH": str(_PROJECT), "PYTHONUNBUFFERED": "1", "LANG": "C.UTF-8"}
+    variables = parts.environment | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "LANG": "C.UTF-8"}
     command = ["/usr/bin/env", "-i", *(f"{name}={value}" for name, value in variables.items())]
-    command += [sys.executable, "-B", "-P", "-m", "tests.netem.guest", _EXCHANGE, ",".join(modules), *names]
+    command += [sys.executable, "-B", "-P", "-m", "tests.netem.guest", _EXCHANGE, ",".join(modules)]
+    command += [case.name for case in cases]
     init = folder / "init"
     init.write_text(
         _INIT.format(folder=folder, exchange=_EXCHANGE, command=shlex.join(command), mark=RESULT_MARK, booted=_BOOTED)
@@ -132,20 +124,14 @@ def run_machine(parts: Parts, folder: Path, names: Sequence[str], limit_s: float
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-    try:
-        code = follow(machine, limit_s, hear)
-        machine.wait(timeout=20.0)
-    except subprocess.TimeoutExpired:
-        pass  # it has said its result
-    except MachineError as error:
-        if _BOOTED in said:
-            raise
-        raise SkippedError(f"User-Mode Linux does not boot here: {said[-1] if said else error}") from error
-    finally:
-        # Each of its programs is a process of the host, too.
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(machine.pid, signal.SIGKILL)
-        machine.wait()
-        if machine.stdout is not None:
-            machine.stdout.close()
-    return code
+    with machine:
+        try:
+            assert follow(machine, _LIMIT_S, said.append) == 0, said[-20:]
+        except MachineError as error:
+            if _BOOTED in said:
+                raise
+            pytest.skip(f"User-Mode Linux does not boot here: {said[-1] if said else error}")
+        finally:
+            # Each of its programs is a process of the host, too.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(machine.pid, signal.SIGKILL)

@@ -1,56 +1,54 @@
 """docs/two-machines.md as a program: indented lines are commands, the paragraph before says on which machine."""
 
 import re
-from collections.abc import Iterator, Mapping
+import shlex
+import shutil
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
+from operator_side.dualsense.hid.udev import RULE_FILE
 from tests.helpers.repository import ROOT
+from tests.two_hosts.lan import Host, Lan
 
-GUIDE = ROOT / "docs" / "two-machines.md"
-Where = Literal["robot", "operator"]
-
-_INDENT = "    "
-_PLACEHOLDER = re.compile(r"\b(?:ROBOT|OPERATOR)(?:-KEY)?\b")
-
-
-class GuideError(AssertionError):
-    """The guide cannot be followed; the text says why."""
+GUIDE: Final = ROOT / "docs" / "two-machines.md"
+PORTS: Final = ("5555", "5556")
+_INDENT: Final = "    "
+_PLACEHOLDER: Final = re.compile(r"\b(?:ROBOT|OPERATOR)(?:-KEY)?\b")
+_USUAL_FIREWALL: Final = (
+    "nft add table inet filter; nft add chain inet filter input '{ type filter hook input priority 0; policy drop; }'; "
+    "nft add rule inet filter input ct state established,related accept"
+)
 
 
 @dataclass(frozen=True)
 class Step:
     """One command of the guide."""
 
-    where: Where
+    where: Literal["robot", "operator"]
     command: str
 
     def filled_in(self, words: Mapping[str, str]) -> str:
-        """With what stands for the words in capitals; GuideError for one that the guide has not told yet."""
-
-        def word(match: re.Match[str]) -> str:
-            if match[0] not in words:
-                raise GuideError(f"{self.command}: nothing before it tells {match[0]}")
-            return words[match[0]]
-
-        return _PLACEHOLDER.sub(word, self.command)
+        """Replace the words in capitals; KeyError for one that the guide has not given yet."""
+        return _PLACEHOLDER.sub(lambda match: words[match[0]], self.command)
 
 
 def steps(path: Path = GUIDE) -> list[Step]:
-    """Its commands, in their order; GuideError for one without a machine."""
+    """Read its commands, in order; AssertionError for one without a machine."""
     found: list[Step] = []
-    where: Where | None = None
+    named: list[str] = []
     paragraph = ""
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith(_INDENT):
             if paragraph:
-                where, paragraph = _machine(paragraph), ""
-            if where is None:
-                raise GuideError(f"{path.name}: {line.strip()!r}: neither machine is named before it")
-            found.append(Step(where, line.strip()))
+                named, paragraph = re.findall(r"\bthe (robot|operator)'s", paragraph, flags=re.IGNORECASE), ""
+            assert named, f"{path.name}: {line.strip()!r}: neither machine is named before it"
+            found.append(Step("robot" if named[-1].lower() == "robot" else "operator", line.strip()))
         elif line.startswith("#"):
-            where, paragraph = None, ""
+            named, paragraph = [], ""
         elif line.strip():
             paragraph += f" {line.strip()}"
         elif not paragraph.rstrip().endswith(":"):
@@ -58,14 +56,46 @@ def steps(path: Path = GUIDE) -> list[Step]:
     return found
 
 
-def commands_of(text: str) -> Iterator[str]:
-    """The indented lines of a piece of Markdown."""
-    return (line.strip() for line in text.splitlines() if line.startswith(_INDENT))
+def follow(lan: Lan) -> None:
+    """Do all that the guide says up to the starts, which are kept for `lan.start`."""
+    hosts = {"robot": lan.robot_host, "operator": lan.operator_host}
+    if shutil.which("nft") is not None:
+        lan.robot_host.run(_USUAL_FIREWALL)
+    for step in steps():
+        _do(lan, hosts[step.where], step)
+    assert lan.doctor, "no line looks at the way"
+    assert lan.starts.keys() == hosts.keys()
 
 
-def _machine(paragraph: str) -> Where | None:
-    """The machine that is named last."""
-    named = re.findall(r"\bthe (robot|operator)'s", paragraph, flags=re.IGNORECASE)
-    if not named:
-        return None
-    return "robot" if named[-1] == "robot" else "operator"
+def _do(lan: Lan, host: Host, step: Step) -> None:
+    """Run the command on its host, or check it otherwise where it would change this machine."""
+    match shlex.split(step.command):
+        case ["pip", "install", wanted]:
+            assert wanted == f".[{step.where}]"
+            project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+            for package in [*project["dependencies"], *project["optional-dependencies"][step.where]]:
+                version(re.split(r"[^\w.-]", package, maxsplit=1)[0])
+        case ["feelahead", "keys", "make", side]:
+            assert side == step.where
+            key = re.search(r"\b[0-9a-f]{64}\b", host.run(step.command))
+            assert key is not None
+            lan.words[f"{step.where.upper()}-KEY"] = key[0]
+        case ["feelahead", "keys", *_]:
+            host.run(step.filled_in(lan.words))
+        case ["sudo", "nft", *_]:
+            assert all(port in step.command for port in PORTS)
+            if shutil.which("nft") is not None:
+                host.run(step.command.removeprefix("sudo "))
+        case ["sudo", "ufw", *_]:  # for the whole machine
+            assert step.command == f"sudo ufw allow {':'.join(PORTS)}/tcp"
+        case ["feelahead", "doctor"]:
+            said = host.run(step.command, codes=(0, 1))
+            assert "--realtime" in said
+            assert RULE_FILE in said or "udev rule" in said
+        case ["feelahead", "doctor", "--connect", *_]:
+            assert host is lan.operator_host
+            lan.doctor = step.filled_in(lan.words)
+        case [program, *_] if program == f"feelahead-{step.where}":
+            lan.starts[step.where] = step.filled_in(lan.words)
+        case _:
+            raise AssertionError(f"{step.command}: say here how to check this")

@@ -15,20 +15,11 @@ from rich.text import Text
 
 from common.command.command_line import parse_settings
 from common.sockets.authentication import OperatorKeys
-from feelahead.commands.doctor import facts
-from feelahead.commands.doctor.controller_checks import (
-    ControllerSeen,
-    check_controllers,
-    check_hidapi,
-    check_permission,
-    check_uhid,
-)
+from feelahead.commands.doctor import controllers, machine
+from feelahead.commands.doctor.controllers import ControllerSeen
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
-from feelahead.commands.doctor.kernel_checks import check_kernels, compile_kernels
 from feelahead.commands.doctor.link_facts import Way, look_along
 from feelahead.commands.doctor.link_judgement import LinkFacts, judge, reached, told
-from feelahead.commands.doctor.machine_checks import RENDERING, check_ports, check_realtime, check_rendering
-from feelahead.commands.doctor.python_checks import check_extra, check_python
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 _WIDTH_WITHOUT_TERMINAL: Final = 120
@@ -36,7 +27,7 @@ _WIDTH_WITHOUT_TERMINAL: Final = 120
 
 @dataclass(frozen=True)
 class DoctorSettings:
-    """What is missing on this machine, and the command that mends it.
+    """Say what is missing on this machine, and the command that mends it.
 
     Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
     without, "missing" is what does not work as it is.
@@ -55,13 +46,13 @@ class DoctorSettings:
     compile: bool = False
     """Compile the robot side's kernels now."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where a robot side should listen: look at the way there."""
+    """Look at the way to a robot side that should listen there."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where it should publish what the screen shows; the port after the control port unless given."""
+    """The robot side's view port; the port after the control port unless given."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """As for feelahead-operator: the folder with the operator's key."""
+    """The folder with the operator's key, like feelahead-operator's."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
-    """With --keys: the robot side's public key."""
+    """The robot side's public key; needs --keys."""
 
     def __post_init__(self) -> None:
         for name in ("view_connect", "keys", "robot_key"):
@@ -80,15 +71,15 @@ def doctor(arguments: Sequence[str]) -> int:
         keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
         return _tell_of_link(look_along(Way(settings.connect, settings.view_connect, keys)), as_json=settings.json)
     if settings.compile:
-        return compile_kernels(as_json=settings.json)
-    controllers = facts.controllers_seen()
-    findings = examine(controllers)
+        return machine.compile_kernels(as_json=settings.json)
+    seen = controllers.controllers_seen()
+    findings = examine(seen)
     fit = fit_for_demo(findings)
     if settings.json:
         found = {
             "demo": fit,
             "findings": [dataclasses.asdict(finding) for finding in findings],
-            "controllers": None if controllers is None else [dataclasses.asdict(seen) for seen in controllers],
+            "controllers": None if seen is None else [dataclasses.asdict(one) for one in seen],
         }
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
@@ -108,22 +99,21 @@ def _tell_of_link(link: LinkFacts, *, as_json: bool) -> int:
     return 0 if fault is None else 1
 
 
-def examine(controllers: list[ControllerSeen] | None) -> list[Finding]:
+def examine(seen: list[ControllerSeen] | None) -> list[Finding]:
     """Every check of this machine, in the order of the table."""
-    version = sys.version_info
+    platform, version = sys.platform, sys.version_info
+    rules, is_root = controllers.udev_rules(), controllers.is_root()
     return [
-        check_python((version.major, version.minor, version.micro)),
-        *(check_extra(extra, failures) for extra, failures in facts.failed_imports().items()),
-        check_hidapi(sys.platform, facts.hid_facts()),
-        check_permission(
-            sys.platform, is_root=facts.is_root(), rules=facts.udev_rules(), controllers=controllers or []
-        ),
-        *check_controllers(controllers),
-        check_uhid(sys.platform, facts.uhid_facts()),
-        *check_kernels(facts.kernel_facts()),
-        check_rendering(facts.rendering_troubles(RENDERING)),
-        *check_realtime(sys.platform, facts.realtime_notes()),
-        *check_ports(facts.port_troubles()),
+        machine.check_python((version.major, version.minor, version.micro)),
+        *(machine.check_extra(extra, failures) for extra, failures in machine.failed_imports().items()),
+        controllers.check_hidapi(platform, controllers.hid_facts()),
+        controllers.check_permission(platform, is_root=is_root, rules=rules, controllers=seen or []),
+        *controllers.check_controllers(seen),
+        controllers.uhid_finding(platform),
+        *machine.check_kernels(machine.kernel_facts()),
+        machine.check_rendering(machine.rendering_troubles()),
+        *machine.check_realtime(platform, machine.realtime_notes()),
+        *machine.check_ports(machine.port_troubles()),
     ]
 
 

@@ -1,17 +1,17 @@
-"""What a check comes to."""
+"""The outcome of a check."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """How it stands."""
+    """A verdict."""
 
     OK = "ok"
     NOTE = "note"
     """Works without; something is better, or possible, with it."""
     MISSING = "missing"
-    """What this check is about does not work as it is."""
+    """The thing that was checked does not work."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class Finding:
     name: str
     verdict: Verdict
     said: str
-    """What is the case, in one line."""
+    """The finding in one line."""
     remedy: str | None = None
-    """What to do about it: a command, or what to change; None where there is nothing to do."""
+    """The command or change that mends it; None where there is nothing to do."""
     for_demo: bool = False
     """Whether `feelahead demo` cannot run without it."""
 

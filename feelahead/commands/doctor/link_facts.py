@@ -24,12 +24,11 @@ from feelahead.commands.doctor.link_judgement import CONNECT_LIMIT_S, LinkFacts,
 
 _ROUND_TRIPS: Final = 20
 _MEASURE_S: Final = 5.0
-"""On a long way fewer round trips must do."""
+"""A long way allows fewer round trips."""
 _PAUSE_S: Final = 0.11
 """The robot side answers strangers ten times a second."""
 _KNOCKS: Final = ((KNOCK, 2.0), (b"\r\n\r\n", 1.0))
-"""What to say to a port, and how long it may be silent after that beside the round trips: one that waits for the end of
-a line says nothing before."""
+"""Words for a port, and how long it may stay silent after them beside the round trips. Some wait for a line's end."""
 _TELEMETRY_LIMIT_S: Final = 2.0
 _ANSWER_LIMIT_S: Final = 2.5
 _HANDSHAKE_LIMIT_S: Final = 4.0
@@ -44,7 +43,7 @@ _MOST_LOST: Final = 2
 
 @dataclass(frozen=True)
 class Way:
-    """Where a robot side is sought, and with which keys."""
+    """The address of a robot side, and the keys to it."""
 
     connect: str
     view_connect: str | None = None
@@ -70,7 +69,7 @@ def look_along(way: Way) -> LinkFacts:
 
 
 def _looks(way: Way, facts: LinkFacts, control: Endpoint, view: Endpoint) -> Generator[LinkFacts]:
-    """What is known after each look, each of which needs the ones before."""
+    """Yield the facts after each look. Each look needs the ones before."""
     try:
         to_control, _ = resolve(control.host, way.connect, "--connect")
         to_view, _ = resolve(view.host, way.view_connect or way.connect, "--view-connect")
@@ -113,7 +112,7 @@ def _knock(host: str, port: int, clock: MonotonicClock) -> Opening:
 
 
 def _listen(connection: socket.socket, clock: MonotonicClock, end_s: float) -> tuple[bytes, bool]:
-    """What is said until `end_s`, a greeting at most, and whether the other side has hung up."""
+    """Read until `end_s`, a greeting at most; return the bytes, and whether the other side hung up."""
     said = b""
     while len(said) < GREETING_BYTES and (said[:1] in (b"", KNOCK[:1])) and (left_s := end_s - clock.now()) > 0.0:
         connection.settimeout(left_s)

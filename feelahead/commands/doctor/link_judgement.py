@@ -1,4 +1,4 @@
-"""What is wrong on the way from this machine to a robot side, first things first, from facts alone."""
+"""Judge the way from this machine to a robot side, first things first, from facts alone."""
 
 import errno
 import os
@@ -18,14 +18,14 @@ _OTHERS: Final = {
     b"<": "an HTTP server",
     b"\x15\x03": "a TLS server",
 }
-"""Who they are that begin so."""
+"""Servers by the bytes that they begin with."""
 _STEPS: Final = "feelahead keys --help has the steps on both machines"
 
 _VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
 
 
 class Wrong(StrEnum):
-    """What kind of thing is wrong, in the order in which it is looked for."""
+    """The kinds of faults, in the order of looking."""
 
     NAME = "name"
     ROUTE = "route"
@@ -43,7 +43,7 @@ class Wrong(StrEnum):
 
 @dataclass(frozen=True)
 class Opening:
-    """How a port took a TCP connection, and what it said first."""
+    """A port's answer to a TCP connection, and its first bytes."""
 
     error: int | None = None
     """The errno of a connection that failed, ETIMEDOUT for one that nobody answered; None for one that stands."""
@@ -51,31 +51,31 @@ class Opening:
     hung_up: bool = False
     """Whether it ended the connection by itself."""
     took_s: float = 0.0
-    """Until the connection stood."""
+    """The time until the connection stood."""
 
 
 @dataclass(frozen=True)
 class Talk:
-    """What came of questions that ask for nothing, over ZeroMQ."""
+    """The answers to questions that ask for nothing, over ZeroMQ."""
 
     handshake: Literal["key refused", "failed"] | None = None
-    """How it failed, if it did."""
+    """The handshake's failure, if it failed."""
     answered: bool = False
     other_version: str | None = None
-    """What the robot side speaks, where that is another protocol than ours."""
+    """The robot side's protocol, where it is not ours."""
     round_trips_s: tuple[float, ...] = ()
     place: int = 0
-    """The one that we would get: 0 owns the arm."""
+    """The place that we would get: 0 owns the arm."""
     waiting: int = 0
-    """How many observe already."""
+    """The number of observers."""
 
 
 @dataclass(frozen=True)
 class LinkFacts:
-    """What is known of the way so far; None for what has not been looked at yet."""
+    """The facts about the way; None for those not looked at yet."""
 
     control: str
-    """As HOST:PORT."""
+    """HOST:PORT of the control port."""
     view: str
     keys: str | None = None
     """Our public key, where we have been given keys."""
@@ -116,7 +116,7 @@ def judge(facts: LinkFacts) -> Fault | None:
 
 
 def told(facts: LinkFacts) -> dict[str, object]:
-    """The same for programs."""
+    """Tell the facts to programs."""
     fault, talk = judge(facts), facts.talk
     trips_s = talk.round_trips_s if talk is not None else ()
     answered = talk is not None and talk.answered

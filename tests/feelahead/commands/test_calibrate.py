@@ -115,24 +115,18 @@ def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
     assert handle.closed == handle.times_opened > 0
 
 
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="is a folder"):
-        command(["calibrate", "--out", str(tmp_path)])
-
-
 @pytest.mark.parametrize(
     ("out", "said"),
-    [("/dev/null", "is no regular file"), ("new/mine.toml", "there is no folder"), ("pipe", "is no regular file")],
+    [("/dev/null", "is no regular file"), ("new/mine.toml", "there is no folder"), (".", "is a folder")],
 )
 def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_measured(
     out: str, said: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    with pytest.raises(ConfigurationError, match=f"--out {out}: {said}"):
+    with pytest.raises(ConfigurationError, match=f"--out {out}: .*{said}"):
         command(["calibrate", "--out", out])
     assert handle.now_s == 0.0
-    assert [file.name for file in tmp_path.iterdir()] == ["pipe"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_pipe_where_it_is_kept_is_refused_before_anything_is_measured(handle: PlayedHandle) -> None:

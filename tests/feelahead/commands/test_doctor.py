@@ -9,13 +9,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from common.errors import ConfigurationError
 from feelahead.commands.doctor import command as doctor_command
-from feelahead.commands.doctor import facts
-from feelahead.commands.doctor.controller_checks import (
+from feelahead.commands.doctor import controllers, machine
+from feelahead.commands.doctor.controllers import (
     ControllerSeen,
     HidFacts,
-    UhidFacts,
     check_controllers,
     check_hidapi,
     check_permission,
@@ -23,16 +21,22 @@ from feelahead.commands.doctor.controller_checks import (
     missing_grants,
 )
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
-from feelahead.commands.doctor.kernel_checks import COMPILE, KernelFacts, check_kernels
-from feelahead.commands.doctor.machine_checks import (
+from feelahead.commands.doctor.machine import (
+    COMPILE,
+    EXTRAS,
+    OLDEST_PYTHON,
     PORTS,
     RENDERING,
     RENDERING_PACKAGES,
+    KernelFacts,
+    check_extra,
+    check_kernels,
     check_ports,
+    check_python,
     check_realtime,
     check_rendering,
+    modules_of,
 )
-from feelahead.commands.doctor.python_checks import EXTRAS, OLDEST_PYTHON, check_extra, check_python, modules_of
 from feelahead.main import command
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
@@ -43,101 +47,84 @@ from tests.helpers.repository import ROOT
 from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 
 OK, NOTE, MISSING = Verdict.OK, Verdict.NOTE, Verdict.MISSING
+ABSENT = {"some_module": "No module named 'some_module'"}
+BROKEN = {"numba": "No module named 'numba'", "mujoco": "libGL.so.1: cannot open"}
+BOTH = ("hid", "hidapi")
 SEEN = ControllerSeen("DualSense", "/dev/hidraw3", "USB", ADDRESS, "0x0110002a", "about 95%, full")
 DENIED = ControllerSeen("DualSense", "/dev/hidraw3", trouble="no permission to open the controller at X: do this")
+NO_RIGHT = "--realtime: locking memory is not permitted; to permit it: sudo this; and that"
 
 
-@pytest.mark.parametrize(("version", "verdict"), [((3, 11, 0), OK), ((3, 14, 2), OK), ((3, 10, 9), MISSING)])
-def test_python(version: tuple[int, int, int], verdict: Verdict) -> None:
-    finding = check_python(version)
+def permission(*seen: ControllerSeen, platform: str = "linux", is_root: bool = False, rules: str = "") -> Finding:
+    return check_permission(platform, is_root=is_root, rules={"/etc/x.rules": rules}, controllers=seen)
+
+
+@pytest.mark.parametrize(
+    ("findings", "verdict", "said", "remedy"),
+    [
+        ([check_python((3, 11, 0))], OK, "3.11.0", None),
+        ([check_python((3, 10, 9))], MISSING, "older than 3.11", "install Python 3.11"),
+        ([check_extra("robot", {})], OK, "mujoco, numba", None),
+        ([check_extra("robot", ABSENT)], MISSING, "not installed: some_module", re.escape("'feelahead[robot]'")),
+        ([check_extra("record", ABSENT)], NOTE, "not installed: some_module", re.escape("'feelahead[record]'")),
+        ([check_extra("robot", BROKEN)], MISSING, "numba; cannot be imported: mujoco (libGL", "numba mujoco-core$"),
+        ([check_hidapi("linux", HidFacts("0.15.0", ("hidapi",), None))], OK, "0.15.0", None),
+        ([check_hidapi("linux", HidFacts(None, (), "not importable"))], NOTE, "not installed", "operator"),
+        ([check_hidapi("linux", HidFacts("0.15.0", BOTH, None))], NOTE, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("linux", HidFacts("0.15.0", BOTH, "no"))], MISSING, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("darwin", HidFacts("0.15.0", BOTH, None))], MISSING, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("win32", HidFacts("0.15.0", ("hidapi",), "broken"))], MISSING, "broken", "--force-reinstall"),
+        ([permission()], NOTE, RULE_FILE, "udevadm control --reload && sudo udevadm trigger$"),
+        ([permission(DENIED)], MISSING, RULE_FILE, "udevadm"),
+        ([permission(SEEN)], OK, "can be opened", None),
+        ([permission(platform="darwin")], OK, "not needed", None),
+        ([permission(rules="\n".join(RULES))], OK, "there", None),
+        ([permission(is_root=True)], OK, "root", "udevadm"),
+        (check_controllers(None), NOTE, "without hidapi", None),
+        (check_controllers([]), NOTE, "none is connected", "by USB"),
+        (check_controllers([SEEN]), OK, f"on USB: {ADDRESS}, firmware 0x0110002a, battery about 95%, full", None),
+        (check_controllers([DENIED]), MISSING, "/dev/hidraw3: no permission", "^do this$"),
+        ([check_uhid("linux", exists=True, writable=True)], OK, "can be used", None),
+        ([check_uhid("linux", exists=False, writable=False)], NOTE, "not there", "sudo modprobe uhid"),
+        ([check_uhid("linux", exists=True, writable=False)], NOTE, "no permission", "sudo setfacl -m u:"),
+        ([check_uhid("darwin", exists=False, writable=False)], NOTE, "Linux alone", None),
+        (check_realtime("linux", []), OK, "permitted", None),
+        (check_realtime("darwin", []), NOTE, "Linux alone", None),
+        (check_realtime("linux", [NO_RIGHT]), NOTE, "locking memory is not permitted;", "^sudo this; and that$"),
+        (check_ports(dict.fromkeys(PORTS)), OK, "5555, 5556, 8080 are free", None),
+        (check_ports({5555: "in use"}), NOTE, "5555, the control port", "--bind tcp://127.0.0.1:5557"),
+        ([check_rendering({"egl": "egl: gone", "osmesa": None})], OK, "OSMESA", None),
+        ([check_rendering({"egl": "egl: gone", "osmesa": "nor it"})], NOTE, "egl: gone; nor it", "libegl1"),
+        (check_kernels(KernelFacts(30, 0, "/there", writable=False)), OK, "30 compiled for this processor", None),
+        (check_kernels(KernelFacts(30, 2, "/there", writable=True)), NOTE, "2 of 30 are not compiled", COMPILE),
+        (check_kernels(KernelFacts(30, 2, "/x", writable=False)), NOTE, "each start", f"NUMBA_CACHE_DIR.*{COMPILE}"),
+    ],
+)
+def test_a_check(findings: list[Finding], verdict: Verdict, said: str, remedy: str | None) -> None:
+    [finding] = findings
     assert finding.verdict is verdict
-    assert finding.for_demo
+    assert said in finding.said
+    assert (finding.remedy is None) == (remedy is None)
+    assert re.search(remedy or "", finding.remedy or "")
+    # The demo needs nothing but Python and its own extra.
+    assert fit_for_demo(findings) == (verdict is not MISSING or finding.name not in ("Python", "extra robot"))
 
 
-def test_what_is_checked_is_what_the_package_says() -> None:
+def test_what_is_checked_is_what_the_package_and_the_robot_side_say() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["requires-python"] == f">={OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]}"
     for extra, modules in EXTRAS.items():
         assert len(project["optional-dependencies"][extra]) == len(modules)
-
-
-def test_hidapi_has_another_module_on_linux() -> None:
     assert "hidraw" in modules_of("operator", "linux")
     assert "hid" in modules_of("operator", "darwin")
-
-
-def test_an_extra_that_is_there() -> None:
-    for extra in EXTRAS:
-        finding = check_extra(extra, {})
-        assert (finding.verdict, finding.remedy) == (OK, None)
-
-
-@pytest.mark.parametrize(
-    ("extra", "verdict"), [("robot", MISSING), ("operator", NOTE), ("record", NOTE), ("experiments", NOTE)]
-)
-def test_an_extra_that_is_not(extra: str, verdict: Verdict) -> None:
-    finding = check_extra(extra, {"some_module": "No module named 'some_module'"})
-    assert finding.verdict is verdict
-    assert "not installed: some_module" in finding.said
-    assert finding.remedy == f"pip install 'feelahead[{extra}]'"
-    assert finding.for_demo is (verdict is MISSING)
-
-
-def test_an_extra_that_is_broken() -> None:
-    finding = check_extra("robot", {"numba": "No module named 'numba'", "mujoco": "libGL.so.1: cannot open"})
-    assert "not installed: numba; cannot be imported: mujoco (libGL.so.1: cannot open)" in finding.said
-    assert finding.remedy == "pip install --force-reinstall numba mujoco-core"
-
-
-@pytest.mark.parametrize(
-    ("platform", "hid", "verdict", "remedy"),
-    [
-        ("linux", HidFacts("0.15.0", ("hidapi",), None), OK, None),
-        ("linux", HidFacts(None, (), "not importable"), NOTE, "pip install 'feelahead[operator]'"),
-        ("linux", HidFacts("0.15.0", ("hid", "hidapi"), None), NOTE, "pip uninstall hid && "),
-        ("linux", HidFacts("0.15.0", ("hid", "hidapi"), "not hidapi's"), MISSING, "pip uninstall hid && "),
-        ("darwin", HidFacts("0.15.0", ("hid", "hidapi"), None), MISSING, "pip uninstall hid && "),
-        ("win32", HidFacts("0.15.0", ("hidapi",), "a library is missing"), MISSING, "pip install --force-reinstall"),
-    ],
-)
-def test_hidapi_and_the_package_called_hid(platform: str, hid: HidFacts, verdict: Verdict, remedy: str | None) -> None:
-    finding = check_hidapi(platform, hid)
-    assert finding.verdict is verdict
-    assert (finding.remedy or "").startswith(remedy or "")
-    assert (finding.remedy is None) is (remedy is None)
-
-
-def permission(
-    *controllers: ControllerSeen, platform: str = "linux", is_root: bool = False, rules: str = ""
-) -> Finding:
-    return check_permission(platform, is_root=is_root, rules={"/etc/x.rules": rules}, controllers=controllers)
+    assert (RENDERING, RENDERING_PACKAGES) == (BACKENDS, REMEDY)
 
 
 def test_the_rule_with_its_place_and_what_loads_it() -> None:
-    finding = permission()
-    assert finding.verdict is NOTE
-    assert RULE_FILE in finding.said
-    assert finding.remedy is not None
-    for line in (*RULES, f"sudo tee {RULE_FILE} << 'END'", "END"):
-        assert line in finding.remedy.splitlines()
-    assert finding.remedy.endswith("sudo udevadm control --reload && sudo udevadm trigger")
-
-
-def test_its_file_comes_before_the_one_that_gives_devices_to_people() -> None:
+    lines = (permission().remedy or "").splitlines()
+    assert {*RULES, f"sudo tee {RULE_FILE} << 'END'", "END"} <= set(lines)
+    # Before the file that gives devices to people.
     assert Path(RULE_FILE).name < "73-seat-late.rules"
-
-
-def test_without_permission_the_rule_is_missing() -> None:
-    assert permission(DENIED).verdict is MISSING
-
-
-def test_no_rule_is_asked_for_where_none_is_needed() -> None:
-    assert permission(SEEN).verdict is OK
-    assert permission(platform="darwin").verdict is OK
-    assert permission(rules="\n".join(RULES)).verdict is OK
-    as_root = permission(is_root=True)
-    assert as_root.verdict is OK
-    assert as_root.remedy == installing_command()
 
 
 def test_rules_that_others_wrote_count() -> None:
@@ -150,82 +137,32 @@ def test_rules_that_others_wrote_count() -> None:
     assert missing_grants({"a": steam, "b": everybody}) == ["a DualSense Edge on Bluetooth"]
     assert len(missing_grants({"a": steam.replace("KERNEL==", "# KERNEL==")})) == 4
     assert len(missing_grants({"a": steam.replace('MODE="0660", TAG+="uaccess"', 'SYMLINK+="pad"')})) == 4
-    assert missing_grants({"ours": "\n".join(RULES)}) == []
-
-
-def test_controllers() -> None:
-    assert check_controllers(None)[0].verdict is NOTE
-    assert "none is connected" in check_controllers([])[0].said
-    fine, denied = check_controllers([SEEN, DENIED])
-    assert fine.verdict is OK
-    assert fine.said == f"DualSense at /dev/hidraw3 on USB: {ADDRESS}, firmware 0x0110002a, battery about 95%, full"
-    assert (denied.verdict, denied.remedy) == (MISSING, "do this")
-
-
-@pytest.mark.parametrize(
-    ("platform", "uhid", "verdict", "remedy"),
-    [
-        ("linux", UhidFacts(exists=True, writable=True), OK, ""),
-        ("linux", UhidFacts(exists=False, writable=False), NOTE, "sudo modprobe uhid"),
-        ("linux", UhidFacts(exists=True, writable=False), NOTE, "sudo setfacl -m u:"),
-        ("darwin", UhidFacts(exists=False, writable=False), NOTE, ""),
-    ],
-)
-def test_virtual_controllers(platform: str, uhid: UhidFacts, verdict: Verdict, remedy: str) -> None:
-    finding = check_uhid(platform, uhid)
-    assert finding.verdict is verdict
-    assert (finding.remedy or "").startswith(remedy)
-
-
-def test_realtime_rights() -> None:
-    assert [finding.verdict for finding in check_realtime("linux", [])] == [OK]
-    assert [finding.verdict for finding in check_realtime("darwin", [])] == [NOTE]
-    note = "--realtime: locking memory is not permitted; to permit it: sudo this; and that"
-    [finding] = check_realtime("linux", [note])
-    assert (finding.verdict, finding.remedy) == (NOTE, "sudo this; and that")
-    assert finding.said.startswith("locking memory is not permitted")
-
-
-def test_ports() -> None:
-    assert [finding.said for finding in check_ports(dict.fromkeys(PORTS))] == ["5555, 5556, 8080 are free"]
-    free, taken = check_ports({5555: "Address already in use", 5556: None, 8080: None})
-    assert (free.verdict, taken.verdict) == (OK, NOTE)
-    assert "5555, the control port" in taken.said
-    assert taken.remedy is not None
-    assert "--bind tcp://127.0.0.1:5557" in taken.remedy
-
-
-def test_only_what_the_demo_needs_decides() -> None:
-    assert fit_for_demo([Finding("a", MISSING, ""), Finding("b", OK, "", for_demo=True)])
-    assert not fit_for_demo([Finding("a", MISSING, "", for_demo=True)])
 
 
 # On this machine
 
 
 def test_a_port_that_is_taken_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
+    with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        monkeypatch.setattr(facts, "PORTS", {port: "a test"})
-        assert facts.port_troubles() == {port: "Address already in use"}
+        monkeypatch.setattr(machine, "PORTS", {port: "a test"})
+        assert machine.port_troubles() == {port: "Address already in use"}
 
 
 @pytest.mark.processes
-def test_what_cannot_be_imported_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(facts, "EXTRAS", {"robot": ()})
-    monkeypatch.setattr(facts, "modules_of", lambda *_: ("json", "no_such_module"))
-    assert facts.failed_imports() == {"robot": {"no_such_module": "No module named 'no_such_module'"}}
+def test_what_cannot_be_imported_or_rendered_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine, "EXTRAS", {"robot": ("json", "no_such_module")})
+    assert machine.failed_imports() == {"robot": {"no_such_module": "No module named 'no_such_module'"}}
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+    monkeypatch.setenv("EGL_PLATFORM", "none")
+    assert str(machine.rendering_troubles(["egl"])["egl"]).startswith("egl: ")
 
 
 def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     working, denied = FakeHandle(BLUETOOTH), FakeHandle(opens=False, reason="in use")
     backend: HidBackend = FakeBackend({0x0CE6: {b"/dev/a": working}, 0x0DF2: {b"/dev/b": denied}})
-    monkeypatch.setattr(facts, "load_backend", lambda: backend)
-    seen = facts.controllers_seen()
-    assert seen is not None
-    first, second = seen
+    monkeypatch.setattr(controllers, "load_backend", lambda: backend)
+    first, second = controllers.controllers_seen() or []
     assert (first.model, first.transport, first.address, first.trouble) == ("DualSense", "Bluetooth", ADDRESS, None)
     assert first.firmware == "0x0110002a (hardware 0x00000616)"
     assert first.battery is not None
@@ -245,28 +182,21 @@ def fake_findings(verdict: Verdict) -> list[Finding]:
 def test_the_exit_code_says_whether_the_demo_can_run(
     verdict: Verdict, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(facts, "controllers_seen", lambda: [SEEN])
+    monkeypatch.setattr(controllers, "controllers_seen", lambda: [SEEN])
     monkeypatch.setattr(doctor_command, "examine", lambda _: fake_findings(verdict))
     assert command(["doctor", "--json"]) == code
     told = json.loads(capsys.readouterr().out)
     assert told["demo"] is (code == 0)
-    assert told["findings"][0] == {
-        "name": "extra robot",
-        "verdict": verdict.value,
-        "said": "numba [gone]",
-        "remedy": "pip install 'feelahead[robot]'",
-        "for_demo": True,
-    }
+    assert (told["findings"][0]["name"], told["findings"][0]["verdict"]) == ("extra robot", verdict.value)
     assert told["controllers"][0]["address"] == ADDRESS
 
 
 def test_what_is_to_be_copied_is_not_wrapped() -> None:
-    console = Console(width=60, record=True, quiet=False, file=None)
+    console = Console(width=60)
     with console.capture() as captured:
         doctor_command.show(fake_findings(MISSING), console)
     lines = captured.get().splitlines()
-    for line in installing_command().splitlines():
-        assert line in lines
+    assert set(installing_command().splitlines()) <= set(lines)
     assert any("numba [gone]" in line for line in lines)
 
 
@@ -281,60 +211,7 @@ def test_here_it_tells_of_everything(capsys: pytest.CaptureFixture[str]) -> None
     assert code == (0 if told["demo"] else 1)
 
 
-def test_a_flag_that_it_does_not_have() -> None:
-    with pytest.raises(ConfigurationError, match="--colour"):
-        command(["doctor", "--colour"])
-
-
-def test_one_way_to_render_is_enough() -> None:
-    found = check_rendering({"egl": "egl: no such library", "osmesa": None})
-    assert (found.verdict, found.remedy) == (OK, None)
-    assert "OSMESA" in found.said
-
-
-def test_without_a_way_to_render_the_packages_are_named_and_the_demo_runs_all_the_same() -> None:
-    found = check_rendering({"egl": "egl: no such library", "osmesa": "osmesa: nor this one"})
-    assert found.verdict is NOTE
-    assert "egl: no such library; osmesa: nor this one" in found.said
-    assert found.remedy is not None
-    assert "libegl1" in found.remedy
-    assert fit_for_demo([found])
-
-
-def test_doctor_tries_what_the_robot_side_tries_and_says_the_same() -> None:
-    assert (RENDERING, RENDERING_PACKAGES) == (BACKENDS, REMEDY)
-
-
-@pytest.mark.processes
-def test_a_way_to_render_that_does_not_work_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
-    monkeypatch.setenv("EGL_PLATFORM", "none")
-    assert str(facts.rendering_troubles(["egl"])["egl"]).startswith("egl: ")
-
-
-@pytest.mark.parametrize(
-    ("seen", "verdict", "said", "remedy"),
-    [
-        (KernelFacts(30, 0, "/there", writable=True), OK, "30 compiled for this processor, in /there", None),
-        (KernelFacts(30, 0, "/there", writable=False), OK, "30 compiled for this processor, in /there", None),
-        (KernelFacts(30, 2, "/there", writable=True), NOTE, "2 of 30 are not compiled", COMPILE),
-        (KernelFacts(30, 2, "/there", writable=False), NOTE, "each start compiles", f"NUMBA_CACHE_DIR.*{COMPILE}"),
-    ],
-)
-def test_kernels(seen: KernelFacts, verdict: Verdict, said: str, remedy: str | None) -> None:
-    (found,) = check_kernels(seen)
-    assert found.verdict is verdict
-    assert said in found.said
-    assert fit_for_demo([found])
-    assert (found.remedy is None) == (remedy is None)
-    assert remedy is None or re.search(remedy, found.remedy or "")
-
-
-def test_without_numba_nothing_is_said_of_kernels() -> None:
-    assert check_kernels(None) == []
-
-
-def test_kernels_are_compiled_beforehand_and_once(
+def test_kernels_are_compiled_beforehand_and_once_and_said_where_they_cannot_be_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
@@ -345,18 +222,7 @@ def test_kernels_are_compiled_beforehand_and_once(
     assert told["folder"] == str(tmp_path / "kernels")
     assert command(["doctor", "--compile"]) == 0
     assert capsys.readouterr().out.startswith("0 kernels compiled")
-
-
-def test_kernels_that_cannot_be_kept_are_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
-    monkeypatch.setattr(warm_up_module, "import_kernels", fresh_kernels)
     assert command(["doctor", "--compile"]) == 1
     assert "3 of 3 kernels were compiled, but not kept" in capsys.readouterr().out
-
-
-def test_compiling_is_of_this_machine_alone() -> None:
-    with pytest.raises(ConfigurationError, match="--compile with --connect"):
-        command(["doctor", "--compile", "--connect", "tcp://127.0.0.1:5555"])

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
+from tests.helpers.machines.two_machines import two_machines
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.processes
@@ -58,7 +58,7 @@ class Desk:
                 process.communicate(timeout=LIMIT_S)
 
     def doctor(self, connect: str = CONTROL) -> dict[str, Any]:
-        """What the doctor says on the operator's machine."""
+        """Run the doctor on the operator's machine."""
         program = [*self.operator, sys.executable, "-m", "feelahead", "doctor", "--json", "--connect", connect]
         done = subprocess.run(program, check=False, capture_output=True, text=True, cwd=ROOT, timeout=LIMIT_S)
         told: dict[str, Any] = json.loads(done.stdout)
@@ -68,31 +68,25 @@ class Desk:
 
 @pytest.fixture
 def desk() -> Iterator[Desk]:
-    with contextlib.ExitStack() as stack:
-        try:
-            robot, operator = stack.enter_context(two_machines(ROBOT, OPERATOR))
-        except NotPermittedError as error:
-            pytest.skip(str(error))
+    with two_machines(ROBOT, OPERATOR) as (robot, operator):
         yield Desk(robot.surroundings, operator.surroundings)
 
 
-def test_no_network_there(desk: Desk) -> None:
-    told = desk.doctor("tcp://10.91.84.1:5555")
+@pytest.mark.parametrize(
+    ("address", "route", "said"),
+    [
+        ("10.91.84.1", False, "Network is unreachable"),
+        ("10.91.84.1", True, "No route to host"),
+        ("10.91.83.77", False, "no machine on its network has that address"),
+    ],
+    ids=["no network", "unreachable", "nobody's address"],
+)
+def test_no_way_there(desk: Desk, address: str, route: bool, said: str) -> None:
+    if route:
+        desk.run(desk.operator, "ip", "route", "add", "unreachable", "10.91.84.0/24")
+    told = desk.doctor(f"tcp://{address}:5555")
     assert told["wrong"] == "route"
-    assert "Network is unreachable" in told["said"]
-
-
-def test_a_way_that_is_known_to_lead_nowhere(desk: Desk) -> None:
-    desk.run(desk.operator, "ip", "route", "add", "unreachable", "10.91.84.0/24")
-    told = desk.doctor("tcp://10.91.84.1:5555")
-    assert told["wrong"] == "route"
-    assert "No route to host" in told["said"]
-
-
-def test_an_address_that_no_machine_has(desk: Desk) -> None:
-    told = desk.doctor("tcp://10.91.83.77:5555")
-    assert told["wrong"] == "route"
-    assert "no machine on its network has that address" in told["said"]
+    assert said in told["said"]
 
 
 def test_nothing_listens(desk: Desk) -> None:
@@ -101,24 +95,18 @@ def test_nothing_listens(desk: Desk) -> None:
     assert "--bind tcp://0.0.0.0:5555" in told["remedy"]
 
 
-def test_a_firewall_that_drops(desk: Desk) -> None:
-    desk.block("tcp dport 5555 drop")
-    assert desk.doctor()["wrong"] == "firewall"
-
-
-def test_a_firewall_that_drops_what_goes_to_the_view_port_alone(desk: Desk) -> None:
-    desk.block("tcp dport 5556 drop")
+@pytest.mark.parametrize(
+    ("rule", "wrong"),
+    [
+        ("tcp dport 5555 drop", "firewall"),
+        ("tcp dport 5556 drop", "view port"),
+        ("tcp dport 5555 ip length > 1000 drop", "large packets"),
+    ],
+)
+def test_a_firewall(desk: Desk, rule: str, wrong: str) -> None:
+    desk.block(rule)
     with desk.serving():
-        told = desk.doctor()
-    assert told["wrong"] == "view port"
-    assert f"{ROBOT}:5556 gave no answer" in told["said"]
-    assert "any to any port 5555,5556" in told["remedy"]
-
-
-def test_large_packets_that_are_swallowed(desk: Desk) -> None:
-    desk.block("tcp dport 5555 ip length > 1000 drop")
-    with desk.serving():
-        assert desk.doctor()["wrong"] == "large packets"
+        assert desk.doctor()["wrong"] == wrong
 
 
 def test_all_is_well(desk: Desk) -> None:

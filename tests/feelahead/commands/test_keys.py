@@ -33,24 +33,18 @@ def test_the_printed_commands_lead_from_nothing_to_an_allowed_operator(
     assert "anna" not in said(capsys, "list", *robot)
 
 
-def test_a_key_whose_file_is_named_as_no_peer_is_pointed_out(
+def test_a_public_file_may_be_handed_over_and_a_file_named_as_no_peer_is_pointed_out(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     folder = ["--folder", str(tmp_path / "robot")]
-    key = re.findall(r"[0-9a-f]{64}", said(capsys, "make", "operator", "--folder", str(tmp_path / "operator")))[0]
-    said(capsys, "allow", "anna", key, *folder)
-    assert "passed over" not in said(capsys, "list", *folder)
-    (tmp_path / "robot" / "allowed" / "alice.smith.public").write_text(key)
-    (tmp_path / "robot" / "allowed" / ".hidden.public").write_text(key)
+    said(capsys, "make", "operator", "--folder", str(tmp_path / "operator"))
+    handed = tmp_path / "operator" / "operator.public"
+    assert "anna" in said(capsys, "allow", "anna", str(handed), *folder)
+    for name in ("alice.smith.public", ".hidden.public"):
+        (tmp_path / "robot" / "allowed" / name).write_text(handed.read_text())
     listed = said(capsys, "list", *folder)
     assert "passed over, for its name is no peer's: alice.smith.public; valid: letters" in listed
     assert "hidden" not in listed
-
-
-def test_a_public_file_may_be_handed_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    said(capsys, "make", "operator", "--folder", str(tmp_path / "operator"))
-    handed = str(tmp_path / "operator" / "operator.public")
-    assert "anna" in said(capsys, "allow", "anna", handed, "--folder", str(tmp_path / "robot"))
 
 
 @pytest.mark.parametrize(
@@ -72,15 +66,6 @@ def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], named: str)
         command(["keys", *arguments, *folder])
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_help_teaches_the_whole_way(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        command(["keys", "--help"])
-    assert stop.value.code == 0
-    shown = capsys.readouterr().out
-    for step in ("make robot", "make operator", "allow NAME", "feelahead-robot --bind", "--robot-key"):
-        assert step in shown
 
 
 @pytest.mark.parametrize(

@@ -10,15 +10,11 @@ from pathlib import Path
 import pytest
 
 from common.clock import VirtualClock
-from common.errors import ConfigurationError
 from feelahead.commands.virtual_dualsense import (
     DRIVER_PATIENCE_S,
     PULL_PERIOD_S,
     VirtualDualSenseSettings,
-    described,
     live,
-    pulling,
-    virtual_dualsense,
 )
 from feelahead.main import command
 from operator_side.dualsense.effects.official import Feedback, Off
@@ -27,19 +23,16 @@ from operator_side.dualsense.reports.feature_report import parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from operator_side.dualsense.uhid.file import UHID_PATH
 from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
 
 INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
 
 
-def lived(
-    kernel: FakeKernel, settings: VirtualDualSenseSettings, stopped: Callable[[], bool] = lambda: False
-) -> list[str]:
-    """What a controller says in its life."""
+def lived(kernel: FakeKernel, settings: VirtualDualSenseSettings) -> list[str]:
+    """Run a controller's life; return its lines."""
     lines: list[str] = []
-    live(settings, kernel, kernel.clock, stopped, lines.append)
+    live(settings, kernel, kernel.clock, lambda: False, lines.append)
     return lines
 
 
@@ -82,12 +75,6 @@ def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None
     assert kernel.heard[-1][1][0] == DESTROY
 
 
-def test_it_ends_when_it_is_asked_to() -> None:
-    kernel = FakeKernel(VirtualClock())
-    lived(kernel, VirtualDualSenseSettings(), stopped=lambda: kernel.clock.now() >= 3.0)
-    assert kernel.clock.now() == pytest.approx(3.0, abs=0.01)
-
-
 def test_without_a_driver_it_says_so_once() -> None:
     kernel = FakeKernel(VirtualClock())
     lines = lived(kernel, VirtualDualSenseSettings(duration=2 * DRIVER_PATIENCE_S))
@@ -109,30 +96,6 @@ def test_pulling_hands_are_seen_to_move() -> None:
     middle = len(states) // 2
     assert all(state.l2 == 0.0 for state in states[:middle])
     assert all(state.r2 == 0.0 for state in states[middle + 50 :])
-
-
-@pytest.mark.parametrize(
-    ("quarters", "expected"),
-    [
-        (0, [0.0, 0.0, 0.8, 0.0]),
-        (1, [0.0, NORMAL_FINGER_FORCE_N, 0.0, 0.8]),
-        (3, [NORMAL_FINGER_FORCE_N, 0.0, 0.0, -0.8]),
-    ],
-)
-def test_hands_that_pull(quarters: int, expected: list[float]) -> None:
-    l2_n, r2_n, stick = pulling(quarters * PULL_PERIOD_S / 4)
-    assert [l2_n, r2_n, *stick] == pytest.approx(expected)
-
-
-def test_effects_in_words() -> None:
-    assert described(Off()) == "Off"
-    assert described(Feedback(position=9, strength=1)) == "Feedback, position 9, strength 1"
-
-
-@pytest.mark.parametrize("duration", ["0", "-1", "1e6", "nan"])
-def test_an_impossible_duration_is_refused(duration: str) -> None:
-    with pytest.raises(ConfigurationError, match=r"--duration .*: valid: above 0"):
-        virtual_dualsense(["--duration", duration])
 
 
 def test_the_command_is_one_of_feelaheads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,15 +1,20 @@
-"""The cable between the two networks, found and described without touching any network."""
+"""The router without any network: the cable that it finds, and what it tells the kernel."""
 
-import json
 import re
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
-from feelahead.containers import guest
-from feelahead.containers.cable import Cable, End, delays, find_cable
+from common.emulation.profile import LinkProfile
+from common.emulation.spec import Direction, LinkSpec
+from feelahead.containers.cable import Cable, End, find_cable
+from feelahead.containers.netem import BeyondNetemError, Counted, count_packets, netem_words
 from tests.helpers.repository import ROOT
+
+
+def words(spec: str) -> Mapping[Direction, str]:
+    return netem_words(LinkSpec.parse(spec))
 
 
 def interface(name: str, number: int, *addresses: str) -> dict[str, Any]:
@@ -18,7 +23,6 @@ def interface(name: str, number: int, *addresses: str) -> dict[str, Any]:
         "ifname": name,
         "ifindex": number,
         "mtu": 1500,
-        "address": f"02:42:00:00:00:{number:02x}",
         "addr_info": [{"family": "inet", "local": local, "prefixlen": int(length)} for local, length in held],
     }
 
@@ -38,8 +42,8 @@ def cable() -> Cable:
 def test_the_robots_end_is_the_one_that_reaches_it(order: int) -> None:
     found = find_cable([LO, *SIDES[::order]], ROBOT)
     assert found == Cable(
-        End("eth1", 7, "02:42:00:00:00:07", "172.21.0.2/16"),
-        End("eth0", 5, "02:42:00:00:00:05", "172.20.0.3/16"),
+        End("eth1", 7, "172.21.0.2/16"),
+        End("eth0", 5, "172.20.0.3/16"),
         ROBOT,
     )
 
@@ -54,11 +58,18 @@ def test_an_interface_that_went_and_came_back_is_another_one() -> None:
     assert find_cable([SIDES[0], interface("eth1", 9, "172.21.0.2/16")], ROBOT) != cable()
 
 
-def test_what_is_sent_to_a_side_is_delayed_on_the_way_to_it() -> None:
-    said = delays(cable().leaves(), {"to_robot": "delay 20ms", "to_operator": "delay 50ms loss 1%"})
+def test_what_is_sent_to_a_side_is_delayed_on_the_way_to_it_and_counted_as_such() -> None:
+    said = cable().delays({"to_robot": "delay 20ms", "to_operator": "delay 50ms loss 1%"})
     by_interface = {line[line.index("dev") + 1]: " ".join(line) for line in said if "netem" in line}
-    assert by_interface["eth1"].endswith("netem delay 20ms")
-    assert by_interface["eth0"].endswith("netem delay 50ms loss 1%")
+    assert by_interface["eth1"].endswith("handle 2: netem delay 20ms")
+    assert by_interface["eth0"].endswith("handle 3: netem delay 50ms loss 1%")
+    queues = [
+        {"kind": "noqueue", "handle": "0:", "packets": 9, "drops": 0},
+        {"kind": "netem", "handle": "3:", "packets": 990, "drops": 10},
+        {"kind": "netem", "handle": "2:", "packets": 500, "drops": 0},
+    ]
+    assert count_packets(queues) == {"to_robot": Counted(500, 0), "to_operator": Counted(990, 10)}
+    assert count_packets(queues[:1]) == {}
 
 
 def test_the_rules_pass_on_the_two_ports_only() -> None:
@@ -67,26 +78,47 @@ def test_the_rules_pass_on_the_two_ports_only() -> None:
     assert rules.count("{ 5555, 5556 }") == 2
 
 
-@pytest.mark.processes
-def test_the_address_that_the_guest_has_taken_still_counts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    ran: list[list[str]] = []
-    bare = [interface(shown["ifname"], shown["ifindex"]) for shown in SIDES]
+def test_each_direction_gets_its_own_words() -> None:
+    said = words("to_robot: delay 20ms; to_operator: delay 50ms 10ms distribution normal loss 1% limit 2000")
+    assert said["to_robot"] == "delay 20ms"
+    assert LinkProfile.parse(said["to_operator"]) == LinkProfile.parse(
+        "delay 50ms 10ms distribution normal loss 1% limit 2000"
+    )
 
-    def run(words: list[str]) -> str:
-        ran.append(words)
-        return json.dumps([LO, *bare])
 
-    monkeypatch.setattr(guest, "run_system", run)
-    monkeypatch.setattr(guest, "_KERNEL", "false")
-    one = guest.Guest(tmp_path / "guest")
-    one.start(cable(), {"to_robot": "delay 20ms", "to_operator": "delay 0ms"})
-    assert find_cable(map(one.with_taken_addresses, [LO, *bare]), ROBOT) == cable()
-    init = (tmp_path / "guest/init").read_text()
-    assert "ip address add 172.20.0.3/16 dev vec0" in init
-    assert "dev vec1 parent 1: handle 2: netem delay 20ms" in init
-    ran.clear()
-    one.stop()
-    assert ["ip", "address", "replace", "172.21.0.2/16", "dev", "eth1"] in ran
+def test_nothing_asked_for_is_no_delay() -> None:
+    assert words("") == {"to_robot": "delay 0ms", "to_operator": "delay 0ms"}
+
+
+@pytest.mark.parametrize(
+    ("spec", "why"),
+    [
+        ("delay 10ms 5ms distribution exponential", "distribution"),
+        ("delay 10ms outage 1s at 2s", "outage"),
+        ("to_operator.telemetry: delay 5ms", "streams"),
+        ("to_robot: outage 1s at 2s", "to_robot: outage"),
+        ("slot distribution uniform 20ms 5ms", "slot"),
+    ],
+)
+def test_what_netem_cannot_do_is_left_to_the_sides(spec: str, why: str) -> None:
+    with pytest.raises(BeyondNetemError, match=why):
+        words(spec)
+
+
+def test_a_clause_of_video_changes_nothing() -> None:
+    """Nothing sends video yet, and what is not sent needs no netem."""
+    assert words("delay 5ms; video: rate 2mbit")["to_operator"] == "delay 5ms"
+
+
+def test_the_share_that_was_lost_is_of_what_came_since() -> None:
+    assert Counted(990, 10).lost_share_since(Counted(0, 0)) == 0.01
+    assert Counted(1089, 11).lost_share_since(Counted(990, 10)) == 0.01
+    assert Counted(990, 10).lost_share_since(Counted(990, 10)) is None
+
+
+def test_what_was_set_up_anew_meanwhile_tells_nothing() -> None:
+    assert Counted(5, 0).lost_share_since(Counted(990, 0)) is None
+    assert Counted(2000, 0).lost_share_since(Counted(990, 10)) is None
 
 
 def test_the_locks_of_the_images_are_parts_of_the_lock() -> None:

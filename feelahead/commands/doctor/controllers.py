@@ -1,0 +1,200 @@
+"""Checks of a real controller (hidapi, permission, connection) and of a virtual one."""
+
+import importlib.metadata
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import DeviceError, NoDriverError, RemoteProtocolError
+from feelahead.commands.doctor.finding import Finding, Verdict
+from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
+from operator_side.dualsense.hid.finding import sightings
+from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing_command
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
+
+_UHID: Final = "/dev/uhid"
+
+
+@dataclass(frozen=True)
+class HidFacts:
+    """The packages installed under hidapi's names."""
+
+    version: str | None
+    """The package hidapi's; None where it is not installed."""
+    packages_of_hid: tuple[str, ...]
+    """All that install a module called `hid`."""
+    trouble: str | None
+    """Why it cannot be used; None if it can."""
+
+
+@dataclass(frozen=True)
+class ControllerSeen:
+    """A controller that the system has, and what it says of itself; None for what it does not say."""
+
+    model: str
+    path: str
+    transport: str | None = None
+    address: str | None = None
+    firmware: str | None = None
+    battery: str | None = None
+    trouble: str | None = None
+    """Why it cannot be used, and what to do; None if it can."""
+
+
+def check_hidapi(platform: str, facts: HidFacts) -> Finding:
+    """Whether hidapi is there, and no other package in its place."""
+    name = "hidapi"
+    if facts.version is None:
+        return Finding(name, Verdict.NOTE, "not installed (for a real controller)", "pip install 'feelahead[operator]'")
+    again = "pip install --force-reinstall hidapi"
+    strangers = [package for package in facts.packages_of_hid if package.lower() != "hidapi"]
+    if strangers:
+        # On Linux ours is the module hidraw, which nobody else brings.
+        verdict = Verdict.NOTE if platform == "linux" and facts.trouble is None else Verdict.MISSING
+        said = f"{facts.version}, but the package {' and '.join(strangers)} installs a module called hid, too"
+        return Finding(name, verdict, said, f"pip uninstall {' '.join(strangers)} && {again}")
+    if facts.trouble is not None:
+        return Finding(name, Verdict.MISSING, facts.trouble, again)
+    return Finding(name, Verdict.OK, facts.version)
+
+
+def check_permission(
+    platform: str, *, is_root: bool, rules: Mapping[str, str], controllers: Sequence[ControllerSeen]
+) -> Finding:
+    """Whether a controller may be opened: seen to be so, or by udev's rules (`rules`: file -> text)."""
+    name = "udev rule"
+    if platform != "linux":
+        return Finding(name, Verdict.OK, f"not needed on {platform}")
+    if controllers and all(seen.trouble is None for seen in controllers):
+        return Finding(name, Verdict.OK, "the controller can be opened")
+    if not (missing := missing_grants(rules)):
+        return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
+    remedy = installing_command()
+    if is_root:
+        said = "not needed by root, who you are; what is below is for everybody else"
+        return Finding(name, Verdict.OK, said, remedy)
+    denied = any(seen.trouble is not None and "permission" in seen.trouble for seen in controllers)
+    opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
+    return Finding(
+        name, Verdict.MISSING if denied else Verdict.NOTE, f"none in {RULE_FILE} or elsewhere {opened}", remedy
+    )
+
+
+def missing_grants(rules: Mapping[str, str]) -> list[str]:
+    """The models and transports that no rule in these files opens to the person at the machine."""
+    lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
+    granting = [line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line)]
+    patterns = {
+        f"a {model} on {transport}": pattern
+        for product, model in PRODUCT_IDS.items()
+        for transport, pattern in (
+            ("USB", rf'idProduct\}}\s*==\s*"{product:04x}"'),
+            ("Bluetooth", rf'KERNELS\s*==\s*"[^"]*{SONY_VENDOR_ID:04X}:{product:04X}'),
+        )
+    }
+    return [
+        name
+        for name, pattern in patterns.items()
+        if not any(re.search(pattern, line, re.IGNORECASE) for line in granting)
+    ]
+
+
+def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Finding]:
+    """Each controller that is connected; None: without hidapi nobody can know."""
+    name = "controller"
+    if controllers is None:
+        return [Finding(name, Verdict.NOTE, "cannot be looked for without hidapi")]
+    if not controllers:
+        how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
+        return [Finding(name, Verdict.NOTE, "none is connected (the demo simulates one)", how)]
+    return [_described(seen) for seen in controllers]
+
+
+def check_uhid(platform: str, *, exists: bool, writable: bool) -> Finding:
+    """Whether `feelahead virtual-dualsense` can show a controller to the system."""
+    purpose = "for feelahead virtual-dualsense"
+    if platform != "linux":
+        return Finding(_UHID, Verdict.NOTE, f"Linux alone has it ({purpose})")
+    if not exists:
+        return Finding(_UHID, Verdict.NOTE, f"not there ({purpose})", "sudo modprobe uhid")
+    if not writable:
+        command = f"sudo setfacl -m u:{os.environ.get('USER', 'YOU')}:rw {_UHID}"
+        return Finding(_UHID, Verdict.NOTE, f"no permission ({purpose})", command)
+    return Finding(_UHID, Verdict.OK, f"can be used ({purpose})")
+
+
+def _described(seen: ControllerSeen) -> Finding:
+    place = f"{seen.model} at {seen.path}"
+    if seen.trouble is not None:
+        said, _, remedy = seen.trouble.partition(": ")
+        return Finding("controller", Verdict.MISSING, f"{place}: {said}", remedy or None)
+    parts = (seen.address, f"firmware {seen.firmware or 'unknown'}", f"battery {seen.battery or 'unknown'}")
+    return Finding("controller", Verdict.OK, f"{place} on {seen.transport}: {', '.join(filter(None, parts))}")
+
+
+# Looking
+
+
+def hid_facts() -> HidFacts:
+    """Look at what is installed under hidapi's names."""
+    try:
+        version = importlib.metadata.version("hidapi")
+    except importlib.metadata.PackageNotFoundError:
+        version = None
+    try:
+        load_backend()
+        trouble = None
+    except NoDriverError as error:
+        trouble = str(error)
+    packages = importlib.metadata.packages_distributions().get("hid", [])
+    return HidFacts(version, tuple(sorted(set(packages))), trouble)
+
+
+def controllers_seen() -> list[ControllerSeen] | None:
+    """Every controller that is connected, opened for a moment; None without hidapi."""
+    try:
+        backend = load_backend()
+    except NoDriverError:
+        return None
+    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)]
+
+
+def udev_rules() -> dict[str, str]:
+    """The text of each file of udev's rules."""
+    paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
+    return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
+
+
+def uhid_finding(platform: str) -> Finding:
+    """Look at /dev/uhid."""
+    return check_uhid(platform, exists=Path(_UHID).exists(), writable=os.access(_UHID, os.R_OK | os.W_OK))
+
+
+def is_root() -> bool:
+    """Whether no permission is asked of us."""
+    return hasattr(os, "geteuid") and os.geteuid() == 0
+
+
+def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:
+    name = os.fsdecode(path)
+    try:
+        device = HidDualSense(backend, path)
+    except DeviceError as error:
+        return ControllerSeen(model, name, trouble=str(error))
+    identity = device.identity
+    device.close()
+    firmware = battery = None
+    if identity.firmware is not None:
+        version, hardware = identity.firmware.firmware_version, identity.firmware.hardware_version
+        firmware = f"0x{version:08x} (hardware 0x{hardware:08x})"
+    try:
+        state = parse_input_report(identity.first_report).battery
+    except RemoteProtocolError:
+        state = None
+    if state is not None:
+        battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"
+    return ControllerSeen(model, name, identity.transport.value, identity.address, firmware, battery)

@@ -1,0 +1,96 @@
+"""The gate: refused without the token, and for another web site with it."""
+
+import http.client
+import http.server
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+import pytest
+
+from tests.console.browser import Browser
+from tests.console.run import DRAWN, Run
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+_PAGE = b"<!doctype html><title>another site</title><p>another site</p>"
+
+
+def test_wrong_addresses_are_refused(demo: Run) -> None:
+    """No token, another token, another Host, another Origin: nothing is told."""
+    right = urlsplit(demo.address)
+    port, host = right.port or 0, f"127.0.0.1:{right.port}"
+    token = right.path.strip("/")
+    wrong = "x" * len(token)
+    tried = {
+        "the right address": (f"/{token}/", {"Host": host}),
+        "no token": ("/", {"Host": host}),
+        "another token": (f"/{wrong}/", {"Host": host}),
+        "half the token": (f"/{token[: len(token) // 2]}/", {"Host": host}),
+        "another Host": (f"/{token}/", {"Host": "example.org"}),
+        "a Host that resolves to here": (f"/{token}/", {"Host": f"rebound.example:{port}"}),
+        "another Origin": (f"/{token}/", {"Host": host, "Origin": "http://example.org"}),
+        "a file above": (f"/{token}/../index.html", {"Host": host}),
+    }
+    answers = {}
+    for name, (path, headers) in tried.items():
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0)
+        connection.putrequest("GET", path, skip_host=True)
+        for key, value in headers.items():
+            connection.putheader(key, value)
+        connection.endheaders()
+        answer = connection.getresponse()
+        content = answer.read()
+        answers[name] = answer.status
+        assert name == "the right address" or token.encode() not in content
+        connection.close()
+    assert answers.pop("the right address") == 200, "the right address is refused"
+    let_in = [name for name, status in answers.items() if status < 400]
+    assert not let_in
+
+
+def test_another_site_is_refused(browser: Browser, demo: Run) -> None:
+    """A page of another origin that knows the whole address gets neither content nor a WebSocket nor a frame."""
+    with _another_site() as elsewhere, browser.page(elsewhere) as page:
+        script = """async (address) => {
+            const live = address.replace('http', 'ws') + 'live';
+            const opened = await new Promise((resolve) => {
+                const socket = new WebSocket(live);
+                socket.onopen = () => resolve(true);
+                socket.onclose = socket.onerror = () => resolve(false);
+            });
+            const read = await fetch(address).then(() => true, () => false);
+            const image = await fetch(address, { mode: 'no-cors' }).then((answer) => answer.type, () => 'refused');
+            return { opened, read, image };
+        }"""
+        seen = page.ask(script, demo.address)
+        page.complaints.clear()  # the refusals themselves
+        assert not seen["opened"], "its WebSocket was let in"
+        assert not seen["read"], "it could read the page"
+    with browser.page(demo.address) as page:
+        page.wait(DRAWN, "drawn for whoever may see it")
+
+
+@contextmanager
+def _another_site() -> Iterator[str]:
+    class Answers(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(_PAGE)
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002  # as the base class has it
+            """Say nothing."""
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Answers)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()

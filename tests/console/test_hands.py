@@ -1,0 +1,98 @@
+"""The keyboard and a gamepad drive, and let go as soon as nobody means them."""
+
+from typing import Any, Final
+
+import pytest
+
+from tests.console.browser import Browser, Page
+from tests.console.run import Run
+
+LINK = ()
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+_BUTTONS: Final = 17
+_RUN: Final = 4
+_PULL: Final = 7
+"""L1 and R2 among a standard gamepad's buttons."""
+
+
+def test_space_drives(browser: Browser, demo: Run) -> None:
+    """Space held arms and runs, a pull moves, and the key that comes up lets go."""
+    with browser.page(demo.address) as page:
+        take_over(page, demo)
+        with page.held("Space"):
+            page.wait_for_text("#hands_state", "You drive", 15.0)
+            with page.held("KeyW"):
+                demo.wait_until("pulled", lambda run: pull(run) > 0.1, 5.0)
+                page.picture("hands")
+            demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
+        demo.wait_until("disarmed or at rest", lambda run: not _runs(run), 5.0)
+
+
+def test_hidden_or_left_page_lets_go(browser: Browser, demo: Run) -> None:
+    """A window that loses the focus and a tab that is hidden hold nothing any more, keys down or not."""
+    for leave in (Page.blur, Page.hide):
+        with browser.page(demo.address) as page:
+            take_over(page, demo)
+            with page.held("Space"):
+                page.wait_for_text("#hands_state", "You drive", 15.0)
+                with page.held("KeyW"):
+                    demo.wait_until("pulled", lambda run: pull(run) > 0.1, 5.0)
+                    leave(page)
+                    demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
+
+
+def test_gamepad_drives(browser: Browser, demo: Run) -> None:
+    """A gamepad's trigger is a trigger."""
+    with browser.page(demo.address, gamepad=True) as page:
+        page.pretend_gamepad((0.0,) * 4, (0.0,) * _BUTTONS)
+        take_over(page, demo)
+        held = [0.0] * _BUTTONS
+        held[_RUN] = 1.0
+        page.pretend_gamepad((0.0,) * 4, tuple(held))
+        page.wait_for_text("#hands_state", "You drive", 15.0)
+        held[_PULL] = 0.6
+        page.pretend_gamepad((0.0,) * 4, tuple(held))
+        demo.wait_until("pulled", lambda run: pull(run) > 0.3, 5.0)
+        page.pretend_gamepad((0.0,) * 4, (0.0,) * _BUTTONS)
+        demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
+
+
+def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
+    """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
+    with browser.page(fresh_demo.address) as page:
+        fresh_demo.wait_until("armed", is_armed, 60.0)
+        page.press("Tab")
+        page.press("Escape")
+        fresh_demo.wait_until("stopped", lambda run: not is_armed(run), 5.0)
+        page.wait("document.body.dataset.state != 'armed'", "shown as stopped", 5.0)
+        words = page.text("#state")
+        page.picture("stopped")
+        assert "ARMED" not in words.replace("DISARMED", "")
+
+
+def take_over(page: Page, run: Run) -> None:
+    """The page asks to drive, and its keys rest until it may."""
+    page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 20.0)
+    page.raw.click("#drive")
+    run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser", 10.0)
+    page.wait_for_text("#hands_state", "Ready", 15.0)
+
+
+def _newest(run: Run) -> dict[str, Any]:
+    return dict(run.facts[-1])
+
+
+def is_armed(run: Run) -> bool:
+    """Armed, by the newest facts."""
+    return run.status.get("state") == "armed"
+
+
+def pull(run: Run) -> float:
+    """R2's travel, by the newest facts."""
+    return float(_newest(run)["r2"]["travel"] or 0.0)
+
+
+def _runs(run: Run) -> bool:
+    return is_armed(run) and _newest(run)["hands"] == "browser" and pull(run) > 0.0

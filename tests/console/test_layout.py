@@ -1,0 +1,82 @@
+"""Everything has its place, at the smallest size that is promised and at a large one, and by keyboard alone."""
+
+from typing import Final
+
+import pytest
+
+from tests.console.browser import LARGE, SMALL, Browser, Page
+from tests.console.run import DRAWN, Run
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+_FOCUSABLE: Final = """() => {
+    const all = document.querySelectorAll('a[href], button, input, select, textarea, summary, [tabindex]');
+    return [...all].filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility()).map((one, number) => {
+        one.dataset.reach = number;
+        return one.id || one.getAttribute('aria-label') || one.textContent.trim() || one.tagName;
+    });
+}"""
+_FOCUSED: Final = """() => {
+    const one = document.activeElement;
+    const style = getComputedStyle(one);
+    return [one.dataset?.reach ?? null, style.outlineStyle !== 'none' && parseFloat(style.outlineWidth) >= 2];
+}"""
+_CUT: Final = """() => {
+    const shown = document.querySelectorAll('#state, .age, h2, dt, .meets, .trigger p, button, label');
+    const cut = (one) => one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1;
+    return [...shown].filter((one) => one.checkVisibility() && cut(one)).map((one) => one.textContent.trim());
+}"""
+
+
+@pytest.mark.parametrize("size", [SMALL, LARGE])
+def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -> None:
+    """1280x720 and 1920x1080: no scroll bars of the page, no words cut, both views large."""
+    with browser.page(demo.address, size, scene=True) as page:
+        page.wait(DRAWN, "drawn both views")
+        width, height = page.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+        assert (width, height) == size
+        assert not page.ask(_CUT)
+        widths = [_inside(page, selector, size)[0] for selector in ("#overview", "#first_person")]
+        for selector in ("#l2", "#r2", "#charts", "#scene", "#state"):
+            _inside(page, selector, size)
+        assert min(widths) >= 0.3 * size[0]
+        page.raw.click("#drive")
+        demo.wait_until("the page's hands", lambda run: run.facts[-1]["hands"] == "browser", 10.0)
+        for selector in ("#hands", "#tuning"):
+            _inside(page, selector, size)
+        page.picture(f"page-{size[0]}x{size[1]}")
+
+
+def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
+    """Tab goes to everything that can be used, each with a mark to see, and not into a trap."""
+    with browser.page(demo.address) as page:
+        page.wait(DRAWN, "drawn both views")
+        names = page.ask(_FOCUSABLE)
+        assert len(names) > 0, "nothing can be reached"
+        reached, unmarked = set(), set()
+        for _ in range(3 * len(names) + 20):
+            page.press("Tab")
+            number, marked = page.ask(_FOCUSED)
+            if number is not None:
+                reached.add(int(number))
+                if not marked:
+                    unmarked.add(names[int(number)])
+            if len(reached) == len(names):
+                break
+        missed = [name for number, name in enumerate(names) if number not in reached]
+        assert not missed
+        assert not unmarked
+
+
+def _inside(page: Page, selector: str, size: tuple[int, int]) -> tuple[float, float]:
+    """Return its width and height; AssertionError unless it lies within the page."""
+    box = page.raw.locator(selector).bounding_box() or dict.fromkeys(("x", "y", "width", "height"), 0.0)
+    x, y, width, height = box["x"], box["y"], box["width"], box["height"]
+    assert width > 0
+    assert height > 0
+    assert x >= 0
+    assert y >= 0
+    assert x + width <= size[0]
+    assert y + height <= size[1]
+    return width, height

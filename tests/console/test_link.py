@@ -1,0 +1,73 @@
+"""A link that is lost is unmistakable, also without colours."""
+
+import time
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from tests.console.browser import Browser, Page, border, brightness
+from tests.console.run import DRAWN, STATE, Run
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+_ASKED_S: Final = 1.0
+_LIMIT_S: Final = 4.0
+"""A busy machine may take its time; the line says what it took."""
+
+
+def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
+    """kill -STOP of the robot side: words, border and both views say so, and it all comes back."""
+    with browser.page(demo.address) as page:
+        page.wait(DRAWN, "drawn both views")
+        page.wait(f"{STATE} == 'armed'", "armed", 60.0)
+        before, views_before = border(page.pixels()), _fresh_view(page)
+        words_before = page.text("#state")
+        with demo.frozen("robot"):
+            began_s = time.monotonic()
+            page.wait(f"{STATE} == 'lost'", "shown as lost", _LIMIT_S)
+            print(f"lost after {time.monotonic() - began_s:.2f} s (asked: {_ASKED_S:g} s)")
+            page.wait_for_text("#link", "lost", _LIMIT_S)
+            page.wait_for_text("#overview .stale", "stale", _LIMIT_S)
+            page.wait_for_text("#first_person .stale", "stale", _LIMIT_S)
+            words = page.text("#state")
+            lost, views_lost = border(page.pixels()), page.pixels("#overview")
+            page.picture("link-lost")
+        assert "LOST" in words
+        assert words != words_before
+        colour = np.abs(before.mean(axis=0) - lost.mean(axis=0)).max()
+        assert colour > 40
+        # One flat brightness while armed, stripes while lost: seen by whoever sees no colours.
+        flat, striped = brightness(before).std(), brightness(lost).std()
+        assert flat < 10
+        assert striped > 50
+        greyed = np.abs(brightness(views_before) - brightness(views_lost)).mean()
+        assert greyed > 5
+        page.wait("document.querySelector('#link').textContent == 'up'", "back", 30.0)
+        page.wait("document.querySelector('#overview .stale').hidden", "fresh again", 30.0)
+
+
+def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """The overview at a moment when it was not stale: on a busy machine it may be, now and then."""
+    end_s = time.monotonic() + 60.0
+    while time.monotonic() < end_s:
+        page.wait("document.querySelector('#overview.old') === null", "a fresh view", 60.0)
+        pixels = page.pixels("#overview")
+        if page.ask("document.querySelector('#overview.old') === null"):
+            return pixels
+    raise AssertionError("the overview was stale for a minute")
+
+
+def test_silent_operator_side_is_unmistakable(browser: Browser, demo: Run) -> None:
+    """kill -STOP of the operator side, which feeds the console."""
+    with browser.page(demo.address) as page:
+        page.wait(DRAWN, "drawn both views")
+        with demo.frozen("operator"):
+            began_s = time.monotonic()
+            page.wait("!document.querySelector('#lost').hidden", "shown as silent", _LIMIT_S)
+            print(f"said after {time.monotonic() - began_s:.2f} s (asked: {_ASKED_S:g} s)")
+            words = page.text("#lost")
+            page.picture("operator-silent")
+        assert "HEARD" in words or "LOST" in words
+        page.wait("document.querySelector('#lost').hidden", "back", 30.0)

@@ -1,0 +1,115 @@
+"""The page draws both views, the scene, triggers and words, and they are true."""
+
+import re
+import time
+from typing import Any, Final
+
+import pytest
+
+from tests.console.browser import Browser, Page
+from tests.console.run import DRAWN, Run
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+VIEWS: Final = ("overview", "first_person")
+_OLDEST_MS: Final = 500.0
+_PATIENCE_S: Final = 60.0
+_LEAST_DETAIL: Final = 8.0
+"""Standard deviation of a picture's colours: an empty one has none."""
+
+
+def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
+    """Both cameras' pictures are drawn, have something on them, change, and say their age."""
+    with browser.page(fresh_demo.address) as page:
+        page.wait(DRAWN, "drawn both views")
+        for view in VIEWS:
+            before = page.pixels(f"#{view} canvas")
+            assert before.std() > _LEAST_DETAIL
+            _wait_for_change(page, view, before)
+        # How old on a busy machine is for a benchmark to say; at some moment both have to be fresh.
+        end_s = time.monotonic() + _PATIENCE_S
+        while _oldest_ms(page) >= _OLDEST_MS:
+            assert time.monotonic() < end_s
+        page.picture("views")
+
+
+def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
+    """The scene has something on it, beside what the page says of it in words."""
+    with browser.page(fresh_demo.address, scene=True) as page:
+        page.wait("!document.querySelector('#scene iframe').hidden", "a scene", _PATIENCE_S)
+        end_s = time.monotonic() + _PATIENCE_S
+        while page.pixels("#scene iframe").std() <= _LEAST_DETAIL:
+            assert time.monotonic() < end_s
+        page.picture("scene")
+
+
+def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
+    """The zones' numbers and heights equal those that the operator side wrote."""
+    with browser.page(fresh_demo.address) as page:
+        page.wait("document.querySelectorAll('#r2 .zones b').length == 10", "drawn the zones")
+        fresh_demo.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
+        script = """() => ['l2', 'r2'].map((side) => [...document.querySelectorAll(`#${side} .zones div`)]
+            .map((zone) => {
+            const bar = zone.querySelector('i').getBoundingClientRect();
+            return [Number(zone.querySelector('b').textContent), bar.height / zone.getBoundingClientRect().height];
+        }))"""
+        compared, stiff, end_s = 0, 0, time.monotonic() + 20.0
+        while time.monotonic() < end_s and (compared < 30 or stiff < 5):
+            seen: list[list[tuple[float, float]]] = page.ask(script)
+            time.sleep(0.15)
+            fresh_demo.look()
+            newest = [[list(facts[side]["zones"]) for side in ("l2", "r2")] for facts in list(fresh_demo.facts)[-8:]]
+            shown = [[round(number) for number, _ in side] for side in seen]
+            for side in seen:
+                for number, height in side:
+                    assert abs(height - number / 8) < 0.04
+            compared += 1
+            # Zones that rise and fall within a tenth of a second are in no two places the same.
+            if shown in newest:
+                stiff += any(map(any, shown))
+            elif all(before == newest[0] for before in newest):
+                raise AssertionError(f"zones {shown} are shown, and {newest[-1]} were written")
+        assert stiff > 0, "no trigger stiffened while it was looked at"
+        page.picture("triggers")
+
+
+def test_words_agree(browser: Browser, demo: Run) -> None:
+    """State, link and target in words are those of the run."""
+    with browser.page(demo.address) as page:
+        page.wait("document.querySelector('#link').textContent == 'up'", "link up")
+        seen: set[str] = set()
+        for _ in range(20):
+            before = page.text("#state")
+            demo.look()
+            status: dict[str, Any] = demo.status
+            seen.add(before)
+            time.sleep(0.1)
+            demo.look()
+            if status.get("state") == demo.status.get("state") == "armed" and page.text("#state") == before:
+                assert "ARMED" in before or "RELEASE" in before
+        assert page.text("#target") == demo.status.get("target")
+
+
+def _wait_for_change(page: Page, view: str, before: Any) -> None:
+    """Wait until some of the view has changed; the arm moves most of the time."""
+    end_s = time.monotonic() + 15.0
+    while time.monotonic() < end_s:
+        after = page.pixels(f"#{view} canvas")
+        share = float((abs(after.astype(int) - before.astype(int)).max(axis=2) > 24).mean())
+        if share > 0.002:
+            return
+        time.sleep(0.3)
+    raise AssertionError(f"{view} stands still")
+
+
+def _oldest_ms(page: Page) -> float:
+    """The greatest age that either view says within two seconds."""
+    ages = []
+    for _ in range(20):
+        for view in VIEWS:
+            found = re.search(r"(\d+) ms", page.text(f"#{view} .age"))
+            assert found is not None
+            ages.append(float(found[1]) if found else 0.0)
+        time.sleep(0.1)
+    return sorted(ages)[-3]

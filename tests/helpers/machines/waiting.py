@@ -1,0 +1,36 @@
+"""Waiting for what happens in its own time."""
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+Value = TypeVar("Value")
+
+_LOOK_S = 0.02
+
+
+def wait_until(
+    what: str,
+    condition: Callable[[], Value | None],
+    limit_s: float = 60.0,
+    instead: Callable[[], object] | None = None,
+) -> Value:
+    """The first value of `condition` that is not None or False.
+
+    AssertionError after `limit_s` names `what`, and what there was `instead`.
+    """
+    end_s = time.monotonic() + limit_s
+    while time.monotonic() < end_s:
+        value = condition()
+        if value is not None and value is not False:
+            return value
+        time.sleep(_LOOK_S)
+    raise AssertionError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
+
+
+def stays(otherwise: str, condition: Callable[[], bool], for_s: float = 1.0) -> None:
+    """AssertionError with the text `otherwise` unless `condition` holds for so long."""
+    end_s = time.monotonic() + for_s
+    while time.monotonic() < end_s:
+        assert condition(), otherwise
+        time.sleep(_LOOK_S)

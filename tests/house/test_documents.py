@@ -1,0 +1,216 @@
+"""Commands in the documents exist and parse, and the examples are true."""
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+import pytest
+import tyro
+
+import feelahead.main
+import operator_side.main
+import robot_side.main
+from common.command.command_line import load_toml
+from common.errors import ConfigurationError
+from feelahead.commands import keys
+from feelahead.commands.bench_and_try import bench, try_out
+from feelahead.commands.demo import DemoSettings
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
+from tests.helpers.documents import Document, typed, words
+from tests.helpers.repository import DATA, ROOT
+from tests.two_hosts.guide import Step, steps
+
+README = "README.md"
+TO_BE_TYPED = [README, "docs/two-machines.md", "docs/systemd/README.md"]
+"""Each indented line of these is a command."""
+DOCUMENTS = [
+    README,
+    "CONTRIBUTING.md",
+    *(str(path.relative_to(ROOT)) for path in sorted((ROOT / "docs").rglob("*.md"))),
+]
+COMMANDS = {
+    "feelahead": feelahead.main.command,
+    "feelahead-robot": robot_side.main.command,
+    "feelahead-operator": operator_side.main.command,
+}
+OTHERS = re.compile("cd|cp|echo|git|install|journalctl|mkdir|nft|python3|systemctl|systemd-sysusers|ufw")
+NOT_TYPED = ("advancing  L2/R2 pull", "FEELAHEAD_")
+"""Prefixes of lines that a program prints, or that stand in a file."""
+KEY = "5a" * 32
+PLACEHOLDERS = {
+    r"\bROBOT-KEY\b|\bOPERATOR-KEY\b": KEY,
+    r"tcp://(ROBOT|HOST)\b": "tcp://127.0.0.1",
+    r"\bSPEC\b": "'delay 5ms'",
+    r"\bmy_arm\.xml\b": str(DATA / "arm.xml"),
+    r"--scene NAME\b": "--scene wall",
+    r"\bNAME\.csv\.gz\b": "normal.csv.gz",
+    r"--(config|peer-header) \S+": "",  # files that must be there
+}
+TAILS = {"allow": ["anna", KEY], "revoke": ["anna"], "make": ["robot"], "show": ["robot"]}
+"""Arguments for actions of `feelahead keys` that the text names alone."""
+
+
+class ParsedError(Exception):
+    """The arguments are good: nothing more is to happen."""
+
+
+@pytest.fixture
+def parse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every command ends as soon as its own parser has taken its arguments."""
+    cli, parse_args = tyro.cli, keys._Parser.parse_args
+
+    def only_tyro(*arguments: Any, **options: Any) -> None:
+        cli(*arguments, **options)
+        raise ParsedError
+
+    def only_argparse(*arguments: Any) -> None:
+        parse_args(*arguments)
+        raise ParsedError
+
+    monkeypatch.setattr(tyro, "cli", only_tyro)
+    monkeypatch.setattr(keys._Parser, "parse_args", only_argparse)
+    monkeypatch.chdir(ROOT)
+
+
+def indented(name: str) -> list[str]:
+    """The commands of a document's indented blocks; of a block that is a file's content, nothing."""
+    names: dict[str, str] = {}
+    blocks = [one for one in Document.read(ROOT / name).blocks() if not one.startswith(("from ", "import ", "<"))]
+    lines = [line for block in blocks if not is_toml(block) for line in typed(block, names)]
+    return [line for line in lines if not line.startswith(NOT_TYPED)]
+
+
+def is_toml(block: str) -> bool:
+    try:
+        tomllib.loads(block)
+    except tomllib.TOMLDecodeError:
+        return False
+    return True
+
+
+def filled(command: str) -> list[str]:
+    """A command's words, without sudo and with values for what stands in capitals."""
+    for pattern, value in PLACEHOLDERS.items():
+        command = re.sub(pattern, value, command)
+    split = words(command)
+    if split[-1:] == ["NAME"]:
+        split[-1] = "--list"
+    if split[:2] == ["feelahead", "keys"] and len(split) < 4:
+        split += TAILS.get(split[2], []) if len(split) == 3 else ["list"]
+    return split
+
+
+def require_known(split: Sequence[str]) -> None:
+    """AssertionError or ConfigurationError for a command that does not exist, or would not take its arguments."""
+    if list(split[:2]) == ["make", "demo"]:
+        split = ["feelahead", "demo", *words(" ".join(word.removeprefix("ARGS=") for word in split[2:]))]
+    program, *arguments = split
+    if program == "make":
+        assert re.search(rf"^{arguments[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    elif program == "pytest":
+        assert (ROOT / arguments[0]).exists(), arguments[0]
+    elif program == "pip":
+        extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+        named = re.findall(r"\[([a-z,]+)\]", arguments[-1])
+        assert all(extra in extras for names in named for extra in names.split(","))
+    elif program in COMMANDS:
+        try:
+            ended = COMMANDS[program](arguments)
+        except ParsedError:
+            return
+        except SystemExit as shown:
+            ended = int(shown.code or 0)
+        assert ended == 0, split
+    else:
+        assert OTHERS.fullmatch(program), f"{program!r} is neither ours nor known; if people type it, add it to OTHERS"
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+@pytest.mark.usefixtures("parse")
+def test_every_command_is_known(name: str) -> None:
+    for command in (*indented(name), *Document.read(ROOT / name).spans()):
+        split = filled(command)
+        if split and (name in TO_BE_TYPED or split[0] in {*COMMANDS, "make"}):
+            require_known(split)
+
+
+@pytest.mark.usefixtures("parse")
+@pytest.mark.parametrize("command", ["feelahead-robot --probabilty 1", "make demmo", "make demo ARGS='--durration 3'"])
+def test_a_misspelt_command_is_found(command: str) -> None:
+    with pytest.raises((AssertionError, ConfigurationError)):
+        require_known(filled(command))
+
+
+def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
+    [section] = re.findall(r"## Every command\n(.*?)\n## ", (ROOT / README).read_text(), re.DOTALL)
+    named = {name.partition(" ")[0] for name in re.findall(r"`([a-z-]+(?: NAME)?)`", section)}
+    assert named >= feelahead.main._COMMANDS.keys()
+    for menu in (bench, try_out):
+        [listed] = re.findall(rf"`{menu.name} NAME`\s+\(([^)]*)\)", section)
+        assert set(listed.replace("\n", " ").split(", ")) == menu.entries.keys()
+
+
+def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:
+    blocks = [block for block in Document.read(ROOT / README).blocks() if is_toml(block)]
+    assert blocks
+    for block in blocks:
+        path = tmp_path / "settings.toml"
+        path.write_text(block)
+        key = next(iter(tomllib.loads(block)))
+        kinds = [kind for kind in (RobotSettings, OperatorSettings, DemoSettings) if key in get_type_hints(kind)]
+        load_toml(path, kinds[0])
+
+
+def test_the_python_in_the_readme_runs() -> None:
+    blocks = [block for block in Document.read(ROOT / README).blocks() if block.startswith("from ")]
+    assert blocks
+    shape = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    for block in blocks:
+        vertices = np.stack([shape, 2.0 * shape])
+        given: dict[str, Any] = {"centers": np.zeros((2, 3)), "radii": np.ones(2), "vertices": vertices}
+        exec(block, given)  # noqa: S102  # the README's own lines
+        assert given["volumes"].shape == given["areas"].shape == (2,)
+        assert given["gradients"].shape == (2, 3)
+        assert (given["volumes"] > 0.0).all()
+
+
+@pytest.mark.processes
+def test_an_arm_of_ones_own(tmp_path: Path) -> None:
+    """Run the README's command, on a port and for a time that suit a test."""
+    [command] = [line for line in indented(README) if "my_arm.xml" in line]
+    program, *arguments = filled(command.replace("pinch", "tool"))
+    assert program == "feelahead-robot"
+    short = ["--bind", "tcp://127.0.0.1:0", "--duration", "0.3", "--status", "none"]
+    ended = subprocess.run(
+        [sys.executable, "-P", "-m", "robot_side", *arguments, *short],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same(tmp_path: Path) -> None:
+    """`make test-two-hosts` follows it."""
+    said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
+    made = [(where, split[2]) for where, split in said if split[:2] == ["feelahead", "keys"]]
+    assert made == [("robot", "make"), ("operator", "make"), ("robot", "allow")]
+    assert [where for where, split in said if split[0] == f"feelahead-{where}"] == ["robot", "operator"]
+    section = (ROOT / README).read_text(encoding="utf-8").partition("## On two machines")[2].partition("\n## ")[0]
+    commands = [line.strip() for line in section.splitlines() if line.startswith("    ")]
+    assert len(commands) > 5
+    assert set(commands) <= {step.command for step in steps()}
+    (tmp_path / "guide.md").write_text("On the robot's machine:\n\n    one\n\n# Next\n\nDo:\n\n    two\n")
+    with pytest.raises(AssertionError, match="neither machine"):
+        steps(tmp_path / "guide.md")
+    assert Step("robot", "allow anna OPERATOR-KEY").filled_in({"OPERATOR-KEY": KEY}) == f"allow anna {KEY}"

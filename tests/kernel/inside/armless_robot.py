@@ -1,0 +1,54 @@
+"""A robot side without an arm: its real sockets, lease and safety, and stiffness as the test says."""
+
+from common.protocol.codec import encode
+from common.protocol.messages import StiffnessUpdate
+from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from robot_side.operators.safety import SafetySettings
+from tests.helpers.serving_robot import ServingRobot
+
+SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
+"""A processor emulated in software holds no tenth of a second; what is checked is what follows, not how soon."""
+_FIELD_PERIOD_S = 0.02
+
+
+class ArmlessRobot(ServingRobot):
+    """One life of it, in a thread."""
+
+    def __init__(self) -> None:
+        super().__init__(publishes=False, safety=SLOW_MACHINE)
+        self.r2_stiffness = 0.0
+        """0 to 1, wherever R2 is."""
+        self.moving = False
+        """Whether the arm, if there were one, would be told to move now."""
+        self.state = "disarmed"
+        self._next_s = 0.0
+
+    @property
+    def flags(self) -> list[str]:
+        """The operator side's flags to find it."""
+        return [f"--connect={self.control}", f"--view-connect={self.view}"]
+
+    @property
+    def commands(self) -> int:
+        """Motion commands that have come."""
+        return self.session.motion_received
+
+    def tick(self, now_s: float) -> None:
+        """Decide as a robot side does, and send the owner what is felt."""
+        self.session.update(now_s)
+        permission = self.session.permission(now_s)
+        self.state = permission.state
+        self.moving = permission.command is not None and permission.command.r2 > 0.0
+        if now_s < self._next_s or (owner := self.session.owner(now_s)) is None:
+            return
+        self._next_s = now_s + _FIELD_PERIOD_S
+        felt = StiffnessUpdate(
+            owner.header,
+            l2=uniform_field(0),
+            r2=uniform_field(round(STRENGTHS * self.r2_stiffness)),
+            speed_m_s=0.0,
+            horizon_m=FAR_M,
+            rumble=0.0,
+            state=permission.state,
+        )
+        self.sockets.send(owner.peer, encode(felt))

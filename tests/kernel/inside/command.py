@@ -1,0 +1,56 @@
+"""The command `feelahead virtual-dualsense`, as a process of its own."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from operator_side.dualsense.effects.official import Feedback
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
+from operator_side.dualsense.uhid.controller import identity
+from tests.helpers.machines.waiting import wait_until
+from tests.kernel.inside.evdev import ABS_RZ, ABS_X, InputDevice
+from tests.kernel.inside.kernel_view import seen_device
+
+_START_S = 60.0
+# Not all of `feelahead`, whose other commands an emulated processor would load for long.
+_COMMAND = (
+    "import sys; from feelahead.commands.virtual_dualsense import virtual_dualsense as v; sys.exit(v(sys.argv[1:]))"
+)
+
+
+def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path: Path) -> None:
+    transport = Transport.BLUETOOTH
+    told = identity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
+    command = [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"]
+    said = tmp_path / "said"
+
+    def lines() -> list[str]:
+        return said.read_text().splitlines()
+
+    with said.open("w") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
+        try:
+            wait_until("a driver takes it", lambda: "a driver has taken it" in lines(), _START_S, instead=lines)
+            view = wait_until("the kernel shows it", lambda: seen_device(told))
+            wait_until("three input devices", lambda: len(view.inputs()) == 3)
+            with InputDevice(view.inputs()[told.name]) as device:
+                wait_until("R2 is pulled", lambda: device.axis(ABS_RZ).value > 200)
+                wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
+            hidraw = view.hidraw()
+            assert hidraw is not None
+            hidraw.write_bytes(build_output_report(OutputReport(r2=Feedback(position=3, strength=6)), transport))
+            told_it = "R2: Feedback, position 3, strength 6"
+            wait_until("it says the effect", lambda: told_it in lines(), instead=lines)
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(30.0) == 0
+            assert lines()[-1].startswith("unplugged: ")
+            wait_until("it is gone", lambda: seen_device(told) is None)
+        finally:
+            process.kill()
+
+
+def _left(device: InputDevice) -> bool:
+    return device.axis(ABS_X).value < 100

@@ -1,0 +1,18 @@
+"""Virtual controllers of every kind."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.transport import Transport
+from tests.kernel.inside.plugged import Plugged, Variant
+
+_VARIANTS = [Variant(transport, model) for transport in Transport for model in Model]
+
+
+@pytest.fixture(scope="session", params=_VARIANTS, ids=lambda variant: variant.name)
+def plugged(request: pytest.FixtureRequest) -> Iterator[Plugged]:
+    """A controller, plugged in by whoever needs it so."""
+    with Plugged(request.param) as one:
+        yield one

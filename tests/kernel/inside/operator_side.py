@@ -1,0 +1,147 @@
+"""The process feelahead-operator with a controller on a real kernel that comes, goes, and must not stay stiff."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from feelahead.both_sides.processes import SideProcess
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from tests.helpers.machines.waiting import stays, wait_until
+from tests.kernel.inside.armless_robot import ArmlessRobot
+from tests.kernel.inside.plugged import Plugged, Variant
+
+_PATIENCE_S = 90.0
+_HEALTHY_S = 0.7
+"""More than the robot side asks for."""
+_PRESSED_S = 0.3
+_HOLD_TO_RUN = Button.L1
+_ARM = Button.OPTIONS
+
+
+class Desk:
+    """A controller, an operator side, and the robot side that it is connected to."""
+
+    def __init__(self, plugged: Plugged, operator: SideProcess, robot: ArmlessRobot) -> None:
+        self.plugged = plugged
+        self.operator = operator
+        self.robot = robot
+        self.notes: list[str] = []
+        self.controller = "unknown"
+
+    def note(self, part: str) -> None:
+        """Wait for a note with `part` in it."""
+
+        def said() -> bool:
+            self._listen()
+            return any(part in note for note in self.notes)
+
+        wait_until(f"a note: {part}", said, _PATIENCE_S, instead=lambda: self.notes)
+
+    def controller_lost(self) -> bool:
+        """Whether the operator side's newest status says so."""
+        self._listen()
+        return self.controller == "lost"
+
+    def _listen(self) -> None:
+        for event in self.operator.events():
+            if event["event"] == "note":
+                self.notes.append(event["text"])
+            if event["event"] == "status":
+                self.controller = event["controller"]
+        self.operator.check()
+
+
+@pytest.fixture(scope="module", params=Transport, ids=lambda transport: transport.value)
+def desk(request: pytest.FixtureRequest) -> Iterator[Desk]:
+    """The operator side begins before its controller is there. It is the same for the Edge."""
+    with (
+        ArmlessRobot() as robot,
+        Plugged(Variant(request.param)) as plugged,
+        SideProcess("operator_side", "operator", ["--device=hid", *robot.flags]) as operator,
+    ):
+        yield Desk(plugged, operator, robot)
+
+
+# The tests in this order: each goes on from where the one before left off.
+
+
+def hold(plugged: Plugged, *buttons: Button, r2_n: float = 0.0) -> None:
+    """Hold these buttons and pull R2."""
+    plugged.ask(lambda controller: controller.set_buttons(frozenset(buttons)))
+    plugged.ask(lambda controller: controller.set_finger_force(0.0, r2_n))
+
+
+def arm_and_pull(desk: Desk) -> None:
+    """Arm as a person does, then pull R2 until the arm would move and the trigger is stiff."""
+    plugged, robot = desk.plugged, desk.robot
+    plugged.plug_in()
+    robot.r2_stiffness = 0.9
+
+    def moving() -> bool:
+        # A gap, as a slow machine has them, disarms, or asks for released triggers before motion goes on.
+        hold(plugged, _HOLD_TO_RUN)
+        time.sleep(_HEALTHY_S)
+        if robot.state != "armed":
+            hold(plugged, _HOLD_TO_RUN, _ARM)
+        else:
+            hold(plugged, _HOLD_TO_RUN, r2_n=NORMAL_FINGER_FORCE_N)
+        time.sleep(_PRESSED_S)
+        return robot.moving
+
+    wait_until("the arm would move", moving, _PATIENCE_S, instead=lambda: robot.state)
+    wait_until("the trigger is stiff", lambda: not plugged.ask(lambda controller: controller.released))
+
+
+def test_without_a_controller_it_says_so_and_commands_nothing(desk: Desk) -> None:
+    plugged, robot = desk.plugged, desk.robot
+    desk.note("no DualSense")
+    assert "waiting for one" in desk.notes[0]
+    assert robot.commands == 0
+    plugged.plug_in()
+    wait_until("commands come", lambda: robot.commands > 10, _PATIENCE_S, instead=lambda: desk.notes)
+    desk.note(f"controller: {plugged.variant.name}")
+    assert robot.state == "disarmed"
+
+
+def test_unplugged_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk) -> None:
+    plugged, robot = desk.plugged, desk.robot
+    arm_and_pull(desk)
+    plugged.unplug()
+    wait_until("the robot stops", lambda: robot.state == "disarmed" and not robot.moving)
+    wait_until("the operator side notices", desk.controller_lost, instead=lambda: desk.notes)
+    desk.note("the controller is gone")
+    commands = robot.commands
+    stays("commands are sent without a controller", lambda: robot.commands == commands)
+    # The hands still pull R2 and hold L1.
+    plugged.plug_in()
+    wait_until("commands come again", lambda: robot.commands > commands + 10, _PATIENCE_S)
+    desk.note("back again")
+    wait_until("its triggers are free", lambda: plugged.ask(lambda controller: controller.released))
+    stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
+
+
+def test_stopped_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
+    arm_and_pull(desk)
+    os.kill(desk.operator.process_id, signal.SIGSTOP)
+    try:
+        released_and_stopped(desk)
+    finally:
+        os.kill(desk.operator.process_id, signal.SIGCONT)
+
+
+def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
+    arm_and_pull(desk)
+    os.kill(desk.operator.process_id, signal.SIGKILL)
+    assert desk.operator.wait(30.0) == -signal.SIGKILL
+    released_and_stopped(desk)
+
+
+def released_and_stopped(desk: Desk) -> None:
+    """Wait until the triggers are free and the arm may not move."""
+    wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
+    wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)

@@ -1,0 +1,124 @@
+"""A virtual controller in the machine, and hands on it."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, TypeVar
+
+from common.clock import MonotonicClock
+from operator_side.dualsense.reports.feature_report import CalibrationReport
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.file import UhidFile, offer
+from tests.helpers.machines.waiting import wait_until
+
+Value = TypeVar("Value")
+
+
+ADDRESS: Final = "01:02:03:04:05:06"
+CALIBRATION: Final = CalibrationReport(
+    gyro_bias=(0, 0, 0),
+    gyro_plus=(8843, 8850, 8870),
+    gyro_minus=(-8837, -8860, -8866),
+    speed_plus=540,
+    speed_minus=540,
+    acceleration_plus=(8250, 8200, 8100),
+    acceleration_minus=(-8130, -8190, -8240),
+)
+"""Differs for each axis like real ones, but for the gyroscope's bias: Linux 6.1 subtracts it, later ones do not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Which controller, and how it is connected."""
+
+    transport: Transport
+    model: Model = Model.DUALSENSE
+
+    @property
+    def name(self) -> str:
+        """Lines for people."""
+        return f"{self.model.title} on {self.transport.value}"
+
+
+class Plugged:
+    """A simulated controller on /dev/uhid, alive in a thread of its own while it is plugged in.
+
+    Unplugged, it remembers what it was told, as one would that is back before it loses its power.
+    """
+
+    def __init__(self, variant: Variant) -> None:
+        self.variant = variant
+        self.identity = identity(variant.transport, variant.model, ADDRESS)
+        self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS, calibration=CALIBRATION)
+        self.offered = UhidController(self._simulated, self.identity)
+        self._asked: deque[Callable[[], None]] = deque()
+        self._ending = False
+        self._failure: BaseException | None = None
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> "Plugged":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.unplug()
+
+    def plug_in(self) -> None:
+        """Let it appear; nothing happens when it is in."""
+        if self._thread is not None:
+            return
+        self._ending = False
+        self._thread = threading.Thread(target=self._live)
+        self._thread.start()
+
+    def unplug(self) -> None:
+        """Pull it out; nothing happens when it is out."""
+        self._ending = True
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def ask(self, function: Callable[[SimulatedDualSense], Value]) -> Value:
+        """Call `function` on the simulated controller in its own thread."""
+        answers: deque[Value] = deque()
+        thread = self._thread
+        if thread is None:
+            return function(self._simulated)
+        self._asked.append(lambda: answers.append(function(self._simulated)))
+        wait_until("the controller answers", lambda: bool(answers) or not thread.is_alive())
+        if not answers:
+            raise AssertionError(f"the controller has died: {self._failure!r}")
+        return answers[0]
+
+    def hands_off(self) -> None:
+        """Let go of everything."""
+
+        def let_go(controller: SimulatedDualSense) -> None:
+            controller.set_sticks()
+            controller.set_buttons(frozenset())
+            controller.set_finger_force(0.0, 0.0)
+            controller.set_motion()
+
+        self.ask(let_go)
+
+    def _live(self) -> None:
+        try:
+            with UhidFile() as file:
+                offer(file, self.offered, MonotonicClock(), 0.004, self._going)
+        except BaseException as error:
+            self._failure = error
+
+    def _going(self, now_s: float) -> bool:
+        del now_s
+        while self._asked:
+            self._asked.popleft()()
+        return not self._ending

@@ -1,0 +1,126 @@
+"""Second operators, and sides that die, start in the other order, or have their wall clock set."""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.two_hosts.lan import ATTEMPTS, Host, Lan, gap_ms, is_armed
+
+pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
+
+_AN_HOUR_S = 3600
+_REFUSED = "does not let this key in"
+
+
+def test_a_second_operator_watches_until_revoked_and_an_unknown_key_gets_nothing(lan: Lan) -> None:
+    bob, eve = lan.operator_host.user("bob"), lan.operator_host.user("eve")
+    for one in (bob, eve):
+        one.run("feelahead keys make operator")
+    lan.robot_host.run(f"feelahead keys allow bob {bob.run('feelahead keys show operator').strip()}")
+    lan.moving()
+    # The same person as at the other controller: they try to arm and to drive.
+    bobs = lan.start("operator", bob, called="bob")
+    lan.until("bob", "watching", lambda status: str(status["link"]).startswith("observing"))
+    lan.until("robot", "an observer", lambda status: status["observers"] == 1)
+    lan.until("operator", "armed", is_armed)
+    for _ in lan.watch(1.5):
+        assert str(bobs.status["link"]).startswith("observing")
+    lan.robot_host.run("feelahead keys revoke bob")
+    began_s = time.monotonic()
+    lan.until("bob", "out", lambda status: _REFUSED in str(status["link"]))
+    lan.until("robot", "no observer", lambda status: status["observers"] == 0)
+    print(f"out {time.monotonic() - began_s:.1f} s after the revocation")
+    lan.end("bob")
+    summary = eve.home / "summary.json"
+    eves = lan.start("operator", eve, f"--summary={summary}", called="eve")
+    lan.until("eve", "refused", lambda status: _REFUSED in str(status["link"]))
+    lan.end("eve")
+    assert json.loads(summary.read_text(encoding="utf-8"))["messages"]["stiffness_received"] == 0
+    assert not any("target" in status for status in eves.said)
+    lan.until("robot", "anna's link", lambda status: status["link"] == "up")
+
+
+def test_revoked_while_driving(lan: Lan) -> None:
+    lan.moving()
+    lan.robot_host.run("feelahead keys revoke anna")
+    began_s = time.monotonic()
+    lan.until("robot", "the arm is stopped", lambda status: not is_armed(status))
+    print(f"stopped {time.monotonic() - began_s:.1f} s after the command")
+    lan.until("operator", "out", lambda status: _REFUSED in str(status["link"]))
+    lan.until("operator", "the triggers are free", lambda status: status["triggers_released"] is True)
+    lan.robot_host.run(f"feelahead keys allow anna {lan.words['OPERATOR-KEY']}")
+    lan.back()
+
+
+def test_the_robot_side_killed(lan: Lan) -> None:
+    lan.moving()
+    lan.kill("robot")
+    lan.until("operator", "the triggers are free", lambda status: status["triggers_released"] is True)
+    lan.until("operator", "the link is lost", lambda status: str(status["link"]).startswith("lost"))
+    lan.start("robot")
+    lan.until("robot", "it listens", bool)
+    lan.back()
+
+
+def test_the_operator_side_killed(lan: Lan) -> None:
+    lan.moving()
+    lan.kill("operator")
+    gap_ms(lan.until("robot", "the arm is stopped", lambda status: not is_armed(status)))
+    lan.until("robot", "the lease is free", lambda status: status["owner"] == "none")
+    lan.start("operator")
+    lan.back()
+
+
+def test_the_operator_side_first(lan: Lan) -> None:
+    for side in ("operator", "robot"):
+        lan.end(side)
+    lan.start("operator")
+    lan.until("operator", "it waits", lambda status: status["link"] == "waiting for the robot side")
+    lan.start("robot")
+    lan.until("robot", "it listens", bool)
+    lan.back()
+
+
+def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
+    """For the two processes alone, while the arm moves."""
+    libraries = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
+    if not libraries:
+        pytest.skip("no libfaketime here (apt install libfaketime)")
+    offset = lan.robot_host.home.with_name("wall-clock")
+    faked = {
+        "LD_PRELOAD": str(libraries[0]),
+        "FAKETIME_TIMESTAMP_FILE": str(offset),
+        "FAKETIME_NO_CACHE": "1",
+        "DONT_FAKE_MONOTONIC": "1",
+    }
+
+    def under_it(host: Host) -> Host:
+        return replace(host, also=faked)
+
+    def step(offset_s: int) -> int:
+        """Set it; what a program there takes for the time."""
+        partial = offset.with_suffix(".new")
+        partial.write_text(f"+{offset_s}\n", encoding="ascii")
+        partial.replace(offset)
+        return int(under_it(lan.robot_host).run("date +%s"))
+
+    def undisturbed() -> bool:
+        return all(is_armed(lan.robot.status) for _ in lan.watch(1.5))
+
+    step(0)
+    lan.restart(under_it)
+    for _ in range(ATTEMPTS):
+        lan.moving()
+        before_s = step(0)
+        assert _AN_HOUR_S <= step(_AN_HOUR_S) - before_s < _AN_HOUR_S + 60
+        forward = undisturbed()
+        why = lan.robot.status["stopped_because"]
+        step(0)
+        if forward and undisturbed():
+            break
+    else:
+        pytest.fail(f"the arm was stopped each time: {why or lan.robot.status['stopped_because']}")
+    lan.restart()
