@@ -199,7 +199,7 @@ def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: P
     """Only what somebody asked for: the sides' own files are to count where nothing was."""
     arguments = [
         f"--{name.replace('_', '-')}={getattr(settings, name)}"
-        for name in ("link", "link_model", "link_correlation", "asymmetry", "seed")
+        for name in ("link", "link_model", "asymmetry", "seed")
         if name in given
     ]
     if "realtime" in given:
