@@ -8,7 +8,6 @@ import tyro
 
 from common.command.status import StatusMode
 from common.emulation.clauses import LinkModel
-from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.files.output_file import require_output_file
 from common.recording.side import require_recordable
@@ -31,9 +30,6 @@ class RunOptions:
     link_model: LinkModel = "datagram"
     """datagram loses and reorders messages as UDP does; stream keeps them in order as TCP does, and loss becomes
     delay."""
-    link_correlation: CorrelationModel = "netem"
-    """What a correlation in the link means: netem's own, which makes loss rarer and leaves delays independent, or a
-    proper one, which keeps shares and distributions."""
     asymmetry: Annotated[str, tyro.conf.arg(metavar="TIME")] = "0ms"
     """By how much the least delay to the robot exceeds that to the operator (12ms, or -12ms), where that is known from
     elsewhere: no exchange of messages between two clocks can tell. Half of it would be an error of the offset."""
@@ -63,7 +59,7 @@ class RunOptions:
 
     def link_spec(self) -> LinkSpec:
         """The emulated link, with this run's seed; ConfigurationError for a bad one."""
-        return LinkSpec.parse(self.link, max(0, self.seed), self.link_model, self.link_correlation)
+        return LinkSpec.parse(self.link, max(0, self.seed), self.link_model)
 
     def asymmetry_s(self) -> float:
         """`asymmetry` in seconds, with its sign; ConfigurationError for what is no time."""

@@ -2,7 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from common.limits import Share, check_limits
 
 LinkModel = Literal["datagram", "stream"]
 
@@ -14,55 +18,40 @@ QUEUE_LIMIT = 1000
 class Chance:
     """Something that happens to a share of the messages."""
 
-    share: float
-    correlation: float = 0.0
+    share: Share
+    correlation: Share = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("share", "correlation"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to 1")
+        check_limits(self)
 
 
 @dataclass(frozen=True)
 class Rate:
     """A bottleneck that takes one message after the other."""
 
-    bits_per_second: float
+    bits_per_second: Annotated[float, Meta(ge=1.0)]
     overhead_bytes: int = 0
     """On each message, such as headers; negative takes away."""
-    cell_bytes: int = 0
-    """Messages travel in whole cells of this payload, as on ATM; 0: they do not."""
-    cell_overhead_bytes: int = 0
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.bits_per_second < math.inf:
-            raise ValueError(f"bits_per_second = {self.bits_per_second}; valid: 1 or more")
-        if self.cell_bytes < 0 or self.cell_bytes + self.cell_overhead_bytes < 0:
-            raise ValueError(f"cell_bytes = {self.cell_bytes}, cell_overhead_bytes = {self.cell_overhead_bytes}")
+        check_limits(self)
 
     def transmission_s(self, size_bytes: int) -> float:
         """How long a message of `size_bytes` takes."""
-        size_bytes = max(0, size_bytes + self.overhead_bytes)
-        if self.cell_bytes:
-            cells = -(-size_bytes // self.cell_bytes)
-            size_bytes = cells * (self.cell_bytes + self.cell_overhead_bytes)
-        return 8.0 * size_bytes / self.bits_per_second
+        return 8.0 * max(0, size_bytes + self.overhead_bytes) / self.bits_per_second
 
 
 @dataclass(frozen=True)
 class Outage:
     """A time without a link, counted from the line's start."""
 
-    duration_s: float
-    at_s: float
+    duration_s: Annotated[float, Meta(gt=0.0)]
+    at_s: Annotated[float, Meta(ge=0.0)]
     every_s: float | None = None
-    """It comes again after so long; None: once."""
+    """The period with which it comes again; None: once."""
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.duration_s < math.inf:
-            raise ValueError(f"of {self.duration_s} s; valid: above 0")
-        if not 0.0 <= self.at_s < math.inf:
-            raise ValueError(f"at {self.at_s} s; valid: 0 or more")
+        check_limits(self)
         if self.every_s is not None and not self.duration_s < self.every_s < math.inf:
             raise ValueError(f"every {self.every_s} s; valid: longer than the {self.duration_s:g} s that it lasts")
 

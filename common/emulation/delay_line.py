@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from common.emulation.clauses import Chance
-from common.emulation.distribution import cells, delays_at
+from common.emulation.distribution import delays_at
 from common.emulation.expectation import expected
 from common.emulation.figures import LinkFigures
 from common.emulation.profile import LinkProfile
@@ -73,16 +73,16 @@ class DelayLine(Generic[Item]):
         def chances(chance: Chance | None, number: int) -> Iterator[bool] | None:
             if chance is None or chance.share == 0.0:
                 return None
-            return decisions(generator(number), chance.share, chance.correlation, profile.correlation_model)
+            return decisions(generator(number), chance.share, chance.correlation)
 
         self._delays_s = _endless_delays(profile, generator(0))
-        self._losses = None if profile.loss is None else profile.loss.losses(generator(1), profile.correlation_model)
+        self._losses = None if profile.loss is None else profile.loss.losses(generator(1))
         self._duplicates = None if self._in_order else chances(profile.duplicate, 2)
         self._corruptions = chances(profile.corrupt, 3)
         self._reorders = chances(profile.reorder, 4)
         self._slots = None if profile.slot is None else SlotTimes(profile.slot, generator(5))
         self._bits = generator(6)
-        self._lost_again = decisions(generator(7), profile.retransmitted_share(), 0.0, "proper")
+        self._lost_again = decisions(generator(7), profile.retransmitted_share())
 
     def push(self, now_s: float, item: Item, size_bytes: int | None = None) -> None:
         """Take `item` in at `now_s`; its size, which `rate` needs, is that of its bytes unless it is given.
@@ -143,11 +143,10 @@ class DelayLine(Generic[Item]):
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """`asked`, in the grammar's words, with model, correlation and seed, what is `expected` and was `achieved`."""
+        """`asked`, in the grammar's words, with model and seed, what is `expected` and was `achieved`."""
         return {
             "asked": self.profile.words(),
             "model": self.profile.model,
-            "correlation": self.profile.correlation_model,
             "seed": self.profile.seed,
             "expected": expected(self.profile),
             "achieved": self.figures.achieved() | {"waiting": self.waiting},
@@ -266,8 +265,7 @@ def _endless_delays(profile: LinkProfile, generator: np.random.Generator) -> Ite
     if profile.jitter_s == 0.0:
         while True:
             yield profile.delay_s
-    number = cells(profile.distribution, profile.jitter_s)
-    for block in uniform_blocks(generator, profile.delay_correlation, profile.correlation_model, number):
+    for block in uniform_blocks(generator):
         yield from delays_at(block, profile.delay_s, profile.jitter_s, profile.distribution).tolist()
 
 

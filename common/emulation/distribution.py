@@ -5,77 +5,26 @@ netem's tables hold quantiles in steps of 1/8192 jitter, as 16-bit integers, so 
 """
 
 import functools
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
-from common.files.regular_file import read_regular_file
 
 Distribution = Literal["uniform", "normal", "pareto", "paretonormal", "exponential"]
 
 STEPS_PER_JITTER = 8192
 TABLE_SIZE = 4096
-"""Entries of the tables that are built in, one for each 1/4096 of probability."""
-_LARGEST_TABLE = 16384
-"""The most entries that the kernel takes."""
-_LARGEST_BYTES = 100 * _LARGEST_TABLE
-"""With room for comments."""
+"""Entries of a table, one for each 1/4096 of probability."""
 _LOWEST_ENTRY, _HIGHEST_ENTRY = -(2**15), 2**15 - 1
 _PARETO_SHAPE = 3.0
 _PARETO_MEAN = _PARETO_SHAPE / (_PARETO_SHAPE - 1.0)
 
 
-@dataclass(frozen=True)
-class DelayTable:
-    """A table of one's own, in netem's format: quantiles in steps of 1/8192 of the jitter."""
-
-    name: str
-    """The file that it came from."""
-    steps: tuple[int, ...]
-    """In ascending order; netem draws from any order alike."""
-
-    @classmethod
-    def read(cls, path: Path, field: str) -> "DelayTable":
-        """Read whitespace-separated whole numbers, `#` beginning a comment, as in iproute2's `*.dist` files.
-
-        ConfigurationError, in one line that begins with `field`, for a file that cannot be read or holds
-        anything else.
-        """
-        try:
-            text = read_regular_file(path, _LARGEST_BYTES).decode("utf-8")
-        except (OSError, UnicodeDecodeError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error).partition(";")[0]
-            reason = "is no text" if isinstance(error, UnicodeDecodeError) else reason
-            raise ConfigurationError(
-                f"{field}: {str(path)!r} is no distribution and cannot be read as a table ({reason}); "
-                f"valid: {', '.join(get_args(Distribution))}, or a table's file"
-            ) from error
-        words = [word for line in text.splitlines() for word in line.partition("#")[0].split()]
-        if not 0 < len(words) <= _LARGEST_TABLE:
-            raise ConfigurationError(f"{field}: table {path} has {len(words)} entries; valid: 1 to {_LARGEST_TABLE}")
-        steps = []
-        for word in words:
-            sign, digits = (word[0], word[1:]) if word[0] in "+-" else ("", word)
-            value = int(sign + digits) if digits.isascii() and digits.isdigit() and len(digits) < 9 else None
-            if value is None or not _LOWEST_ENTRY <= value <= _HIGHEST_ENTRY:
-                raise ConfigurationError(
-                    f"{field}: table {path} holds {word[:40]!r}; "
-                    f"valid: whole numbers from {_LOWEST_ENTRY} to {_HIGHEST_ENTRY}, in 1/{STEPS_PER_JITTER} jitter"
-                )
-            steps.append(value)
-        return cls(str(path), tuple(sorted(steps)))
-
-
 @functools.cache
-def table(shape: Distribution | DelayTable) -> FloatArray | None:
+def table(shape: Distribution) -> FloatArray | None:
     """Quantiles of `shape` in jitters, (n,) in ascending order and read-only; None for shapes in closed form."""
-    if isinstance(shape, DelayTable):
-        steps = np.array(shape.steps, dtype=np.float64)
-    elif shape == "normal":
+    if shape == "normal":
         steps = _normal_steps()
     elif shape == "pareto":
         steps = _pareto_steps()
@@ -111,18 +60,7 @@ def _pareto_steps() -> FloatArray:
     return np.minimum(steps, _HIGHEST_ENTRY)
 
 
-def cells(shape: Distribution | DelayTable, jitter_s: float) -> int:
-    """How many different delays netem knows for `shape`, which it picks by a random word's remainder."""
-    quantiles = table(shape)
-    if quantiles is not None:
-        return quantiles.size
-    # Without a table, every nanosecond from −jitter up to +jitter; for our own exponential, as a table has.
-    return max(1, round(2e9 * jitter_s)) if shape == "uniform" else TABLE_SIZE
-
-
-def delays_at(
-    probabilities: FloatArray, mean_s: float, jitter_s: float, shape: Distribution | DelayTable
-) -> FloatArray:
+def delays_at(probabilities: FloatArray, mean_s: float, jitter_s: float, shape: Distribution) -> FloatArray:
     """The delays in seconds at `probabilities` (n,) in [0, 1).
 
     `uniform`: mean ± jitter, netem's shape where none is named. `normal` and netem's other tables: mean plus
@@ -140,7 +78,7 @@ def delays_at(
     return np.maximum(mean_s + jitter_s * in_jitters, 0.0)
 
 
-def moments(mean_s: float, jitter_s: float, shape: Distribution | DelayTable) -> tuple[float, float, float]:
+def moments(mean_s: float, jitter_s: float, shape: Distribution) -> tuple[float, float, float]:
     """Mean, standard deviation and greatest value, in seconds, of the delays; of whole tables exactly.
 
     For closed forms as for tables with very fine steps; the exponential has no greatest value (infinity).

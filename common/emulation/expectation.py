@@ -65,6 +65,6 @@ def _loss_share(profile: LinkProfile) -> float | None:
         return profile.trace.delays_s.count(None) / len(profile.trace.delays_s)
     if profile.loss is None:
         return 0.0
-    if isinstance(profile.loss, RandomLoss) and profile.loss.correlation and profile.correlation_model == "netem":
+    if isinstance(profile.loss, RandomLoss) and profile.loss.correlation:
         return None
     return profile.loss.share()

@@ -6,25 +6,23 @@ from pathlib import Path
 from typing import Any, TypeVar, cast, get_args
 
 from common.emulation.clauses import Chance, LinkModel, Outage, Rate
-from common.emulation.distribution import DelayTable, Distribution
+from common.emulation.distribution import Distribution
 from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.emulation.slots import Slot, SlotShape
+from common.emulation.slots import Slot
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
 from common.units import parse_duration, parse_rate, parse_share
 
 GRAMMAR = {
-    "delay": "delay TIME [JITTER [CORRELATION%]] "
-    "[distribution uniform|normal|pareto|paretonormal|exponential|TABLEFILE]",
+    "delay": "delay TIME [JITTER [CORRELATION%]] [distribution uniform|normal|pareto|paretonormal|exponential]",
     "loss": "loss [random] P% [CORRELATION%] | loss state P13% [P31% [P32% [P23% [P14%]]]] | "
     "loss gemodel P% [R% [1-H% [1-K%]]]",
     "duplicate": "duplicate P% [CORRELATION%]",
     "corrupt": "corrupt P% [CORRELATION%]",
     "reorder": "reorder P% [CORRELATION%] [gap N]",
-    "rate": "rate RATE [PACKETOVERHEAD [CELLSIZE [CELLOVERHEAD]]]",
+    "rate": "rate RATE [PACKETOVERHEAD]",
     "limit": "limit MESSAGES",
-    "slot": "slot MIN [MAX] [packets N] [bytes N] | "
-    "slot distribution uniform|normal|pareto|paretonormal|exponential|TABLEFILE GAP JITTER [packets N] [bytes N]",
+    "slot": "slot MIN [MAX] [packets N] [bytes N]",
     "trace": "trace FILE.csv",
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
@@ -121,14 +119,13 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
         settings["distribution"] = _read_shape(words)
 
 
-def _read_shape(words: _Words) -> Distribution | DelayTable:
+def _read_shape(words: _Words) -> Distribution:
     name = words.take() or ""
-    field = f"link {words.spec!r}: distribution"
-    if name in get_args(Distribution):
-        return cast(Distribution, name)
-    if name in ("", *GRAMMAR):
-        raise ConfigurationError(f"{field} {name!r} is unknown; valid: {', '.join(get_args(Distribution))}, TABLEFILE")
-    return DelayTable.read(Path(name), field)
+    if name not in get_args(Distribution):
+        raise ConfigurationError(
+            f"link {words.spec!r}: distribution {name!r} is unknown; valid: {', '.join(get_args(Distribution))}"
+        )
+    return cast(Distribution, name)
 
 
 def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
@@ -160,13 +157,9 @@ def _read_reorder(words: _Words, settings: dict[str, Any]) -> None:
 
 
 def _read_rate(words: _Words, settings: dict[str, Any]) -> None:
-    numbers = []
     bits_per_second = words.value(parse_rate, "rate", "rate")
-    for name in ("packet overhead", "cell size", "cell overhead"):
-        if not words.number_follows(percent=False):
-            break
-        numbers.append(words.value(_small_integer, "rate", name))
-    settings["rate"] = Rate(bits_per_second, *numbers)
+    overhead = words.value(_small_integer, "rate", "packet overhead") if words.number_follows(percent=False) else 0
+    settings["rate"] = Rate(bits_per_second, overhead)
 
 
 def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
@@ -174,16 +167,10 @@ def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
 
 
 def _read_slot(words: _Words, settings: dict[str, Any]) -> None:
-    shape = None
-    if words.take_if("distribution"):
-        distribution = _read_shape(words)
-        least_s = most_s = words.value(parse_duration, "slot", "gap")
-        shape = SlotShape(least_s, words.value(parse_duration, "slot", "jitter"), distribution)
-    else:
-        least_s = words.value(parse_duration, "slot", "least time")
-        most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
+    least_s = words.value(parse_duration, "slot", "least time")
+    most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
     budgets = {name: words.value(_positive, "slot", name) for name in ("packets", "bytes") if words.take_if(name)}
-    settings["slot"] = Slot(least_s, most_s, shape, budgets.get("packets"), budgets.get("bytes"))
+    settings["slot"] = Slot(least_s, most_s, budgets.get("packets"), budgets.get("bytes"))
 
 
 def _read_trace(words: _Words, settings: dict[str, Any]) -> None:

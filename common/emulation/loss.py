@@ -8,15 +8,16 @@ from typing import Protocol
 import numpy as np
 
 from common.arrays import FloatArray
-from common.emulation.randomness import DRAWN_AT_ONCE, CorrelationModel, decisions
+from common.emulation.randomness import DRAWN_AT_ONCE, decisions
+from common.limits import Share, check_limits
 from common.units import format_share
 
 
 class LossModel(Protocol):
     """Which messages are lost, one decision for each message, whatever the time between them."""
 
-    def losses(self, generator: np.random.Generator, model: CorrelationModel) -> Iterator[bool]:
-        """Whether each message is lost, without end."""
+    def losses(self, generator: np.random.Generator) -> Iterator[bool]:
+        """Say of each message whether it is lost, without end."""
         ...
 
     def share(self) -> float:
@@ -28,33 +29,26 @@ class LossModel(Protocol):
         ...
 
 
-def _check_shares(loss: "RandomLoss | StateLoss | GilbertElliott") -> None:
-    for part in fields(loss):
-        value = getattr(loss, part.name)
-        if not 0.0 <= value <= 1.0:
-            raise ValueError(f"{part.name} = {value}; valid: 0 to 1")
-
-
 @dataclass(frozen=True)
 class RandomLoss:
     """`loss random`: each message with the same probability."""
 
-    probability: float
-    correlation: float = 0.0
+    probability: Share
+    correlation: Share = 0.0
 
     def __post_init__(self) -> None:
-        _check_shares(self)
+        check_limits(self)
 
-    def losses(self, generator: np.random.Generator, model: CorrelationModel) -> Iterator[bool]:
-        """As LossModel has it."""
-        return decisions(generator, self.probability, self.correlation, model)
+    def losses(self, generator: np.random.Generator) -> Iterator[bool]:
+        """Implement LossModel."""
+        return decisions(generator, self.probability, self.correlation)
 
     def share(self) -> float:
-        """As LossModel has it."""
+        """Implement LossModel."""
         return self.probability
 
     def words(self) -> str:
-        """As LossModel has it."""
+        """Implement LossModel."""
         correlation = f" {format_share(self.correlation)}" if self.correlation else ""
         return f"loss {format_share(self.probability)}{correlation}"
 
@@ -66,23 +60,22 @@ class StateLoss:
     Each message takes a step, and is lost when that ends in state 3 or 4. From 4 the next step is to 1.
     """
 
-    p13: float
-    p31: float
-    p32: float = 0.0
-    p23: float = 1.0
-    p14: float = 0.0
+    p13: Share
+    p31: Share
+    p32: Share = 0.0
+    p23: Share = 1.0
+    p14: Share = 0.0
 
     def __post_init__(self) -> None:
-        _check_shares(self)
+        check_limits(self)
         for one, other in (("p13", "p14"), ("p31", "p32")):
             total = getattr(self, one) + getattr(self, other)
             # Percentages that make 100 % need not do so to the last binary digit.
             if total > 1.0 + 1e-9:
                 raise ValueError(f"{one} + {other} = {total:g}; valid: at most 1, as both leave the same state")
 
-    def losses(self, generator: np.random.Generator, model: CorrelationModel) -> Iterator[bool]:
-        """As LossModel has it; `model` makes no difference."""
-        del model
+    def losses(self, generator: np.random.Generator) -> Iterator[bool]:
+        """Implement LossModel."""
         state = 1
         while True:
             for number in generator.random(DRAWN_AT_ONCE).tolist():
@@ -97,7 +90,7 @@ class StateLoss:
                 yield state >= 3
 
     def share(self) -> float:
-        """As LossModel has it: the chain's long-run share of states 3 and 4."""
+        """Implement LossModel: the chain's long-run share of states 3 and 4."""
         steps = np.array(
             [
                 [1.0 - self.p13 - self.p14, 0.0, self.p13, self.p14],
@@ -109,7 +102,7 @@ class StateLoss:
         return float(_long_run(steps)[2:].sum())
 
     def words(self) -> str:
-        """As LossModel has it."""
+        """Implement LossModel."""
         return f"loss state {_shares(self)}"
 
 
@@ -120,21 +113,20 @@ class GilbertElliott:
     Each message is lost by the state that the one before left behind, while it takes a step itself.
     """
 
-    p: float
+    p: Share
     """From good to bad."""
-    r: float
+    r: Share
     """From bad to good: without loss in the good state, bursts of 1 / r messages on average."""
-    loss_bad: float = 1.0
+    loss_bad: Share = 1.0
     """1-h."""
-    loss_good: float = 0.0
+    loss_good: Share = 0.0
     """1-k."""
 
     def __post_init__(self) -> None:
-        _check_shares(self)
+        check_limits(self)
 
-    def losses(self, generator: np.random.Generator, model: CorrelationModel) -> Iterator[bool]:
-        """As LossModel has it; `model` makes no difference."""
-        del model
+    def losses(self, generator: np.random.Generator) -> Iterator[bool]:
+        """Implement LossModel."""
         bad = False
         while True:
             steps, losses = generator.random((2, DRAWN_AT_ONCE)).tolist()
@@ -147,12 +139,12 @@ class GilbertElliott:
                     yield loss < self.loss_good
 
     def share(self) -> float:
-        """As LossModel has it: p / (p + r) of the time is bad."""
+        """Implement LossModel: p / (p + r) of the time is bad."""
         good, bad = _long_run(np.array([[1.0 - self.p, self.p], [self.r, 1.0 - self.r]]))
         return float(good * self.loss_good + bad * self.loss_bad)
 
     def words(self) -> str:
-        """As LossModel has it."""
+        """Implement LossModel."""
         return f"loss gemodel {_shares(self)}"
 
 

@@ -3,24 +3,29 @@
 import math
 import shlex
 from dataclasses import dataclass, field
-from typing import get_args
+from typing import Annotated, get_args
+
+from msgspec import Meta
 
 from common.emulation.clauses import QUEUE_LIMIT, Chance, LinkModel, Outage, Rate
-from common.emulation.distribution import DelayTable, Distribution, moments
+from common.emulation.distribution import Distribution, moments
 from common.emulation.grammar import read_fields
 from common.emulation.loss import LossModel
-from common.emulation.randomness import CorrelationModel
 from common.emulation.slots import Slot
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
+from common.limits import Share, check_limits
 from common.units import format_duration, format_rate, format_share
 
 _SHORTEST_RECOVERY_S = 1e-3
 _RECOVERY_ROUND_TRIPS = 1.25
 _MOST_RETRANSMITTED = 0.99
 
-LONGEST_S = 1e6
+_LONGEST_S = 1e6
 """No delay or jitter is longer: eleven days."""
+_Delay = Annotated[float, Meta(ge=0.0, le=_LONGEST_S)]
+_Recovery = Annotated[float, Meta(ge=0.0, le=4.0 * _LONGEST_S)]
+_Count = Annotated[int, Meta(ge=1)]
 
 
 @dataclass(frozen=True)
@@ -32,76 +37,56 @@ class LinkProfile:
     corrupted message is sent again `recovery_s` later, as often as it takes; duplicates and reordering do not show.
     """
 
-    delay_s: float = 0.0
-    jitter_s: float = 0.0
+    delay_s: _Delay = 0.0
+    jitter_s: _Delay = 0.0
     """Half the range (uniform), the standard deviation (normal), or the scale of another shape."""
-    distribution: Distribution | DelayTable = "uniform"
+    distribution: Distribution = "uniform"
     seed: int = 0
     model: LinkModel = "datagram"
-    delay_correlation: float = 0.0
-    correlation_model: CorrelationModel = "netem"
+    delay_correlation: Share = 0.0
+    """Kept for the words alone: in netem, too, the delays stay independent (measured lag-1 correlation 0)."""
     loss: LossModel | None = None
     duplicate: Chance | None = None
     corrupt: Chance | None = None
     reorder: Chance | None = None
     """At once, ahead of what is being delayed."""
-    gap: int = 1
-    """At most one in so many is reordered."""
+    gap: _Count = 1
+    """At most one in this many is reordered."""
     rate: Rate | None = None
-    limit: int = QUEUE_LIMIT
+    limit: _Count = QUEUE_LIMIT
     """Messages that may wait; what comes on top is dropped."""
     slot: Slot | None = None
     outages: tuple[Outage, ...] = ()
     trace: Trace | None = None
     """Recorded delays instead of delay, jitter and loss."""
-    retransmit_s: float | None = None
+    retransmit_s: _Recovery | None = None
     """In a stream, how long until a lost message is sent again; None: see `recovery_s`."""
-    round_trip_s: float | None = field(default=None, compare=False)
+    round_trip_s: _Recovery | None = field(default=None, compare=False)
     """Of both directions, where the other one is known; None: twice this one."""
 
     def __post_init__(self) -> None:
-        for name in ("delay_s", "jitter_s"):
-            seconds = getattr(self, name)
-            if not 0.0 <= seconds <= LONGEST_S:
-                raise ValueError(f"{name} = {seconds} is negative, too long or no number; valid: 0 to {LONGEST_S:g} s")
-        if not (isinstance(self.distribution, DelayTable) or self.distribution in get_args(Distribution)):
-            raise ValueError(f"distribution = {self.distribution!r}; valid: {choices(Distribution)}, or a table")
-        for name in ("gap", "limit"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: 1 or more")
-        if not 0.0 <= self.delay_correlation <= 1.0:
-            raise ValueError(f"delay_correlation = {self.delay_correlation}; valid: 0 to 1")
-        for name in ("retransmit_s", "round_trip_s"):
-            optional_s: float | None = getattr(self, name)
-            if optional_s is not None and not 0.0 <= optional_s <= 4.0 * LONGEST_S:
-                raise ValueError(f"{name} = {optional_s}; valid: 0 to {4.0 * LONGEST_S:g} s, or None")
+        check_limits(self)
+        if self.distribution not in get_args(Distribution):
+            raise ValueError(f"distribution = {self.distribution!r}; valid: {choices(Distribution)}")
         if self.model == "stream" and self.retransmitted_share() > _MOST_RETRANSMITTED:
             raise ValueError("loss of all messages; valid in a stream, which sends lost ones again: below 99%")
-        check_seed_and_models(self.seed, self.model, self.correlation_model)
+        check_seed_and_model(self.seed, self.model)
 
     @classmethod
-    def parse(
-        cls,
-        spec: str,
-        seed: int = 0,
-        model: LinkModel = "datagram",
-        correlation_model: CorrelationModel = "netem",
-    ) -> "LinkProfile":
+    def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkProfile":
         """Read one bare profile such as `delay 50ms 10ms distribution normal loss 1%`; empty means no delay.
 
         ConfigurationError, in one line, for whatever is unknown, malformed, out of range or contradictory.
         """
-        return cls.parse_within(spec, spec, seed, model, correlation_model)
+        return cls.parse_within(spec, spec, seed, model)
 
     @classmethod
-    def parse_within(
-        cls, profile: str, spec: str, seed: int, model: LinkModel, correlation_model: CorrelationModel
-    ) -> "LinkProfile":
+    def parse_within(cls, profile: str, spec: str, seed: int, model: LinkModel) -> "LinkProfile":
         """Read `profile`, which is `spec` or a clause of it; ConfigurationError in one line that quotes `spec`."""
-        check_seed_and_models(seed, model, correlation_model)
+        check_seed_and_model(seed, model)
         fields = read_fields(profile, spec, model)
         try:
-            return cls(**fields, seed=seed, model=model, correlation_model=correlation_model)
+            return cls(**fields, seed=seed, model=model)
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
 
@@ -115,11 +100,8 @@ class LinkProfile:
         if self.reorder is not None and self.gap > 1:
             clauses.append(f"gap {self.gap}")
         if self.rate is not None:
-            rate = self.rate
-            numbers = [rate.overhead_bytes, rate.cell_bytes, rate.cell_overhead_bytes]
-            while numbers and numbers[-1] == 0:
-                numbers.pop()
-            clauses.append(" ".join(["rate", format_rate(rate.bits_per_second), *map(str, numbers)]))
+            overhead = f" {self.rate.overhead_bytes}" if self.rate.overhead_bytes else ""
+            clauses.append(f"rate {format_rate(self.rate.bits_per_second)}{overhead}")
         if self.limit != QUEUE_LIMIT:
             clauses.append(f"limit {self.limit}")
         if self.slot is not None:
@@ -166,16 +148,12 @@ class LinkProfile:
         return 1.0 - arrives
 
 
-def check_seed_and_models(seed: int, model: LinkModel, correlation_model: CorrelationModel) -> None:
-    """ConfigurationError for a negative seed and for unknown models."""
+def check_seed_and_model(seed: int, model: LinkModel) -> None:
+    """ConfigurationError for a negative seed and for an unknown model."""
     if seed < 0:
         raise ConfigurationError(f"seed = {seed} is negative; valid: 0 or a positive whole number")
     if model not in get_args(LinkModel):
         raise ConfigurationError(f"link model {model!r} is unknown; valid: {choices(LinkModel)}")
-    if correlation_model not in get_args(CorrelationModel):
-        raise ConfigurationError(
-            f"link correlation {correlation_model!r} is unknown; valid: {choices(CorrelationModel)}"
-        )
 
 
 def choices(literal: object) -> str:
@@ -193,20 +171,12 @@ def _format_delay(profile: LinkProfile) -> str:
         if profile.delay_correlation:
             words.append(format_share(profile.delay_correlation))
         if shape != "uniform":
-            words += ["distribution", _format_shape(shape)]
+            words += ["distribution", shape]
     return " ".join(words)
 
 
-def _format_shape(shape: Distribution | DelayTable) -> str:
-    return shlex.quote(shape.name) if isinstance(shape, DelayTable) else shape
-
-
 def _format_slot(slot: Slot) -> str:
-    if slot.shape is None:
-        words = ["slot", format_duration(slot.least_s), format_duration(slot.most_s)]
-    else:
-        times = (format_duration(slot.shape.mean_s), format_duration(slot.shape.jitter_s))
-        words = ["slot distribution", _format_shape(slot.shape.distribution), *times]
+    words = ["slot", format_duration(slot.least_s), format_duration(slot.most_s)]
     for name, budget in (("packets", slot.packets), ("bytes", slot.size_bytes)):
         if budget is not None:
             words += [name, str(budget)]

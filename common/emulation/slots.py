@@ -1,47 +1,32 @@
-"""netem's slots: times at which alone messages leave, each with room for so many messages or bytes."""
+"""netem's slots: times at which alone messages leave, each with room for a number of messages or bytes."""
 
 import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
-from common.emulation.distribution import DelayTable, Distribution, delays_at
+from common.limits import check_limits
 
 SHORTEST_SLOT_S = 1e-4
 _MOST_SLOTS = 20_000
-"""A message due after so many of the shortest slots leaves in one of its own: what lies between is not drawn."""
+"""A message due after this many of the shortest slots leaves in one of its own: what lies between is not drawn."""
 _DRAWN_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class SlotShape:
-    """Gaps between slots that follow a distribution, as a delay's jitter does."""
-
-    mean_s: float
-    jitter_s: float
-    distribution: Distribution | DelayTable
-
-    def __post_init__(self) -> None:
-        if not (SHORTEST_SLOT_S <= self.mean_s < math.inf and 0.0 <= self.jitter_s < math.inf):
-            raise ValueError(
-                f"gaps of {1e3 * self.mean_s:g}ms, jitter {1e3 * self.jitter_s:g}ms; "
-                f"valid: {1e3 * SHORTEST_SLOT_S:g}ms or more, and 0ms or more"
-            )
-
-
-@dataclass(frozen=True)
 class Slot:
-    """Times at which alone messages leave, each `least_s` to `most_s` after the one before, or as `shape` says."""
+    """Times at which alone messages leave, each `least_s` to `most_s` after the one before."""
 
     least_s: float
     most_s: float
-    shape: SlotShape | None = None
-    packets: int | None = None
-    """At most so many messages leave in one slot; None: any number."""
-    size_bytes: int | None = None
-    """The slot ends with the message that brings it to so many bytes; None: never."""
+    packets: Annotated[int, Meta(ge=1)] | None = None
+    """At most this many messages leave in one slot; None: any number."""
+    size_bytes: Annotated[int, Meta(ge=1)] | None = None
+    """The slot ends with the message that brings it to this many bytes; None: never."""
 
     def __post_init__(self) -> None:
         if not SHORTEST_SLOT_S <= self.least_s <= self.most_s < math.inf:
@@ -49,14 +34,7 @@ class Slot:
                 f"from {1e3 * self.least_s:g}ms to {1e3 * self.most_s:g}ms; "
                 f"valid: {1e3 * SHORTEST_SLOT_S:g}ms or more, the shorter one first"
             )
-        for name in ("packets", "size_bytes"):
-            if (value := getattr(self, name)) is not None and value < 1:
-                raise ValueError(f"{name} = {value}; valid: 1 or more")
-
-    @classmethod
-    def shaped(cls, shape: SlotShape, packets: int | None = None, size_bytes: int | None = None) -> "Slot":
-        """Slots whose gaps follow `shape`."""
-        return cls(shape.mean_s, shape.mean_s, shape, packets, size_bytes)
+        check_limits(self)
 
 
 class SlotTimes:
@@ -104,11 +82,5 @@ class SlotTimes:
             del values[:count]
 
     def _endless_gaps_s(self) -> Iterator[float]:
-        slot, shape = self._slot, self._slot.shape
         while True:
-            if shape is None:
-                yield from self._generator.uniform(slot.least_s, slot.most_s, _DRAWN_AT_ONCE).tolist()
-                continue
-            probabilities = self._generator.random(_DRAWN_AT_ONCE)
-            drawn_s = delays_at(probabilities, shape.mean_s, shape.jitter_s, shape.distribution)
-            yield from np.maximum(drawn_s, SHORTEST_SLOT_S).tolist()
+            yield from self._generator.uniform(self._slot.least_s, self._slot.most_s, _DRAWN_AT_ONCE).tolist()

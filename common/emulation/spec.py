@@ -10,8 +10,7 @@ import numpy as np
 from common.emulation.clauses import LinkModel
 from common.emulation.grammar import GRAMMAR
 from common.emulation.named_links import NAMED_LINKS, with_names_spelled_out
-from common.emulation.profile import LinkProfile, check_seed_and_models, choices
-from common.emulation.randomness import CorrelationModel
+from common.emulation.profile import LinkProfile, check_seed_and_model, choices
 from common.errors import ConfigurationError
 
 Direction = Literal["to_robot", "to_operator"]
@@ -30,22 +29,15 @@ class LinkSpec:
     """By name; the bare profile under the empty name. Their seeds are not used."""
     seed: int = 0
     model: LinkModel = "datagram"
-    correlation_model: CorrelationModel = "netem"
 
     @classmethod
-    def parse(
-        cls,
-        spec: str,
-        seed: int = 0,
-        model: LinkModel = "datagram",
-        correlation_model: CorrelationModel = "netem",
-    ) -> "LinkSpec":
+    def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkSpec":
         """Read `[PROFILE;] [NAME: PROFILE;] ...`, a name being a direction, a stream or `DIRECTION.STREAM`.
 
         The name of a link, such as `wifi`, stands for its words. ConfigurationError, in one line, for an unknown or
         repeated name and for a bad profile.
         """
-        check_seed_and_models(seed, model, correlation_model)
+        check_seed_and_model(seed, model)
         clauses: dict[str, LinkProfile] = {}
         for clause in filter(str.strip, with_names_spelled_out(spec).split(";")):
             if (word := clause.strip()).replace("-", "").isalpha() and word not in GRAMMAR:
@@ -65,8 +57,8 @@ class LinkSpec:
                     f"link {spec!r}: {what} stands there twice; "
                     f"valid: one profile without a name and one for each of {_valid_names()}"
                 )
-            clauses[name] = LinkProfile.parse_within(profile, spec, seed, model, correlation_model)
-        return cls(clauses, seed, model, correlation_model)
+            clauses[name] = LinkProfile.parse_within(profile, spec, seed, model)
+        return cls(clauses, seed, model)
 
     def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:
         """The profile of `stream` in `direction`, with a seed of its own so that no two are correlated."""
@@ -95,7 +87,7 @@ class LinkSpec:
 
     def _clause(self, direction: Direction, stream: Stream) -> LinkProfile:
         name = self._clause_name(direction, stream)
-        nothing = LinkProfile(model=self.model, correlation_model=self.correlation_model)
+        nothing = LinkProfile(model=self.model)
         return nothing if name is None else self.clauses[name]
 
 

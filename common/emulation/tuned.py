@@ -7,7 +7,6 @@ whoever asked for it from ever taking it back: neither is tuned.
 import dataclasses
 from typing import Final
 
-from common.emulation.distribution import DelayTable
 from common.emulation.loss import RandomLoss
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import LinkSpec
@@ -29,7 +28,7 @@ def tuned_link(link: LinkSpec, words: str) -> LinkSpec:
     Clauses of `link` for telemetry and video stay: video that has a rate of its own keeps it.
     """
     profile = tunable_profile(words)
-    profile = dataclasses.replace(profile, model=link.model, correlation_model=link.correlation_model)
+    profile = dataclasses.replace(profile, model=link.model)
     kept = {name: one for name, one in link.clauses.items() if name.endswith(("telemetry", "video"))}
     return dataclasses.replace(link, clauses={"": profile} | kept)
 
@@ -40,7 +39,7 @@ def tunable_profile(words: str) -> LinkProfile:
         if word not in _WORDS and not word[0].isdigit():
             raise ConfigurationError(f"link {words!r}: {word!r} cannot be tuned; valid: {_VALID}")
     profile = LinkProfile.parse(words)
-    if isinstance(profile.distribution, DelayTable) or not (profile.loss is None or type(profile.loss) is RandomLoss):
+    if not (profile.loss is None or type(profile.loss) is RandomLoss):
         raise ConfigurationError(f"link {words!r}: cannot be tuned; valid: {_VALID}")
     loss = 0.0 if profile.loss is None else profile.loss.share()
     if profile.delay_s > LONGEST_DELAY_S or profile.jitter_s > LONGEST_JITTER_S or loss > MOST_LOSS:

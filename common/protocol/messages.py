@@ -9,10 +9,12 @@ A field out of range or not finite makes the whole message invalid: nothing of i
 
 import math
 from collections.abc import Iterable
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
+from common.limits import Share, check_limits
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
@@ -26,8 +28,11 @@ Compensation = Literal["operator", "robot"]
 _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
 _SLOWEST = 1e-6
-_LONGEST_REASON = 200
-_LONGEST_LINK = 200
+_Words = Annotated[str, Meta(max_length=200)]
+_Number = Annotated[int, Meta(ge=0, le=_LARGEST)]
+_Few = Annotated[int, Meta(ge=0, le=1000)]
+
+# Messages that are made up to 1000 times a second check their ranges by hand: `check_limits` takes four times as long.
 
 
 def _in_range(name: str, low: float, high: float, value: float) -> None:
@@ -105,12 +110,11 @@ class Hello(Message, frozen=True, tag="hello"):
     """Opens an epoch, in either direction; repeated until the peer's has arrived."""
 
     side: Literal["operator", "robot"]
-    clock_domain: str
+    clock_domain: _Words
     """Names the monotonic clock (common.clock.clock_domain): equal and not empty means a shared clock."""
 
     def __post_init__(self) -> None:
-        if len(self.clock_domain) > 200:
-            raise ValueError(f"clock_domain has {len(self.clock_domain)} characters; valid: up to 200")
+        check_limits(self)
 
 
 class MotionCommand(Message, frozen=True, tag="motion"):
@@ -159,49 +163,38 @@ class Watch(Message, frozen=True, tag="watch"):
 class Tune(Message, frozen=True, tag="tune"):
     """What the owner wants to be different while the run goes on; repeated until a notice says that it was taken."""
 
-    number: int
+    number: Annotated[int, Meta(ge=1, le=_LARGEST)]
     """Grows with each wish."""
-    probability: float | None = None
+    probability: Annotated[float, Meta(ge=1e-6, le=1.0 - 1e-6)] | None = None
     """P of eq. 10, within (0, 1); None leaves it."""
-    link: str | None = None
+    link: _Words | None = None
     """The emulated link of both directions in netem's words, none for an empty text; None leaves it."""
 
     def __post_init__(self) -> None:
-        _in_range("number", 1, _LARGEST, self.number)
-        if self.probability is not None:
-            _in_range("probability", 1e-6, 1.0 - 1e-6, self.probability)
-        if self.link is not None and len(self.link) > _LONGEST_LINK:
-            raise ValueError(f"link has {len(self.link)} characters; valid: up to {_LONGEST_LINK}")
+        check_limits(self)
 
 
 class LeaseNotice(Message, frozen=True, tag="lease"):
     """Where the receiver stands with the robot side; repeated, so that a lost one does no harm."""
 
     session: SessionState
-    why: str
+    why: _Words
     """Why it stands there."""
-    token: int
-    """The fencing token of the present lease, whoever owns it; it only grows. 0 before the first."""
-    waiting: int
+    token: _Number
+    """The fencing token of the present lease; it only grows. 0 before the first."""
+    waiting: _Few
     """How many observe."""
-    place: int = 0
-    """The receiver's place among them, or for who is not known that which it would get: 1 is next, 0 owns."""
+    place: _Few = 0
+    """The receiver's place among them, or the one that an unknown peer would get: 1 is next, 0 owns."""
     may_tune: bool = False
-    """Whether the run lets its owner tune."""
-    probability: float | None = None
+    """True if the run lets its owner tune."""
+    probability: Share | None = None
     """P as it is now."""
-    tuned: int = 0
+    tuned: _Number = 0
     """The number of the receiver's newest wish to tune that arrived, granted or not."""
 
     def __post_init__(self) -> None:
-        if len(self.why) > _LONGEST_REASON:
-            raise ValueError(f"why has {len(self.why)} characters; valid: up to {_LONGEST_REASON}")
-        _in_range("token", 0, _LARGEST, self.token)
-        _in_range("waiting", 0, 1000, self.waiting)
-        _in_range("place", 0, 1000, self.place)
-        _in_range("tuned", 0, _LARGEST, self.tuned)
-        if self.probability is not None:
-            _in_range("probability", 0.0, 1.0, self.probability)
+        check_limits(self)
 
 
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

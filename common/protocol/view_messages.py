@@ -6,11 +6,12 @@
 Arrays travel as bytes, little-endian and row by row, as their docstrings say.
 """
 
-import math
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
+from msgspec import Meta
 
+from common.limits import Finite, check_limits
 from common.protocol.messages import Message, Vector3
 
 ViewName = Literal["overview", "first_person"]
@@ -19,7 +20,7 @@ ShapeKind = Literal["sphere", "box", "cylinder", "capsule", "ellipsoid", "plane"
 
 VIDEO_TOPIC: Final = b"video"
 SCENE_TOPIC: Final = b"scene"
-_LARGEST_IMAGE: Final = 4096
+_Pixels = Annotated[int, Meta(ge=1, le=4096)]
 _POSE_BYTES: Final = 7 * 4
 _SPHERE_BYTES: Final = 4 * 4
 
@@ -28,18 +29,14 @@ class VideoFrame(Message, frozen=True, tag="video"):
     """One picture of one camera."""
 
     view: ViewName
-    captured_s: float
-    """When what it shows was so, on the robot side's monotonic clock."""
-    width: int
-    height: int
+    captured_s: Finite
+    """The moment that it shows, on the robot side's monotonic clock."""
+    width: _Pixels
+    height: _Pixels
     jpeg: bytes
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.captured_s):
-            raise ValueError(f"captured_s = {self.captured_s}; valid: finite")
-        for name, value in (("width", self.width), ("height", self.height)):
-            if not 1 <= value <= _LARGEST_IMAGE:
-                raise ValueError(f"{name} = {value}; valid: 1 to {_LARGEST_IMAGE}")
+        check_limits(self)
 
 
 class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

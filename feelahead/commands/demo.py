@@ -200,7 +200,7 @@ def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: P
     """Pass on the flags that were given: elsewhere the sides' own files count."""
     arguments = [
         f"--{name.replace('_', '-')}={getattr(settings, name)}"
-        for name in ("link", "link_model", "link_correlation", "asymmetry", "seed")
+        for name in ("link", "link_model", "asymmetry", "seed")
         if name in given
     ]
     if "realtime" in given:

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from common.emulation.distribution import DelayTable
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec
 from common.errors import FeelaheadError
@@ -63,14 +62,13 @@ def _direction_words(link: LinkSpec, direction: Direction) -> str:
 
 
 def _beyond(profile: LinkProfile) -> str | None:
-    if isinstance(profile.distribution, DelayTable) or profile.distribution == "exponential":
+    if profile.distribution == "exponential":
         return "a distribution that tc has no table of"
     for name, there in (
-        ("slot distribution", profile.slot is not None and profile.slot.shape is not None),
         ("trace", profile.trace is not None),
         ("outage", bool(profile.outages)),
         ("retransmit", profile.retransmit_s is not None),
     ):
         if there:
-            return f"{name} is not among tc's words, or not with its tables"
+            return f"{name} is not among tc's words"
     return None

@@ -21,12 +21,10 @@ class Run:
         count: int,
         seed: int = 0,
         model: LinkModel = "datagram",
-        correlation: str = "netem",
         size_bytes: int = 100,
         period_s: float = PERIOD_S,
     ) -> None:
-        profile = LinkProfile.parse(spec, seed, model, correlation)  # type: ignore[arg-type]
-        self.line: DelayLine[int] = DelayLine(profile)
+        self.line: DelayLine[int] = DelayLine(LinkProfile.parse(spec, seed, model))
         self.deliveries: list[tuple[float, int]] = []
         for number in range(count):
             self._deliver(number * period_s)

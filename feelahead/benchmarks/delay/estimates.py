@@ -123,7 +123,6 @@ def _ours(outcomes: Sequence[Outcome]) -> Table:
                 f"{1e3 * quantile_of_sizes(outcome.offset_errors_s, 0.99):.3f}",
                 f"{1e3 * quantile_of_sizes(outcome.offset_errors_s, 1.0):.3f}",
                 f"{1e3 * rms(outcome.one_way_errors_s):.3f}",
-                f"{1e6 * rms(outcome.skew_errors):.1f}",
                 f"{float(np.median(outcome.within_after_s)):.2f}",
                 f"{quantile_of_sizes(outcome.within_after_s, 0.99):.2f}",
                 f"{1e3 * float(np.mean(outcome.widest_bounds_s)):.1f}",
@@ -139,7 +138,6 @@ def _ours(outcomes: Sequence[Outcome]) -> Table:
         "p99",
         "max",
         "one-way rms",
-        "skew rms",
         "good after",
         "p99",
         "bound",
@@ -147,7 +145,7 @@ def _ours(outcomes: Sequence[Outcome]) -> Table:
         "estimator",
     )
     note = (
-        "Errors in ms, of the skew in ppm. Good: within 0.5 ms from then on, in s. "
+        "Errors in ms. Good: within 0.5 ms from then on, in s. "
         "What one way's floor has more than the other's and nobody told costs half of itself, whatever the estimator; "
         "the bound covers it."
     )
@@ -177,7 +175,6 @@ def _rows(outcome: Outcome) -> Iterator[tuple[str, str, int, str, str, float, st
         yield (*head, ours, "offset error max", 1e3 * quantile_of_sizes(errors_s, 1.0), "ms")
         yield (*head, ours, "one-way delay error rms", 1e3 * rms(one_way_s), "ms")
         yield (*head, ours, "one-way delay error max of rms", 1e3 * quantile_of_sizes(one_way_s, 1.0), "ms")
-        yield (*head, ours, "skew error rms", 1e6 * rms(outcome.skew_errors[place::2]), "ppm")
         yield (*head, ours, "within 0.5 ms after p50", float(np.median(after_s)), "s")
         yield (*head, ours, "within 0.5 ms after p99", quantile_of_sizes(after_s, 0.99), "s")
         yield (*head, ours, "bound mean", 1e3 * float(np.mean(outcome.widest_bounds_s[place::2])), "ms")

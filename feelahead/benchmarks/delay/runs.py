@@ -25,7 +25,6 @@ class Outcome:
     """At the end."""
     one_way_errors_s: list[float] = field(default_factory=list)
     """Root mean square over the last half second's arrivals."""
-    skew_errors: list[float] = field(default_factory=list)
     within_after_s: list[float] = field(default_factory=list)
     """From when on the offset stayed within `GOAL_S`; infinite where it was not at the end."""
     widest_bounds_s: list[float] = field(default_factory=list)
@@ -74,17 +73,12 @@ def _run(outcome: Outcome, traffic: Traffic, duration_s: float) -> None:
         if estimate.one_way_error_s is not None and estimate.at_s > duration_s - _LAST_S:
             side.squares_s2 += estimate.one_way_error_s**2
             side.squared += 1
-    for name, end, skew in (
-        ("robot", traffic.robot, traffic.clock.skew),
-        ("operator", traffic.operator, 1.0 / (1.0 + traffic.clock.skew) - 1.0),
-    ):
+    for name, end in (("robot", traffic.robot), ("operator", traffic.operator)):
         side = sides[name]
         outcome.offset_errors_s.append(side.offset_error_s)
         outcome.one_way_errors_s.append((side.squares_s2 / side.squared) ** 0.5 if side.squared else np.nan)
         outcome.within_after_s.append(side.outside_s if abs(side.offset_error_s) <= GOAL_S else np.inf)
         outcome.widest_bounds_s.append(side.bound_s)
-        found = end.clock_offset.skew
-        outcome.skew_errors.append(np.nan if found is None else found - skew)
         outcome.estimators[end.clock_offset.estimator or "none"] += 1
     _compare(outcome, traffic)
 

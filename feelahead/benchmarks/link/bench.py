@@ -17,7 +17,6 @@ from common.command.command_line import parse_settings
 from common.emulation.clauses import LinkModel
 from common.emulation.figures import report_lines
 from common.emulation.profile import LinkProfile
-from common.emulation.randomness import CorrelationModel
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.output_file import output_file, require_output_file
@@ -58,8 +57,6 @@ class LinkBenchSettings:
     """The emulated link, in netem's words; the sending robot side is the one shown where directions differ."""
     link_model: LinkModel = "datagram"
     """datagram loses and reorders, stream keeps the order and turns loss into delay."""
-    link_correlation: CorrelationModel = "netem"
-    """What correlations mean: netem's own, or proper ones."""
     rate: Annotated[float, tyro.conf.arg(metavar="HZ")] = 1000.0
     """Messages a second in each direction; not used where a recording gives the send times."""
     count: Annotated[int, tyro.conf.arg(metavar="N")] = 6000
@@ -88,7 +85,7 @@ class LinkBenchSettings:
     """A recording to compare with: seq, sent_ns, delay_ns, in any order; with --virtual its send times are used."""
 
     def __post_init__(self) -> None:
-        LinkSpec.parse(self.link, 0, self.link_model, self.link_correlation)
+        LinkSpec.parse(self.link, 0, self.link_model)
         if not 1.0 <= self.rate <= 1e5:
             raise ValueError(f"--rate {self.rate}: valid: 1 to 100000 messages a second")
         for name, least, most in (
@@ -119,7 +116,7 @@ class LinkBenchSettings:
     @property
     def spec(self) -> LinkSpec:
         """The link with this run's seed."""
-        return LinkSpec.parse(self.link, self.seed, self.link_model, self.link_correlation)
+        return LinkSpec.parse(self.link, self.seed, self.link_model)
 
 
 def bench_link(arguments: Sequence[str]) -> int:

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.emulation.distribution import DelayTable, cells, delays_at, moments, table
-from common.errors import ConfigurationError
+from common.emulation.distribution import delays_at, moments, table
 
 IPROUTE2_TABLES = Path("/usr/lib/x86_64-linux-gnu/tc")
 
@@ -62,9 +61,9 @@ def test_paretonormal_is_a_quarter_normal() -> None:
 @pytest.mark.parametrize("shape", ["normal", "pareto", "paretonormal"])
 def test_tables_differ_from_iproute2s_by_rounding_alone(shape: str) -> None:
     quantiles = table(shape)
-    theirs = table(DelayTable.read(IPROUTE2_TABLES / f"{shape}.dist", "table"))
+    lines = (IPROUTE2_TABLES / f"{shape}.dist").read_text(encoding="utf-8").splitlines()
+    theirs = np.sort([int(word) for line in lines for word in line.partition("#")[0].split()]) / 8192
     assert quantiles is not None
-    assert theirs is not None
     assert np.max(np.abs(quantiles - theirs)) <= 1.0 / 8192
 
 
@@ -87,48 +86,3 @@ def test_exponential_is_a_floor_with_a_tail() -> None:
 def test_a_negative_delay_sends_at_once() -> None:
     assert delays_at(np.array([0.0, 0.5]), 0.005, 0.010, "uniform") == pytest.approx([0.0, 0.005])
     assert moments(0.0, 0.010, "pareto")[2] == pytest.approx(0.040, abs=1e-5)
-
-
-def test_netem_picks_from_nanoseconds_or_entries() -> None:
-    assert cells("uniform", 0.010) == 20_000_000
-    assert cells("normal", 0.010) == 4096
-    assert cells(DelayTable("mine", (0, 1, 2)), 0.010) == 3
-
-
-def test_a_table_of_ones_own(tmp_path: Path) -> None:
-    path = tmp_path / "two.dist"
-    path.write_text("# two delays\n 8192\n-16384 # the lower one\n")
-    mine = DelayTable.read(path, "table")
-    assert mine.steps == (-16384, 8192)
-    assert delays_at(np.array([0.0, 0.49, 0.5, 0.99]), 0.050, 0.010, mine) == pytest.approx([0.03, 0.03, 0.06, 0.06])
-    assert moments(0.050, 0.010, mine) == pytest.approx((0.045, 0.015, 0.060))
-
-
-@pytest.mark.parametrize(
-    ("content", "named"),
-    [
-        (b"", "0 entries"),
-        (b"# nothing but a comment\n", "0 entries"),
-        (b"1 2 x", "'x'"),
-        (b"1 2.5", "'2.5'"),
-        (b"40000", "'40000'"),
-        (b"-32769", "'-32769'"),
-        (b"+", "'+'"),
-        ("٣".encode(), "'٣'"),
-        (b"1 " * 16385, "16385 entries"),
-        (b"\xff\xfe\x00", "is no text"),
-    ],
-)
-def test_a_bad_table_is_refused_in_one_line(tmp_path: Path, content: bytes, named: str) -> None:
-    path = tmp_path / "bad.dist"
-    path.write_bytes(content)
-    with pytest.raises(ConfigurationError) as refusal:
-        DelayTable.read(path, "link 'x': distribution")
-    assert "\n" not in str(refusal.value)
-    assert named in str(refusal.value)
-    assert str(path) in str(refusal.value)
-
-
-def test_a_missing_table_names_the_distributions() -> None:
-    with pytest.raises(ConfigurationError, match=r"'gauss\.dist'.*uniform, normal, pareto, paretonormal, exponential"):
-        DelayTable.read(Path("gauss.dist"), "distribution")

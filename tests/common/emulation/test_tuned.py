@@ -37,7 +37,6 @@ def test_delay_jitter_and_loss_are_tuned(words: str, delay_s: float, jitter_s: f
         "trace /etc/passwd",
         "delay 10ms 1ms distribution /etc/passwd",
         "delay 10ms 1ms distribution 7/etc/passwd",
-        "slot distribution normal 1ms 1ms",
         "outage 2s at 1s",
         "rate 1bit",
         "limit 1",

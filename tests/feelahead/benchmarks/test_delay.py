@@ -104,7 +104,7 @@ def test_the_command_prints_tables_and_goals_and_writes_figures(
     file = tmp_path / "figures.csv"
     assert bench_delay(["--runs", "2", "--seconds", "2", "--csv", str(file)]) == 0
     shown = capsys.readouterr().out
-    for words in ("50 + exp(10) both ways", "lower envelope", "mean of offsets", "violations of the bound: 0"):
+    for words in ("50 + exp(10) both ways", "interval", "mean of offsets", "violations of the bound: 0"):
         assert words in shown
     with file.open(encoding="utf-8", newline="") as lines:
         rows = list(csv.DictReader(lines))

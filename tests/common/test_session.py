@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
-from feelahead.documents.generated_part import BEGIN, END, with_generated_part
+from feelahead.documents.generated_part import with_generated_part
 from feelahead.documents.session_diagram import DOCUMENT, diagram, generated, table
 
 CHANGING = [row for row in TRANSITIONS if row.after is not row.before]
@@ -50,21 +50,11 @@ def test_only_the_arming_button_arms_and_only_after_a_healthy_second() -> None:
     assert {row.event for row in CHANGING if row.after in ready} == {SessionEvent.HEALTHY}
 
 
-@pytest.mark.parametrize("event", STOPPING)
-def test_whatever_stops_stops_the_armed(event: SessionEvent) -> None:
-    assert after(SessionState.ARMED, event) is not SessionState.ARMED
-
-
 def test_every_lease_begins_disarmed() -> None:
     for row in TRANSITIONS:
         if row.before not in OWNING and row.after in OWNING:
             assert row.after is SessionState.DISARMED
             assert row.event in WAYS_IN
-
-
-@pytest.mark.parametrize("state", sorted(OWNING))
-def test_an_emergency_stop_stops_every_owner(state: SessionState) -> None:
-    assert after(state, SessionEvent.EMERGENCY_STOP) is SessionState.STOPPED
 
 
 def test_a_stop_ends_by_arming_alone() -> None:
@@ -74,7 +64,11 @@ def test_a_stop_ends_by_arming_alone() -> None:
 
 
 @pytest.mark.parametrize("event", SessionEvent)
-def test_what_has_ended_stays_so(event: SessionEvent) -> None:
+def test_what_each_event_does_to_who_is_armed_who_owns_and_who_has_ended(event: SessionEvent) -> None:
+    if event in STOPPING:
+        assert after(SessionState.ARMED, event) is not SessionState.ARMED
+    if event is SessionEvent.EMERGENCY_STOP:
+        assert {after(state, event) for state in OWNING} == {SessionState.STOPPED}
     assert after(SessionState.ENDED, event) is SessionState.ENDED
 
 
@@ -99,13 +93,6 @@ def test_armed_always_follows_a_lease_a_healthy_second_and_the_button(events: li
             assert not set(since_lease[last_arm:]) & set(STOPPING)
 
 
-def test_the_reason_is_that_of_the_last_row() -> None:
-    session = Session()
-    session.handle(SessionEvent.ASKED_WHILE_HELD)
-    session.handle(SessionEvent.HEALTHY)
-    assert session.why == "one owner, many observers"
-
-
 def test_the_document_shows_the_table_as_it_is() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
     assert with_generated_part(text, generated()) == text, (
@@ -116,11 +103,6 @@ def test_the_document_shows_the_table_as_it_is() -> None:
 def test_a_changed_row_changes_the_document() -> None:
     assert table(TRANSITIONS[1:]) not in DOCUMENT.read_text(encoding="utf-8")
     assert diagram(TRANSITIONS[:-1]) != diagram()
-
-
-def test_a_document_without_marks_is_refused() -> None:
-    with pytest.raises(ValueError, match="marks"):
-        with_generated_part(f"{END} the wrong way round {BEGIN}", "text")
 
 
 @pytest.mark.processes

@@ -1,0 +1,336 @@
+"""Every message on the wire: it comes back as it was, is MessagePack, and is refused whole when a field is bad."""
+
+import math
+import random
+import struct
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import msgpack
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import OtherVersionError, RemoteProtocolError
+from common.protocol import messages as control
+from common.protocol.codec import (
+    MAXIMUM_BYTES,
+    PROTOCOL_VERSION,
+    VIEW_MAXIMUM_BYTES,
+    Prepared,
+    decode,
+    decode_view,
+    encode,
+)
+from common.protocol.messages import AnyMessage, Header, Hello, Message, MotionCommand
+from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneShapes, SceneState, Shape, VideoFrame
+from tests.helpers.felt import felt, field, ways
+
+repeatable = settings(derandomize=True, deadline=None)
+HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
+POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
+ROW = struct.pack("<7f", *POSE)
+TERMS = EnlargementTerms(0.01, 0.001, 0.002, 0.003, 0.004, 2.3, 0.1, 0.02)
+SHAPE = Shape(0, False, "mesh", (1.0, 1.0, 1.0), POSE, vertices_m=b"\x00" * 12, triangles=b"\x01" * 12)
+SCENE = SceneState(
+    *(HEADER, 1, 2.5, ROW, struct.pack("<I", 3), ROW, bytes([0, 1]), POSE, bytes(16), ((3, 1e-9, 2e-9),)),
+    *(TERMS, TERMS, 100.0, 200.0, 0),
+)
+VIEWS: tuple[AnyViewMessage, ...] = (
+    VideoFrame(HEADER, view="overview", captured_s=3.0, width=640, height=480, jpeg=bytes(range(256)) * 100),
+    SceneShapes(HEADER, 1, ("palm",), ("ball",), (SHAPE,), 2, ROW),
+    SCENE,
+)
+VALID: tuple[AnyMessage, ...] = (
+    Hello(HEADER, side="operator", clock_domain="boot"),
+    MotionCommand(HEADER, l2=0.5, r2=0.25, lateral=(0.1, -0.1), run=True),
+    felt(HEADER, l2=0, r2=5, rumble=0.5),
+)
+
+
+# One strategy for every message class, made from its type hints; what is checked by hand is narrowed here.
+
+unit, stick = st.floats(0.0, 1.0), st.floats(-1.0, 1.0)
+finite = st.floats(-1e6, 1e6)
+stamps = st.integers(0, 2**63 - 1)
+headers = st.builds(Header, stamps, stamps, finite) | st.builds(Header, stamps, stamps, finite, finite, unit)
+eight_ways = st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+BY_HAND: dict[str, st.SearchStrategy[Any]] = {
+    **dict.fromkeys(("header",), headers),
+    **dict.fromkeys(("fast_m", "slow_m"), eight_ways),
+    **dict.fromkeys(("lateral", "turning"), st.tuples(stick, stick)),
+    **dict.fromkeys(("up_in_tool",), st.tuples(stick, stick, stick)),
+    **dict.fromkeys(("tool_position_m",), st.tuples(finite, finite, finite)),
+    **dict.fromkeys(("target_in_tool_m",), st.none() | st.tuples(finite, finite, finite)),
+    **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
+    **dict.fromkeys(("told_m_s",), st.none() | stick),
+    **dict.fromkeys(("token",), stamps),
+}
+
+
+def values(hint: Any) -> st.SearchStrategy[Any]:
+    if get_origin(hint) is Annotated:
+        kind, meta = get_args(hint)
+        if kind is str:
+            return st.text(max_size=meta.max_length)
+        return st.integers(meta.ge, meta.le) if kind is int else st.floats(meta.ge, meta.le)
+    if get_args(hint) and type(None) in get_args(hint):
+        return st.none() | values(next(kind for kind in get_args(hint) if kind is not type(None)))
+    if hint is float:
+        return unit
+    if hint is str:
+        return st.text(max_size=100)
+    if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
+        return made(hint)
+    return st.from_type(hint)
+
+
+def made(kind: type[Any]) -> st.SearchStrategy[Any]:
+    hints = get_type_hints(kind, include_extras=True)
+    return st.builds(kind, **{name: BY_HAND[name] if name in BY_HAND else values(hints[name]) for name in hints})
+
+
+messages: st.SearchStrategy[AnyMessage] = st.one_of([made(kind) for kind in get_args(AnyMessage)])
+
+
+def packed_by_msgpack(message: Message) -> bytes:
+    payload: bytes = msgpack.packb([PROTOCOL_VERSION, msgspec.to_builtins(message, builtin_types=(bytes,))])
+    return payload
+
+
+@given(messages | st.sampled_from(VIEWS))
+@settings(repeatable, max_examples=300)
+def test_a_message_comes_back_as_it_was_and_is_messagepack(message: Any) -> None:
+    payload = encode(message)
+    ours, others = (decode_view, decode) if isinstance(message, get_args(AnyViewMessage)) else (decode, decode_view)
+    assert ours(payload) == message
+    assert payload == packed_by_msgpack(message)
+    with pytest.raises(RemoteProtocolError):
+        others(payload)
+    assert ours is decode_view or len(payload) <= MAXIMUM_BYTES
+
+
+@given(messages, st.data())
+@settings(repeatable, max_examples=500)
+def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, data: st.DataObject) -> None:
+    hostile = bytearray(encode(message))
+    for _ in range(data.draw(st.integers(1, 4))):
+        position = data.draw(st.integers(2, len(hostile)))  # bytes of another version are not looked into
+        removed = data.draw(st.integers(0, 3))
+        hostile[position : position + removed] = data.draw(st.binary(max_size=3))
+    try:
+        expected = msgspec.convert(msgpack.unpackb(bytes(hostile))[1], AnyMessage)
+    except (ValueError, TypeError, KeyError, msgspec.ValidationError):
+        expected = None
+    try:
+        decoded = decode(bytes(hostile))
+    except RemoteProtocolError:
+        decoded = None
+    if expected is not None or decoded is not None:
+        # Where msgpack gives up on more than it must (keys that cannot be hashed), ours may still be valid.
+        assert decoded is None or decode(encode(decoded)) == decoded
+        assert expected is None or decoded == expected
+
+
+def survives(hostile: bytes) -> AnyMessage | None:
+    """None for what is refused; a message that is valid through and through for what is not."""
+    try:
+        message = decode(hostile)
+    except RemoteProtocolError:
+        return None
+    assert decode(encode(message)) == message
+    return message
+
+
+nested = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text(max_size=8) | st.binary(),
+    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=4), inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(st.binary(max_size=200) | nested.map(lambda content: msgpack.packb([PROTOCOL_VERSION, content])))
+@settings(repeatable, max_examples=1000)
+def test_garbage_and_well_packed_nonsense_raise_the_documented_error(payload: bytes) -> None:
+    with pytest.raises(RemoteProtocolError):
+        decode(payload)
+
+
+@pytest.mark.parametrize(
+    "opening", [b"\x91", b"\x92\x01", b"\x81\xa1a", b"\x81\x91", b"\xdc\x00\x01", b"\xdf\x00\x00\x00\x01\xa1a"]
+)
+def test_nesting_as_deep_as_the_limit_allows(opening: bytes) -> None:
+    depth = MAXIMUM_BYTES // len(opening)
+    for hostile in (
+        opening * depth,
+        opening * (depth // 2) + b"\x01",
+        bytes([0x92, PROTOCOL_VERSION]) + opening * 500 + b"\xc0",
+    ):
+        assert survives(hostile[:MAXIMUM_BYTES]) is None
+
+
+@pytest.mark.parametrize("claim", [b"\xdd", b"\xdf", b"\xdb", b"\xc6", b"\xc9"])
+def test_claims_of_four_thousand_million_elements_allocate_nothing(claim: bytes) -> None:
+    claim += b"\xff\xff\xff\xff\x01"
+    assert survives(claim) is None
+    assert survives(claim + bytes(1000)) is None
+    assert survives(bytes([0x92, PROTOCOL_VERSION]) + claim) is None
+
+
+ODD: list[Any] = [
+    *(math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 2**63, 2**64 - 1, -(2**63), -1),
+    *(True, None, "", "x" * 1000, b"\xff" * 1000, [], {}, [[]], {"a": 1}),
+    *(msgpack.Timestamp(1, 0), msgpack.ExtType(5, b"x")),
+]
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: f"{odd!r:.20}")
+def test_an_odd_value_in_any_place_is_refused_or_in_range(odd: object) -> None:
+    for message in VALID:
+        for path in places(msgpack.unpackb(encode(message))):
+            spoiled = msgpack.unpackb(encode(message))
+            holder = spoiled
+            for step in path[:-1]:
+                holder = holder[step]
+            holder[path[-1]] = odd
+            survives(msgpack.packb(spoiled))
+
+
+def places(content: list[Any], before: tuple[int, ...] = ()) -> list[tuple[int, ...]]:
+    found = []
+    for position, item in enumerate(content):
+        found.append((*before, position))
+        if isinstance(item, list):
+            found += places(item, (*before, position))
+    return found
+
+
+def test_the_hostile_mixture_is_refused_or_valid() -> None:
+    generator = random.Random(0)  # noqa: S311
+    outcomes = []
+    for _ in range(5000):
+        payload = bytearray(encode(generator.choice(VALID)))
+        payload[generator.randrange(len(payload))] = generator.randrange(256)
+        outcomes.append(survives(bytes(payload[: generator.randrange(len(payload) // 2, 2 * len(payload))])))
+    assert 1000 < outcomes.count(None) < 5000  # both happen, or this would test nothing
+
+
+# Versions and sizes
+
+
+@pytest.mark.parametrize("version", [PROTOCOL_VERSION + 1, -1, True, "2", None, 2.0, [2]])
+def test_another_version_is_told_apart_from_garbage(version: Any) -> None:
+    content = msgpack.unpackb(encode(VALID[1]))
+    for rest in (msgpack.packb(content[1]), b"\xa1\xff"):  # whatever else the bytes hold
+        with pytest.raises(RemoteProtocolError) as caught:
+            decode(b"\x92" + msgpack.packb(version) + rest)
+        if isinstance(version, int) and version > PROTOCOL_VERSION:
+            assert isinstance(caught.value, OtherVersionError)
+            assert f"protocol version {version}" in str(caught.value)
+        else:
+            assert not isinstance(caught.value, OtherVersionError)
+
+
+def test_what_is_too_long_is_not_looked_into() -> None:
+    for limit, read in ((MAXIMUM_BYTES, decode), (VIEW_MAXIMUM_BYTES, decode_view)):
+        with pytest.raises(RemoteProtocolError, match=f"{limit + 1} bytes; valid: up to {limit}"):
+            read(bytes(limit + 1))
+    with pytest.raises(RemoteProtocolError):
+        decode(encode(VALID[0]) + bytes(MAXIMUM_BYTES))
+
+
+# Refusals
+
+
+REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
+    (HEADER, {"epoch": -1}, "epoch = -1"),
+    (HEADER, {"sequence": 2**63}, "sequence = 9223372036854775808"),
+    (HEADER, {"sent_s": math.nan}, "sent_s = nan"),
+    *(
+        (HEADER, {f"{name}_sent_s": sent_s, f"{name}_held_s": held_s}, f"{name}_(sent|held)_s")
+        for name in ("echo", "last")
+        for sent_s, held_s in ((1.0, None), (None, 0.1), (math.nan, 0.1), (1.0, -0.1), (1.0, 2e9))
+    ),
+    *((VALID[1], {name: value}, name) for name in ("l2", "r2") for value in (math.nan, math.inf, 1.0001, -1e-9)),
+    *((VALID[1], {name: (0.0, value)}, name) for name in ("lateral", "turning") for value in (math.nan, 1.1)),
+    (VALID[1], {"gripper": -1.1}, "gripper"),
+    (VALID[1], {"token": -1}, "token"),
+    (VALID[2], {"rumble": 2.0}, "rumble = 2.0"),
+    (VALID[2], {"speed_m_s": math.nan}, "speed_m_s = nan"),
+    (VALID[2], {"horizon_m": -0.1}, "horizon_m = -0.1"),
+    (VALID[2], {"told_m_s": math.inf}, "told_m_s = inf"),
+    (field(ways(0.1)), {"fast_m": ways(0.2, 0.1)}, "fast_m = .* none shorter than the one before"),
+    (field(ways(0.1)), {"slow_m": ways(0.0, math.nan)}, "slow_m = nan"),
+    (field(ways(0.1)), {"slow_m": ways(0.0, math.inf)}, "slow_m = inf"),
+    (field(ways(0.1)), {"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
+    (field(ways(0.1)), {"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
+    (field(ways(0.1)), {"displacement_m": math.nan}, "displacement_m = nan"),
+    (field(ways(0.1)), {"stiffness": 1.1}, "stiffness = 1.1"),
+    (SCENE, {"link_poses": b"123"}, "link_poses, spheres; valid: whole rows"),
+    (SCENE, {"spheres": b"123"}, "link_poses, spheres; valid: whole rows"),
+    (SCENE, {"object_poses": b""}, "object_poses; valid: a row for each"),
+    (VIEWS[1], {"object_poses": ROW + ROW}, "object_poses; valid: a row for each"),
+)
+
+
+@pytest.mark.parametrize(("valid", "changes", "said"), REFUSED)
+def test_what_is_checked_by_hand_is_refused_when_made(valid: Any, changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        msgspec.structs.replace(valid, **changes)
+
+
+def declared() -> list[tuple[Any, str, Any]]:
+    """The values just outside of each range that a message class declares."""
+    found: list[tuple[Any, str, Any]] = []
+    samples = [VIEWS[0], VALID[0], control.Tune(HEADER, 1), control.LeaseNotice(HEADER, "armed", "", 1, 0)]  # type: ignore[arg-type]
+    for sample in samples:
+        for name, hint in get_type_hints(type(sample), include_extras=True).items():
+            inner = next((one for one in get_args(hint) if get_origin(one) is Annotated), hint)
+            if get_origin(inner) is not Annotated:
+                continue
+            kind, meta = get_args(inner)
+            if kind is str:
+                found.append((sample, name, "x" * (meta.max_length + 1)))
+            elif kind is int:
+                found += [(sample, name, meta.ge - 1), (sample, name, meta.le + 1), (sample, name, 0.5)]
+            else:
+                found += [(sample, name, value) for value in (math.nan, math.inf, -math.inf)]
+    return found
+
+
+@pytest.mark.parametrize(("valid", "name", "value"), declared())
+def test_what_lies_outside_a_declared_range_is_refused_when_made_and_when_read(
+    valid: Message, name: str, value: Any
+) -> None:
+    with pytest.raises(ValueError, match=f"^{name} = .*; valid: "):
+        msgspec.structs.replace(valid, **{name: value})
+    content = msgspec.to_builtins(valid, builtin_types=(bytes,))
+    content[valid.__struct_fields__.index(name) + 1] = value
+    read = decode_view if isinstance(valid, VideoFrame) else decode
+    if not (isinstance(value, int) and value > 2**63 - 1):  # more than MessagePack has bytes for
+        with pytest.raises(RemoteProtocolError):
+            read(msgpack.packb([PROTOCOL_VERSION, content]))
+
+
+# Prepared messages and uniform fields
+
+
+@pytest.mark.parametrize("message", VIEWS)
+def test_a_message_that_is_prepared_is_the_same_under_any_header(message: AnyViewMessage) -> None:
+    prepared = Prepared(message)
+    for header in (HEADER, Header(7, 2**40, 1e6, 0.25, 0.5, 0.125, 0.75)):
+        assert prepared.under(header) == encode(msgspec.structs.replace(message, header=header))
+
+
+@pytest.mark.parametrize("strength", range(-1, STRENGTHS + 2))
+def test_a_uniform_field_begins_so_many_ways_before_any_distance(strength: int) -> None:
+    if not 0 <= strength <= STRENGTHS:
+        with pytest.raises(ValueError, match=f"strength = {strength}; valid: 0 to 8"):
+            uniform_field(strength)
+        return
+    made_field = uniform_field(strength)
+    for metres in (made_field.fast_m, made_field.slow_m):
+        assert sum(way <= -FAR_M for way in metres) == strength
+        assert sum(way >= FAR_M for way in metres) == STRENGTHS - strength
+    assert made_field.stiffness == strength / STRENGTHS
