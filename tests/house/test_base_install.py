@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.install, pytest.mark.xdist_group("base")]
 
 EXTRAS = {
     "record": {"foxglove-sdk", "mcap"},
-    "bench": {"matplotlib", "mpmath", "overlap", "pydualsense"},
+    "bench": {"matplotlib", "mpmath", "overlap"},
     "experiments": {"matplotlib", "pyarrow", "distributed"},
 }
 OF_THE_SIDES = {"mujoco-core", "mujoco", "numba", "simplejpeg", "hidapi", "viser"}

@@ -87,7 +87,6 @@ ARROWS = """
     feelahead/containers: common/* feelahead/both_sides
     feelahead/approaches: common/* robot_side/* operator_side/* feelahead/both_sides
     feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
-        feelahead/documents
     feelahead/experiments: common/* robot_side/* operator_side/* feelahead/approaches feelahead/both_sides
         feelahead/containers
     feelahead/recordings: common/* robot_side/* operator_side/*
