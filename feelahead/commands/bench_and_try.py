@@ -131,17 +131,6 @@ bench = Menu(
             "bench_wake",
             "how late a 1 kHz loop wakes, by how it waits and by what the system was asked for",
         ),
-        "dualsense": Entry(
-            "feelahead.benchmarks.dualsense.bench",
-            "bench_dualsense",
-            "our driver of the controller beside pydualsense, on the same simulated reports",
-            "pip install 'feelahead[operator,bench]'",
-        ),
-        "effects": Entry(
-            "feelahead.benchmarks.effects.effect_latency",
-            "bench_effects",
-            "how long it takes from a change of stiffness until the controller is told",
-        ),
         "tick": Entry(
             "feelahead.benchmarks.tick.bench",
             "bench_tick",

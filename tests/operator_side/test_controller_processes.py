@@ -16,7 +16,6 @@ from typing import Any
 
 import pytest
 
-from feelahead.benchmarks.effects.stiffness_source import StiffnessSource
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
@@ -25,6 +24,7 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
 )
 from tests.helpers.repository import ROOT
+from tests.operator_side.stiffness_source import StiffnessSource
 
 pytestmark = [
     pytest.mark.processes,

@@ -13,7 +13,7 @@ from common.realtime.pacing import Pacer, wait_for_turn
 from common.sockets.robot import RobotSockets
 
 TICK_PERIOD_S = 1e-3
-"""As the robot side's."""
+"""The robot side's own."""
 _NOTICE_PERIOD_S = 0.05
 
 
@@ -29,10 +29,6 @@ class StiffnessSource:
         self.commands = 0
         """Motion commands that came."""
         self.hellos = 0
-        self.sent_s = 0.0
-        """When the last stiffness was sent, on the machine's monotonic clock."""
-        self.longest_pause_s = 0.0
-        """From one stiffness to the next while it ran."""
         self._clock = MonotonicClock()
         self._sockets = RobotSockets("tcp://127.0.0.1:0")
         self._link = LinkEnd("robot", 1, clock_domain())
@@ -63,22 +59,15 @@ class StiffnessSource:
         """Whether an operator side has said Hello."""
         return self._peer is not None
 
-    def change(self) -> float:
-        """Send the stiffness as it is now at once; when."""
-        self._send(self._clock.now())
-        return self.sent_s
-
     def run(self, duration_s: float) -> None:
         """Answer, and send a stiffness every millisecond, for so long."""
         self._pacer.restart(self._clock.now())
-        last_s = self._clock.now()
         end_s = self._clock.now() + duration_s
         while (now_s := self._clock.now()) < end_s:
             self._receive(now_s)
             if self._pacer.due(now_s):
                 self._pacer.begin(now_s)
                 self._send(now_s)
-                self.longest_pause_s, last_s = max(self.longest_pause_s, now_s - last_s), now_s
             wait_for_turn(self._pacer, self._clock, self._sockets.wait)
 
     def _receive(self, now_s: float) -> None:
@@ -104,9 +93,8 @@ class StiffnessSource:
             session = SessionState.ARMED if self.state == "armed" else SessionState.DISARMED
             notice = LeaseNotice(self._link.stamp(now_s), session=session, why="", token=1, waiting=0)
             self._sockets.send(self._peer, encode(notice))
-        self.sent_s = self._clock.now()
         stiffness = StiffnessUpdate(
-            self._link.stamp(self.sent_s),
+            self._link.stamp(self._clock.now()),
             l2=uniform_field(self.l2),
             r2=uniform_field(self.r2),
             speed_m_s=0.0,

@@ -1,1 +1,0 @@
-"""How long a change of stiffness takes to the controller."""
