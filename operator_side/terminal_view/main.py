@@ -18,10 +18,9 @@ from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.screen import Screen
-from operator_side.terminal_view.status import put_back
+from operator_side.terminal_view.terminal import put_back, take_over
 
 _PERIOD_S: Final = 0.1
-_NO_LETTER: Final = b"\x00"
 
 
 def main() -> None:
@@ -30,7 +29,7 @@ def main() -> None:
     terminal = sys.stdout.fileno()
     before = termios.tcgetattr(terminal)
     try:
-        _take_over(terminal)
+        take_over(terminal)
         with Live(console=Console(), screen=True, auto_refresh=False) as live:
             _draw_on(channel, live)
     except OSError:
@@ -38,18 +37,6 @@ def main() -> None:
     finally:
         put_back(terminal, before)
         channel.close()
-
-
-def _take_over(terminal: int) -> None:
-    """Do not show what is typed, and let only Ctrl-C do what it did.
-
-    Ctrl-Z would leave an arm to itself, and Ctrl-S an old screen that looks like a new one.
-    """
-    attributes = termios.tcgetattr(terminal)
-    attributes[6][termios.VSUSP] = _NO_LETTER
-    attributes[0] &= ~termios.IXON
-    attributes[3] &= ~termios.ECHO
-    termios.tcsetattr(terminal, termios.TCSANOW, attributes)
 
 
 def _draw_on(channel: Channel, live: Live) -> None:

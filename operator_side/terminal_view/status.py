@@ -1,12 +1,11 @@
 """The terminal view in the place of the status line: the same calls, drawn by a process that nobody waits for."""
 
-import contextlib
 import os
 import sys
 import termios
 from collections.abc import Mapping
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import msgspec
 
@@ -15,13 +14,12 @@ from common.command.status import Status
 from common.companion.process import Companion
 from common.errors import ConfigurationError
 from operator_side.facts import OperatorFacts
+from operator_side.terminal_view.terminal import put_back
 
 _PERIOD_S: Final = 0.1
 _END_LIMIT_S: Final = 0.5
 _ROOM_BYTES: Final = 1 << 18
 """Some seconds of facts, for a terminal that stalls."""
-_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"
-"""The first screen and its cursor."""
 
 
 class TerminalStatus(Status):
@@ -81,10 +79,3 @@ class TerminalStatus(Status):
         if companion is not None:
             companion.close(_END_LIMIT_S)
             put_back(self._terminal, self._before)
-
-
-def put_back(terminal: int, attributes: list[Any]) -> None:
-    """Bring the first screen back, with the cursor; what was typed meanwhile is dropped. A closed one is left alone."""
-    with contextlib.suppress(termios.error, OSError):
-        termios.tcsetattr(terminal, termios.TCSAFLUSH, attributes)
-        os.write(terminal, _LEAVE)
