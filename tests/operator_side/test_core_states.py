@@ -59,14 +59,25 @@ class Core(RuleBasedStateMachine):
         self.hands: tuple[float, dict[str, Any]] | None = None
         self.sight, self.blind_s, self.lost_s, self.pressed_s = "seeing", math.nan, math.inf, math.nan
         self.older: list[bytes] = []
+        self.held: tuple[tuple[float, float], bool, frozenset[Button]] | None = None
         self.hung, self.waited = False, True
         self.take_notice(SessionState.DISARMED, 7)
 
-    @rule(seconds=st.sampled_from(PAUSES_S), hung=st.booleans())
-    def pass_time(self, seconds: float, hung: bool) -> None:
-        """`hung`: the loop takes no turn before something else happens."""
+    @rule(
+        seconds=st.sampled_from(PAUSES_S),
+        hung=st.booleans(),
+        goes_on=st.sets(st.sampled_from(["lease", "hands", "field"])),
+    )
+    def pass_time(self, seconds: float, hung: bool, goes_on: set[str]) -> None:
+        """What goes on is said again after the pause. `hung`: the loop takes no turn before something else happens."""
         self.bench.now_s += seconds
         self.hung, self.waited = hung, True
+        if "lease" in goes_on and self.lease is not None:
+            self.take_notice(self.lease.session, self.lease.token)
+        if "hands" in goes_on and self.held is not None:
+            self.move_hands(*self.held)
+        if "field" in goes_on and self.field is not None:
+            self.feel(*self.field[1:])
 
     @rule(state=st.sampled_from(STATES), r2=st.sampled_from([0, 3, 8]))
     def feel(self, state: MotionState, r2: int) -> None:
@@ -105,6 +116,7 @@ class Core(RuleBasedStateMachine):
     def move_hands(self, pulls: tuple[float, float], deflected: bool, held: frozenset[Button]) -> None:
         sticks = {"left_stick": (1.0, 0.0), "right_stick": (0.0, 1.0)} if deflected else {}
         self.bench.hands(*held, l2=pulls[0], r2=pulls[1], **sticks)
+        self.held = (pulls, deflected, held)
         self.hands = (self.bench.now_s, meant(*pulls, deflected, held))
         if pulls == (0.0, 0.0) and self.sight == "waiting":
             self.sight = "seeing"
@@ -112,7 +124,7 @@ class Core(RuleBasedStateMachine):
     @rule()
     def unplug(self) -> None:
         self.bench.side.controller_lost(self.bench.now_s)
-        self.hands, self.lost_s = None, self.bench.now_s
+        self.hands, self.held, self.lost_s = None, None, self.bench.now_s
 
     @rule()
     def press_stop_on_a_page(self) -> None:
@@ -182,4 +194,4 @@ def fields_of(command: MotionCommand) -> dict[str, Any]:
 
 
 TestCore = Core.TestCase
-TestCore.settings = settings(derandomize=True, deadline=None, max_examples=80, stateful_step_count=50)
+TestCore.settings = settings(derandomize=True, deadline=None, max_examples=100, stateful_step_count=50)
