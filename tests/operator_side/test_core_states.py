@@ -60,7 +60,7 @@ class Core(RuleBasedStateMachine):
         self.sight, self.blind_s, self.lost_s, self.pressed_s = "seeing", math.nan, math.inf, math.nan
         self.older: list[bytes] = []
         self.held: tuple[tuple[float, float], bool, frozenset[Button]] | None = None
-        self.hung, self.waited = False, True
+        self.hung, self.waited, self.presses = False, True, 0
         self.take_notice(SessionState.DISARMED, 7)
 
     @rule(
@@ -121,21 +121,20 @@ class Core(RuleBasedStateMachine):
         if pulls == (0.0, 0.0) and self.sight == "waiting":
             self.sight = "seeing"
 
-    @rule()
-    def unplug(self) -> None:
-        self.bench.side.controller_lost(self.bench.now_s)
-        self.hands, self.held, self.lost_s = None, None, self.bench.now_s
-
-    @rule()
-    def press_stop_on_a_page(self) -> None:
-        self.bench.side.stop_button.press(self.bench.now_s)
-        self.pressed_s = self.bench.now_s
-
-    @rule()
-    def restart_the_robot_side(self) -> None:
-        self.bench.robot = LinkEnd("robot", self.bench.robot.stamp(0.0).epoch + 1, "clock")
-        self.bench.side.receive(encode(self.bench.robot.hello(self.bench.now_s)), self.bench.now_s)
-        self.lease = None
+    @rule(event=st.sampled_from(["unplugged", "stop pressed on a page", "robot side restarted"]))
+    def happen(self, event: str) -> None:
+        """Something rare."""
+        if event == "unplugged":
+            self.bench.side.controller_lost(self.bench.now_s)
+            self.hands, self.held, self.lost_s = None, None, self.bench.now_s
+        elif event == "stop pressed on a page":
+            self.bench.side.stop_button.press(self.bench.now_s)
+            self.presses += math.isnan(self.pressed_s)
+            self.pressed_s = self.bench.now_s
+        else:
+            self.bench.robot = LinkEnd("robot", self.bench.robot.stamp(0.0).epoch + 1, "clock")
+            self.bench.side.receive(encode(self.bench.robot.hello(self.bench.now_s)), self.bench.now_s)
+            self.lease = None
 
     @property
     def owns(self) -> bool:
@@ -187,6 +186,7 @@ class Core(RuleBasedStateMachine):
         self.waited = False
         assert self.bench.side.status(self.bench.now_s)["release_first"] == (self.sight == "waiting")
         assert (self.bench.side.lease is None) == (self.lease is None)
+        assert self.bench.side.stop_button.presses == self.presses
 
 
 def fields_of(command: MotionCommand) -> dict[str, Any]:
