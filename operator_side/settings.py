@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from common.command.run_options import RunOptions
+from common.limits import check_limits
 from common.protocol.messages import Compensation
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.settings import PersonSettings
-
-_LAST_PORT: Final = 65535
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class OperatorSettings(RunOptions):
     """How what lies ahead becomes what the fingers feel."""
     console: bool = False
     """The browser console on this machine, at an address that is shown: both views, the scene, what is felt and why."""
-    console_port: Annotated[int, tyro.conf.arg(metavar="PORT")] = 0
+    console_port: Annotated[int, tyro.conf.arg(metavar="PORT"), Meta(ge=0, le=65535)] = 0
     """Where it listens, on 127.0.0.1 alone; 0 for any port that is free."""
     tui: bool = False
     """The same on the whole terminal instead of a line, for machines without a browser; pictures aside."""
@@ -61,8 +61,7 @@ class OperatorSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.console_port <= _LAST_PORT:
-            raise ValueError(f"--console-port {self.console_port}: valid: 0 to {_LAST_PORT}")
+        check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.robot_key is not None and self.keys is None:

@@ -5,7 +5,7 @@ from rich.cells import cell_len
 from common.command.live_view import SLOW, LiveView, TriggerView
 
 _BETWEEN = "  "
-_UNKNOWN = "–"
+UNKNOWN = "–"
 _ROOM_FOR_NAMES = 129
 """So many columns hold every usual line in long words and with a name; one that is there only at times would jump."""
 _LONGEST_NAME = 12
@@ -34,7 +34,7 @@ def live_line(view: LiveView, width: int) -> str:
 def millimetres(value_mm: float | None, space: str = " ", digits: int = 0) -> str:
     """A distance, in metres from one metre on; nothing is nearer than 0."""
     if value_mm is None:
-        return f"{_UNKNOWN:>{digits}}{space}mm"
+        return f"{UNKNOWN:>{digits}}{space}mm"
     value_mm = max(0.0, value_mm)
     if round(value_mm) >= 1000:
         return f"{value_mm / 1000.0:.1f}{space}m"
@@ -43,7 +43,7 @@ def millimetres(value_mm: float | None, space: str = " ", digits: int = 0) -> st
 
 def percent(share: float | None, digits: int = 0) -> str:
     """A share without its sign for per cent."""
-    return f"{_UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
+    return f"{UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
 
 
 def _in_long_words(view: LiveView, *, named: bool) -> list[_Fact]:
@@ -97,4 +97,4 @@ def _target(view: LiveView, space: str, digits: int) -> str:
 
 
 def _delay(view: LiveView, space: str) -> str:
-    return f"{_UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}{space}ms"
+    return f"{UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}{space}ms"

@@ -4,7 +4,6 @@ A side's status values are the keys of its JSON lines. They become one frozen re
 for a terminal and `live_story` for a file. All distances are perceived ones, never the simulation's truth.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ LINK_UP = "up"
 LINK_LOST = "lost: "
 """How the link's word begins when there was one; the reason follows."""
 LINK_REFUSED = "refused: "
+_LARGEST = 1e300
 SLOW = 0.9
 """A simulation below this share of real time is said to be slow."""
 _BEFORE_ARMED = ("resting", "arming")
@@ -40,6 +40,8 @@ class LiveView:
     """Why, after a stop or a lost link."""
     alarm: bool = False
     """Whether that has stopped the arm against somebody's will."""
+    state: str | None = None
+    """The arm's; None while the robot side has not said."""
     armed: bool = False
     linked: bool | None = None
     real_time: float | None = None
@@ -68,7 +70,7 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
     armed, link = values.get("state") == "armed", _text(values, "link")
     free = 0.0 if values.get("state") is not None and not armed else None
     l2, r2 = (
-        TriggerView(_number(values, f"{name}_pulled"), _number(values, name) if free is None else free)
+        TriggerView(number(values.get(f"{name}_pulled")), number(values.get(name)) if free is None else free)
         for name in ("L2", "R2")
     )
     holding = _text(values, "holding")
@@ -76,18 +78,19 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
         phase=phase,
         reason=reason,
         alarm=alarm,
+        state=_text(values, "state"),
         armed=armed,
         linked=None if link is None else link == LINK_UP,
-        real_time=_number(values, "real_time"),
-        delay_ms=_number(values, "delay_ms"),
+        real_time=number(values.get("real_time")),
+        delay_ms=number(values.get("delay_ms")),
         l2=l2,
         r2=r2,
         haptics=values.get("haptics") is not False,
         nearest=_text(values, "nearest"),
-        nearest_mm=_number(values, "nearest_mm"),
+        nearest_mm=number(values.get("nearest_mm")),
         has_target=values["target"] is not None if "target" in values else None,
-        target_mm=_number(values, "target_mm"),
-        target_centre_mm=_number(values, "target_centre_mm"),
+        target_mm=number(values.get("target_mm")),
+        target_centre_mm=number(values.get("target_centre_mm")),
         holding=None if holding == "nothing" else holding,
     )
 
@@ -119,13 +122,17 @@ def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
     return person or ("ready to arm" if ready else str(state or "starting")), None, False
 
 
-def _number(values: Mapping[str, Value], name: str) -> float | None:
-    value = values.get(name)
-    known = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+def number(value: Value) -> float | None:
+    """Return a finite number; None for everything else."""
+    known = isinstance(value, float | int) and not isinstance(value, bool) and -_LARGEST < value < _LARGEST
     return float(value) if known and value is not None else None
 
 
+def printable(text: str) -> str:
+    """Put a question mark for each sign that cannot be printed, such as a terminal's control characters."""
+    return text if text.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in text)
+
+
 def _text(values: Mapping[str, Value], name: str) -> str | None:
-    """A word for people; what cannot be printed, such as a terminal's control characters, becomes a question mark."""
     value = values.get(name)
-    return "".join(sign if sign.isprintable() else "?" for sign in value) if isinstance(value, str) else None
+    return printable(value) if isinstance(value, str) else None

@@ -5,8 +5,11 @@ field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once �
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
+from msgspec import Meta
+
+from common.limits import check_limits
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
 from operator_side.dualsense.effects.official import (
@@ -31,12 +34,11 @@ _ROUNDING: Final = 1e-9
 class RenderingSettings:
     """How what lies ahead becomes what a finger feels."""
 
-    horizon_s: float = HORIZON_S
+    horizon_s: Annotated[float, Meta(ge=0.0, le=2.0)] = HORIZON_S
     """h: so long a speed goes on before anything felt can change it (reaction, the finger's way, a write)."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.horizon_s <= 2.0:  # false for NaN, too
-            raise ValueError(f"horizon_s = {self.horizon_s}; valid: 0 to 2")
+        check_limits(self)
 
 
 class RenderedTrigger:

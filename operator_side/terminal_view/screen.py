@@ -1,192 +1,188 @@
-"""A whole screen of one moment, for any size: what matters most stays, and what is large grows with the room."""
+"""A whole screen of one moment, in any size: bars and curves grow with the room, and a low screen loses its end."""
 
+import math
 from collections import deque
-from textwrap import wrap
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final
 
-from common.command.live_view import LiveView, live_view
-from operator_side.facts import DelayFacts, OperatorFacts
-from operator_side.terminal_view.figures import millimetres, plain, share
-from operator_side.terminal_view.history import Curve, History, number
-from operator_side.terminal_view.lines import Line, Look, Ranked, beside, fitted, line, most_important
-from operator_side.terminal_view.signs import Signs
-from operator_side.terminal_view.trigger_part import trigger_part
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from common.command.live_line import UNKNOWN, millimetres, percent
+from common.command.live_view import LiveView, live_view, number, printable
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.facts import OperatorFacts, TriggerFacts
 
 SILENT_AFTER_S: Final = 0.5
-"""So long after the newest facts, what is shown is said to be old."""
+"""Facts that are older are said to be old."""
+_KEPT: Final = 200
+"""Facts that the curves show: 20 s of them, at ten a second."""
+_CURVES: Final = (("delay", "ms"), ("stiffness", ""), ("overlap", "mm³"), ("tick p99", "µs"))
+_NOTES_KEPT: Final = 40
 _USUAL_HEIGHT: Final = 24
-_USUAL_NOTES: Final = 3
-_TALLEST: Final = 4
-_CURVE_LABEL: Final = 10
-_CURVE_FIGURES: Final = 26
+"""Lines of a usual terminal; bars and curves are taller with more."""
+_ZONES: Final = 10
+_LABEL: Final = 8
+_BLOCKS: Final = " ▁▂▃▄▅▆▇█"
+_ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
+_FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold bright_yellow"
 
 
-class Moment(NamedTuple):
-    """What is drawn."""
+class Screen:
+    """Remembers what the terminal shows."""
 
-    facts: OperatorFacts | None
-    """None before the first."""
-    age_s: float
-    """Since they came."""
-    history: History
-    notes: deque[str]
-    """The newest last."""
+    def __init__(self) -> None:
+        self.facts: OperatorFacts | None = None
+        self.notes: deque[str] = deque(maxlen=_NOTES_KEPT)
+        self._history: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
 
+    def add(self, facts: OperatorFacts) -> None:
+        """Show these facts, and their figures in the curves; 0 for unknown."""
+        self.facts, status, delay = facts, facts.status, number(facts.to_operator.newest_ms)
+        known = [number(status.get(name)) or 0.0 for name in ("delay_ms", "overlap_mm3", "tick_p99_us")]
+        stiffest = max(number(trigger.stiffness) or 0.0 for trigger in (facts.l2, facts.r2))
+        self._history.append((known[0] if delay is None else delay, stiffest, *known[1:]))
 
-def screen(moment: Moment, signs: Signs, width: int, height: int) -> list[Line]:
-    """Exactly `height` lines of exactly `width` columns."""
-    extra = max(0, height - _USUAL_HEIGHT)
-    # Each of the four curves grows by a row, then the zones, and so on; what is left is for notes.
-    taller = min(_TALLEST - 1, extra // 6)
-    rows = 1 + taller
-    shown = _shown(moment, signs, width, rows, _USUAL_NOTES + extra - 5 * taller)
-    chosen = [fitted(given, width, signs.cut) for given in most_important(shown, height)]
-    blank = fitted((), width)
-    return [*chosen, *[blank] * (height - len(chosen))]
-
-
-def _shown(moment: Moment, signs: Signs, width: int, rows: int, notes: int) -> list[Ranked]:
-    facts = moment.facts
-    view = live_view({} if facts is None else facts.status)
-    lines = [Ranked(0, _banner(moment, view, signs, width))]
-    if facts is not None:
-        lines += [Ranked(0, _standing(facts, signs)), *_link(facts, signs)]
-        names = [f"{name} {'advances' if facts.advancing == name else 'retreats'}" for name in ("L2", "R2")]
-        half = (width - 2) // 2
-        left, right = (
-            trigger_part(name, trigger, signs, half, rows)
-            for name, trigger in zip(names, (facts.l2, facts.r2), strict=True)
-        )
-        lines += beside(left, right, width, signs.cut)
-        lines += _ahead(facts, view, signs)
-        columns = max(1, width - _CURVE_LABEL - _CURVE_FIGURES)
-        for rank, curve in enumerate(moment.history.curves(columns)):
-            lines += _curve(curve, signs, rows, 2 + rank)
-    else:
-        notes = _USUAL_HEIGHT
-    lines.append(Ranked(5, line((_rule("notes", signs, width), Look.FAINT))))
-    newest = [part for text in list(moment.notes)[-notes:] for part in wrap(text, width, subsequent_indent="  ")][
-        -notes:
-    ]
-    # The newest are worth most.
-    lines += [Ranked(min(6, len(newest) - place), line(signs.words(text))) for place, text in enumerate(newest)]
-    return lines
+    def lines(self, age_s: float, width: int, height: int) -> Group:
+        """Draw at most `width` columns, the most important lines first. `age_s`: time since the facts came."""
+        facts, view = self.facts, live_view({} if self.facts is None else self.facts.status)
+        old = facts is not None and age_s > SILENT_AFTER_S
+        drawn: list[RenderableType] = [_banner(view, f"NO NEWS for {age_s:.1f} s" if old else None, width)]
+        if facts is not None:
+            rows = max(1, min(4, 1 + (height - _USUAL_HEIGHT) // 6))
+            triggers = Table.grid("", "", padding=(0, 2, 0, 0), expand=True)
+            sides = {"L2": facts.l2, "R2": facts.r2}.items()
+            half = (width - 2) // 2
+            for both in zip(*(_trigger(*side, facts.advancing == side[0], half, rows) for side in sides), strict=True):
+                triggers.add_row(*both)
+            drawn += [*_standing(facts), triggers, *_ahead(facts, view), _curves(self._history, width, rows)]
+        rule = _line(("── notes, the newest first ".ljust(width, "─"), _FAINT))
+        return Group(*drawn, rule, *(Text(printable(note)) for note in reversed(self.notes)))
 
 
-def _banner(moment: Moment, view: LiveView, signs: Signs, width: int) -> Line:
-    """What is going on, in words and signs that need no colour."""
-    facts, reason = moment.facts, f": {view.reason}" if view.reason is not None else ""
-    state = None if facts is None else facts.status.get("state")
-    if facts is not None and moment.age_s > SILENT_AFTER_S:
-        text, fill, look = f"NO NEWS for {min(moment.age_s, 9999.0):.1f} s", "!", Look.ALARM
-    elif view.alarm:
-        text, fill, look = f"{view.phase.upper()}{reason}", "!", Look.ALARM
-    elif state == "armed":
-        text, fill, look = f"ARMED  {'' if view.phase == 'armed' else view.phase}".rstrip(), ">", Look.GOOD
-    elif state == "disarmed":
-        text, fill, look = f"DISARMED  {'' if view.phase == 'disarmed' else view.phase}".rstrip(), "-", Look.QUIET
-    else:
-        text, fill, look = f"{view.phase}{reason}", ".", Look.QUIET
-    begun = fitted(line((f"{fill * 3} {signs.words(text)} {fill * 3}", look)), width, signs.cut)
-    # Only an alarm fills the whole line.
-    *words, rest = begun
-    if rest.text.isspace() and words:
-        rest = rest._replace(text=fill * len(rest.text) if look is Look.ALARM else rest.text, look=look)
-    return (*words, rest)
+def _line(*pieces: str | tuple[str, str]) -> Text:
+    """One line of plain or styled pieces; control characters of a peer do not reach the terminal."""
+    styled = [(piece, "") if isinstance(piece, str) else piece for piece in pieces]
+    return Text.assemble(*((printable(text), style) for text, style in styled), no_wrap=True, overflow="ellipsis")
 
 
-def _standing(facts: OperatorFacts, signs: Signs) -> Line:
-    """Link, lease, controller and hands."""
+def _banner(view: LiveView, alarm: str | None, width: int) -> Text:
+    """What is going on, in words and signs that need no colour; only an alarm fills the whole line with its sign."""
+    text, fill, style = view.phase if view.reason is None else f"{view.phase}: {view.reason}", ".", _QUIET
+    if alarm is not None or view.alarm:
+        text, fill, style = alarm or text, "!", _ALARM
+    elif view.state in ("armed", "disarmed"):
+        text = f"{view.state.upper()}  {'' if view.phase == view.state else view.phase}".rstrip()
+        fill, style = (">", _ARMED) if view.armed else ("-", _QUIET)
+    banner = _line(f"{fill * 3} {text} {fill * 3}")
+    banner.pad_right(max(0, width - banner.cell_len), fill if fill == "!" else " ")
+    banner.stylize(style)
+    return banner
+
+
+def _standing(facts: OperatorFacts) -> list[Text]:
+    """Link, lease, hands and controller; the link's directions, as measured over the last second and as asked for."""
     status = facts.status
-    said = [
-        ("link", status.get("link")),
-        ("lease", status.get("owner")),
-        ("hands", facts.hands),
-        ("feel", status.get("feel")),
-        ("controller", status.get("controller")),
-    ]
-    return line(*(piece for name, word in said for piece in (f"{name} ", (_word(word, signs), Look.TITLE), "  ")))
-
-
-def _link(facts: OperatorFacts, signs: Signs) -> list[Ranked]:
-    """Each direction: what was measured over the last second, and what was asked for."""
-    loop = number(facts.status.get("loop_age_ms"))
-    ages = [("round trip", facts.round_trip_ms), ("field age", facts.field_age_ms)]
-    if loop is not None:
-        ages.append(("loop age", loop))
+    words = {"link": status.get("link"), "lease": status.get("owner"), "hands": facts.hands}
+    words |= {name: status.get(name) for name in ("feel", "controller")}
+    said = [piece for name, word in words.items() for piece in (f"{name} ", (str(word or UNKNOWN), _TITLE), "  ")]
+    ages = {"round trip": facts.round_trip_ms, "field age": facts.field_age_ms, "loop age": status.get("loop_age_ms")}
+    delays = (("to operator", facts.to_operator), ("to robot   ", facts.to_robot))
     return [
-        Ranked(1, _direction("to operator", facts.to_operator, signs)),
-        Ranked(2, _direction("to robot", facts.to_robot, signs)),
-        Ranked(1, line(*(f"{name} {plain(value, signs)} ms   " for name, value in ages))),
+        _line(*said),
+        *(
+            _line(
+                f"{name}  mean {_figure(delay.mean_ms, 5)}  p99 {_figure(delay.p99_ms, 5)}",
+                f"  now {_figure(delay.newest_ms, 5)} ms{delay.asked and f'  asked: {delay.asked}'}",
+            )
+            for name, delay in delays
+        ),
+        _line("   ".join(f"{name} {_figure(number(age))} ms" for name, age in ages.items())),
     ]
 
 
-def _direction(name: str, delay: DelayFacts, signs: Signs) -> Line:
-    figures = (("mean", delay.mean_ms), ("p99", delay.p99_ms), ("now", delay.newest_ms))
-    asked = f"  asked: {signs.words(delay.asked)}" if delay.asked else ""
-    return line(f"{name:<11}", *(f" {label} {plain(value, signs, 5)} " for label, value in figures), "ms", asked)
+def _trigger(name: str, trigger: TriggerFacts, advances: bool, width: int, rows: int) -> list[Text]:
+    """Where the finger is, what lies along its way, and from how far it is felt."""
+    cells = min(_LABEL, max(1, (width - _LABEL) // _ZONES))
+    raw = number(trigger.raw)
+    reached = 0 if raw is None else math.ceil(min(1.0, max(0.0, raw * SENSED_TRAVEL)) * cells * _ZONES)
+    bars = _columns([strength / 8 for strength in trigger.zones], rows)
+    blocks = "\n".join(
+        " " * _LABEL + "".join((block * max(1, cells - 1)).ljust(cells) for block in row) for row in bars
+    )
+    metres, stiffness = number(trigger.needed_m), number(trigger.stiffness)
+    return [
+        _line(
+            (f"{name} {'advances' if advances else 'retreats'}", _TITLE),
+            f"  {percent(number(trigger.travel), 3)} %, free {percent(number(trigger.free))} %",
+        ),
+        _line(
+            "finger  ",
+            ("━" * (reached - 1) + "┫" * (reached > 0), _PULL),
+            (("·" if raw is not None else UNKNOWN) * (cells * _ZONES - reached), _FAINT),
+        ),
+        Text(blocks, style=_FELT, no_wrap=True),
+        _line("zones   ", "".join(f"{strength or '.'}".ljust(cells) for strength in trigger.zones)),
+        _line(
+            "meets   ", (f"{trigger.meets} of 8", _FELT if trigger.meets else ""), f"  stiffness {_figure(stiffness)}"
+        ),
+        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * metres:z.0f}'} mm", _TITLE), " ahead"),
+        *(
+            _line(f"{list_name} mm ", " ".join(f"{1e3 * way:z.0f}" for way in ways_m) or UNKNOWN)
+            for list_name, ways_m in (("fast", trigger.fast_m), ("slow", trigger.slow_m))
+        ),
+    ]
 
 
-def _ahead(facts: OperatorFacts, view: LiveView, signs: Signs) -> list[Ranked]:
+def _ahead(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """What is near, what is wanted, and what is in the hand."""
-
-    def metres(value_mm: float | None) -> str:
-        return millimetres(None if value_mm is None else 1e-3 * value_mm, signs)
-
-    nearest = signs.words(view.nearest or "nearest thing")
-    target = {None: signs.unknown, False: "none", True: _word(facts.status.get("target"), signs)}[view.has_target]
-    to_target = f"at {metres(view.target_mm)}"
-    if view.target_mm is None and view.target_centre_mm is not None:
-        to_target = f"centre at {metres(view.target_centre_mm)}"
-    enlargement = number(facts.status.get("enlargement_mm"))
-    spread = "" if enlargement is None else f"enlargement {plain(enlargement, signs)} mm   "
-    rumble = share(facts.rumble)
+    target = UNKNOWN if view.has_target is None else "none"
+    if view.has_target:
+        by_centre = view.target_mm is None and view.target_centre_mm is not None
+        way = f"centre at {millimetres(view.target_centre_mm)}" if by_centre else f"at {millimetres(view.target_mm)}"
+        target = f"{facts.status.get('target')} {way}"
+    pieces = {
+        "nearest": f"{view.nearest or 'nearest thing'} at {millimetres(view.nearest_mm)}",
+        "target": target,
+        "holding": view.holding or "nothing",
+    }
     return [
-        Ranked(
-            0,
-            line(
-                "nearest ",
-                (f"{nearest} at {metres(view.nearest_mm)}", Look.TITLE),
-                "   target ",
-                (f"{target} {to_target}" if view.has_target else target, Look.TITLE),
-                "   holding ",
-                (signs.words(view.holding or "nothing"), Look.TITLE),
-            ),
-        ),
-        Ranked(
-            4,
-            line(
-                spread,
-                f"rumble {plain(rumble, signs)}",
-                "" if facts.probability is None else f"   P {facts.probability:g}",
-                "   haptics off" if not view.haptics else "",
-            ),
+        _line(*(piece for name, said in pieces.items() for piece in (f"{name} ", (said, _TITLE), "   "))),
+        _line(
+            f"enlargement {_figure(number(facts.status.get('enlargement_mm')))} mm   rumble {_figure(facts.rumble)}",
+            "" if facts.probability is None else f"   P {facts.probability:g}",
+            "" if view.haptics else "   haptics off",
         ),
     ]
 
 
-def _curve(curve: Curve, signs: Signs, rows: int, rank: int) -> list[Ranked]:
-    """One figure over the last seconds, `rows` high, named in its lowest row."""
-    drawn = signs.columns((None if value is None else value / curve.top for value in curve.values), rows)
-    figures = f" {plain(curve.newest, signs, 6)} of {plain(curve.top, signs)} {signs.words(curve.unit)}"
-    if signs.plain:
-        figures = figures.replace("mm?", "mm3").replace("?s", "us")
-    return [
-        Ranked(
-            rank if row == rows - 1 else 7,
-            line(
-                f"{curve.name if row == rows - 1 else '':<{_CURVE_LABEL}}",
-                (letters, Look.PULL),
-                figures if row == rows - 1 else "",
-            ),
-        )
-        for row, letters in enumerate(drawn)
-    ]
+def _curves(history: Sequence[tuple[float, ...]], width: int, rows: int) -> Table:
+    """Each figure over the last `_KEPT` facts: of several in one step the largest."""
+    table, steps = Table.grid(padding=(0, 1, 0, 0)), max(1, width - 37)
+    for _ in range(3):
+        table.add_column(vertical="bottom", no_wrap=True)
+    for which, (name, unit) in enumerate(_CURVES):
+        values = [0.0] * steps
+        for age, figures in enumerate(reversed(history)):
+            step = steps - 1 - age * steps // _KEPT
+            values[step] = max(values[step], figures[which])
+        top = max(1.0, *values)
+        drawn = Text("\n".join(_columns([value / top for value in values], rows)), style=_PULL)
+        table.add_row(name, drawn, f"{_figure(history[-1][which], 6)} of {_figure(top)} {unit}")
+    return table
 
 
-def _rule(name: str, signs: Signs, width: int) -> str:
-    return f"{signs.rule * 2} {name} ".ljust(width, signs.rule)
+def _columns(values: Sequence[float], rows: int) -> list[str]:
+    """Columns from 0 to 1, one letter wide and `rows` high; the uppermost row first."""
+    tops = [round(min(1.0, max(0.0, value)) * 8 * rows) for value in values]
+    return ["".join(_BLOCKS[min(8, max(0, top - 8 * row))] for top in tops) for row in reversed(range(rows))]
 
 
-def _word(value: object, signs: Signs) -> str:
-    return signs.unknown if value is None else signs.words(str(value))
+def _figure(value: float | None, width: int = 0) -> str:
+    """A figure with as many digits as say something."""
+    known = number(value)
+    if known is None:
+        return f"{UNKNOWN:>{width}}"
+    digits = 0 if abs(known) >= 100.0 else 1 if abs(known) >= 1.0 or known == 0.0 else 2
+    return f"{known:{width}.{digits}f}"

@@ -1,6 +1,8 @@
 """The terminal view in the place of the status line: the same calls, drawn by a process that nobody waits for."""
 
+import os
 import sys
+import termios
 from collections.abc import Mapping
 from types import TracebackType
 from typing import Final, Self
@@ -10,9 +12,9 @@ import msgspec
 from common.command.live_view import Value
 from common.command.status import Status
 from common.companion.process import Companion
+from common.errors import ConfigurationError
 from operator_side.facts import OperatorFacts
-from operator_side.terminal_view.messages import NewFacts, Note
-from operator_side.terminal_view.terminal import attributes_of, leave, required_terminal
+from operator_side.terminal_view.terminal import put_back
 
 _PERIOD_S: Final = 0.1
 _END_LIMIT_S: Final = 0.5
@@ -26,12 +28,16 @@ class TerminalStatus(Status):
     def __init__(self, program: str) -> None:
         """ConfigurationError unless standard output is a terminal."""
         super().__init__("line", program)
-        self._terminal = required_terminal(sys.stdout)
+        if not sys.stdout.isatty():
+            raise ConfigurationError("--tui: standard output is no terminal; valid: a terminal, or no --tui")
+        if os.environ.get("TERM", "dumb") == "dumb":
+            raise ConfigurationError("--tui: TERM names a terminal without a cursor; valid: TERM=xterm, as a rule")
         self._companion: Companion | None = None
         self._encoder = msgspec.msgpack.Encoder()
 
     def __enter__(self) -> Self:
-        self._before = attributes_of(self._terminal)
+        self._terminal = sys.stdout.fileno()
+        self._before = termios.tcgetattr(self._terminal)
         self._companion = Companion("operator_side.terminal_view.main", room_bytes=_ROOM_BYTES, output=self._terminal)
         return self
 
@@ -46,32 +52,30 @@ class TerminalStatus(Status):
         return True
 
     def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Nothing: the same values are in the facts."""
+        """Show nothing: the same values are in the facts."""
         del values
         self._next_s = now_s + _PERIOD_S
 
     def show_facts(self, facts: OperatorFacts) -> None:
         """Have them drawn, or dropped while the terminal stalls."""
-        self._tell(NewFacts(facts))
+        self._tell(facts)
 
     def note(self, text: str) -> None:
-        """A line that stays for a while; after the context, for good."""
+        """Show a line for a while; after the context, for good."""
         if self._companion is None:
             super().note(text)
         else:
-            self._tell(Note(text))
+            self._tell(text)
 
-    def _tell(self, said: NewFacts | Note) -> None:
-        if self._companion is None:
-            return
-        self._companion.channel.send(self._encoder.encode(said))
-        if self._companion.channel.ended:
-            self._give_up()
+    def _tell(self, said: OperatorFacts | str) -> None:
+        if self._companion is not None:
+            self._companion.channel.send(self._encoder.encode(said))
+            if self._companion.channel.ended:
+                self._give_up()
 
     def _give_up(self) -> None:
-        """End the process that draws; where it cannot put the terminal back itself, do so for it."""
+        """End the process that draws, and put the terminal back where it could not do so itself."""
         companion, self._companion = self._companion, None
         if companion is not None:
-            ended_early = not companion.running
-            if not companion.close(_END_LIMIT_S) or ended_early:
-                leave(self._terminal, self._before)
+            companion.close(_END_LIMIT_S)
+            put_back(self._terminal, self._before)

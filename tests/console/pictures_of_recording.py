@@ -6,22 +6,17 @@ import json
 import re
 import subprocess
 import sys
-from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import rich.screen
 from PIL import Image
 from rich.console import Console
-from rich.style import Style
-from rich.text import Text
 
 from operator_side.facts import OperatorFacts
-from operator_side.terminal_view.history import History
-from operator_side.terminal_view.lines import Line
-from operator_side.terminal_view.screen import Moment, screen
-from operator_side.terminal_view.signs import BLOCKS
+from operator_side.terminal_view.screen import Screen
 from tests.helpers.repository import ROOT
 
 _DURATION_S: Final = 18.0
@@ -60,32 +55,26 @@ def _feelahead(*arguments: str) -> str:
     return done.stdout
 
 
-def _near(events: Sequence[dict[str, Any]]) -> Moment:
-    """The last moment of the approach when R2 resists clearly, with all that the terminal view remembers then."""
+def _near(events: Sequence[dict[str, Any]]) -> Screen:
+    """The terminal view at the last moment of the approach when R2 resists clearly."""
     # What a recording holds is the operator side's alone; the terminal view of a demo is told what both sides know.
-    history, notes, found = History(), deque[str](), None
+    screen, found = Screen(), None
     for event in events:
         if event["event"] == "note":
-            notes.append(event["text"])
+            screen.notes.append(event["text"])
         elif event["event"] == "facts":
             facts = msgspec.convert(event["facts"], OperatorFacts)
-            history.add(facts)
+            screen.add(facts)
             if facts.page is not None and facts.page.doing == "advancing" and facts.r2.meets >= _STIFF:
-                found = Moment(facts, 0.0, copy.deepcopy(history), notes.copy())
+                found = copy.deepcopy(screen)
     if found is None:
         raise AssertionError(f"R2 never met {_STIFF} of 8 on the way to the target")
     return found
 
 
-def _draw_terminal(moment: Moment, path: Path) -> None:
-    """The screen of `moment` as an SVG."""
+def _draw_terminal(screen: Screen, path: Path) -> None:
+    """Write the screen as an SVG."""
     console = Console(record=True, file=io.StringIO(), width=_COLUMNS, height=_ROWS, force_terminal=True)
-    # One column stays free, as on a terminal.
-    for line in screen(moment, BLOCKS, _COLUMNS - 1, _ROWS):
-        console.print(_text(line), no_wrap=True)
+    console.print(rich.screen.Screen(screen.lines(0.0, _COLUMNS, _ROWS)))
     title = "feelahead demo --tui"
     path.write_text(_FONT.sub("", console.export_svg(title=title, unique_id="terminal")))
-
-
-def _text(line: Line) -> Text:
-    return Text.assemble(*((text, Style.parse(look.value)) for text, look in line))

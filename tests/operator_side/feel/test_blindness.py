@@ -1,22 +1,16 @@
-"""Every transition of sight, and what the controller says of it, in virtual time."""
+"""Sight by examples; tests/operator_side/test_core_states.py holds every order of events."""
 
 import itertools
 
 import pytest
 
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Rumble
-from operator_side.feel.blindness import SIGNAL_S, Blindness, Sight
+from operator_side.feel.blindness import Blindness, Sight
 
 
 def blind(since_s: float = 10.0) -> Blindness:
     blindness = Blindness()
     blindness.lose(since_s)
-    return blindness
-
-
-def waiting() -> Blindness:
-    blindness = blind()
-    blindness.end()
     return blindness
 
 
@@ -29,36 +23,23 @@ def test_who_never_saw_is_not_blind() -> None:
     assert blindness.rumble(0.0) == Rumble()
 
 
-@pytest.mark.parametrize("released", [True, False])
-def test_blind_the_hands_move_nothing_whatever_they_do(released: bool) -> None:
+def test_each_state_says_what_it_holds_and_shows() -> None:
     blindness = blind()
-    blindness.see_hands(released=released)
     assert (blindness.sight, blindness.holds, blindness.light) == (Sight.BLIND, True, WARNING_LIGHT)
-
-
-def test_the_field_is_back_and_the_hands_rest_first() -> None:
-    blindness = waiting()
+    blindness.end()
     assert (blindness.sight, blindness.holds, blindness.light) == (Sight.WAITING, True, USUAL_LIGHT)
     assert blindness.rumble(10.0) == Rumble()
-    blindness.end()
-    blindness.see_hands(released=False)
-    assert blindness.holds
     blindness.see_hands(released=True)
     assert (blindness.sight, blindness.holds, blindness.light) == (Sight.SEEING, False, USUAL_LIGHT)
 
 
-def test_lost_again_before_the_hands_rested() -> None:
-    blindness = waiting()
-    blindness.lose(20.0)
-    assert (blindness.sight, blindness.light, blindness.times) == (Sight.BLIND, WARNING_LIGHT, 2)
-    assert blindness.rumble(20.0) != Rumble()
-
-
-def test_still_lost_is_no_new_loss() -> None:
+def test_lost_again_before_the_hands_rested_is_another_loss_and_still_lost_is_none() -> None:
     blindness = blind()
-    blindness.lose(10.0 + SIGNAL_S)
-    assert blindness.times == 1
-    assert blindness.rumble(10.0 + SIGNAL_S) == Rumble()
+    blindness.end()
+    blindness.lose(20.0)
+    blindness.lose(23.0)
+    assert (blindness.sight, blindness.light, blindness.times) == (Sight.BLIND, WARNING_LIGHT, 2)
+    assert blindness.rumble(20.0) != Rumble() == blindness.rumble(23.0)
 
 
 @pytest.mark.parametrize("since_s", [0.0, 10.0, 1e6])

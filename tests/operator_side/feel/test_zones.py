@@ -90,52 +90,6 @@ def test_a_way_that_nothing_gets_to_is_free() -> None:
     assert zone_strengths(far, HORIZON_M, USUAL, 0.0, Displacement(HORIZON_M, 0.0)) is not FREE
 
 
-@given(fields(), TRAVEL, MOVING)
-@REPEATABLE
-def test_strength_never_falls_with_travel(ahead: TriggerField, other: float, moving: Displacement) -> None:
-    strengths, beyond = zone_strengths(ahead, HORIZON_M, USUAL, other, moving)
-    assert list(strengths) == sorted(strengths)
-    assert strengths.count(8) >= beyond
-
-
-@given(fields(), TRAVEL, MOVING, st.floats(0.0, 0.2), st.floats(0.0, 0.3))
-@REPEATABLE
-def test_it_never_falls_as_the_way_under_way_or_its_speed_grow(
-    ahead: TriggerField, other: float, moving: Displacement, farther: float, faster: float
-) -> None:
-    before = zone_strengths(ahead, HORIZON_M, USUAL, other, moving).strengths
-    for more in ((moving.way_m + farther, moving.speed_m_s), (moving.way_m, moving.speed_m_s + faster)):
-        after = zone_strengths(ahead, HORIZON_M, USUAL, other, Displacement(*more)).strengths
-        assert all(a <= b for a, b in zip(before, after, strict=True))
-
-
-@given(fields(), TRAVEL, TRAVEL, MOVING)
-@REPEATABLE
-def test_it_never_falls_as_the_zones_get_faster(
-    ahead: TriggerField, one: float, two: float, moving: Displacement
-) -> None:
-    # The less the other trigger is pulled, the faster is each zone. (Only an arm that goes faster than it can lose
-    # within a reaction is better off with a faster zone than with one that it brakes for.)
-    calm = Displacement(moving.way_m, min(moving.speed_m_s, HORIZON_S * ahead.acceleration_m_s2))
-    slow = zone_strengths(ahead, HORIZON_M, USUAL, max(one, two), calm).strengths
-    fast = zone_strengths(ahead, HORIZON_M, USUAL, min(one, two), calm).strengths
-    assert all(a <= b for a, b in zip(slow, fast, strict=True))
-
-
-@given(fields(), TRAVEL, MOVING)
-@REPEATABLE
-def test_zones_that_do_not_advance_are_free(ahead: TriggerField, other: float, moving: Displacement) -> None:
-    strengths = zone_strengths(ahead, HORIZON_M, USUAL, other, moving).strengths
-    assert all(strength == 0 for strength, travel in zip(strengths, USUAL, strict=True) if travel <= other)
-
-
-def test_pulled_alike_neither_trigger_resists() -> None:
-    assert zone_strengths(uniform_field(8), FAR_M, USUAL, 1.0, STILL).strengths == (0,) * 10
-    for travel in USUAL:
-        strengths = zone_strengths(uniform_field(8), FAR_M, USUAL, travel, STILL).strengths
-        assert strengths[USUAL.index(travel)] == 0
-
-
 @pytest.mark.parametrize("strength", range(9))
 def test_a_uniform_field_is_as_strong_everywhere(strength: int) -> None:
     assert zone_strengths(uniform_field(strength), FAR_M, USUAL, 0.0, STILL) == ((strength,) * 10, 0)

@@ -18,28 +18,16 @@ LIMIT_S = 60.0
 
 
 class OnTerminal:
-    """Runs a command on a pseudo-terminal of its own."""
+    """Runs a command on a pseudo-terminal of its own, of 80 x 24."""
 
-    def __init__(self, command: Sequence[str], size: tuple[int, int] = (80, 24)) -> None:
+    def __init__(self, command: Sequence[str]) -> None:
         self.ours, self.theirs = pty.openpty()
         self.seen = b""
-        self.resize(*size)
+        self.resize(80, 24)
         self.before = termios.tcgetattr(self.ours)
-        environment = {name: value for name, value in os.environ.items() if name not in ("LC_CTYPE", "NO_COLOR")}
-        self.process = subprocess.Popen(
-            command,
-            stdin=self.theirs,
-            stdout=self.theirs,
-            stderr=subprocess.PIPE,
-            env={**environment, "TERM": "xterm", "LC_ALL": "C.UTF-8", "PYTHONPATH": str(ROOT)},
-            start_new_session=True,
-            text=True,
-        )
-
-    def said(self) -> str:
-        """A line of its errors; all that is there once it has ended."""
-        assert self.process.stderr is not None
-        return self.process.stderr.readline()
+        environment = {**os.environ, "TERM": "xterm", "LC_ALL": "C.UTF-8", "PYTHONPATH": str(ROOT)}
+        ends = {"stdin": self.theirs, "stdout": self.theirs, "stderr": subprocess.PIPE}
+        self.process = subprocess.Popen(command, **ends, env=environment, start_new_session=True, text=True)  # type: ignore[call-overload]
 
     def close(self) -> None:
         self.process.kill()
@@ -54,15 +42,15 @@ class OnTerminal:
         end_s = time.monotonic() + LIMIT_S
         while not holds(self.seen):
             assert time.monotonic() < end_s, self.seen[-2000:]
-            if not select.select([self.ours], [], [], 0.1)[0]:
-                continue
-            self.seen += os.read(self.ours, 1 << 16)
+            if select.select([self.ours], [], [], 0.1)[0]:
+                self.seen += os.read(self.ours, 1 << 16)
 
     def end(self, last: bytes) -> int:
         """Ctrl-C, and its exit code; what it writes up to `last` is read."""
         self.process.send_signal(signal.SIGINT)
         self.read_until(lambda seen: last in seen)
-        return self.process.wait(LIMIT_S)
+        code: int = self.process.wait(LIMIT_S)
+        return code
 
     def is_put_back(self) -> bool:
         """Whether the screen is the first one, with its cursor and its ways of reading."""
