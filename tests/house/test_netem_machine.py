@@ -7,7 +7,7 @@ import pytest
 
 from common.arrays import FloatArray
 from common.emulation.profile import LinkProfile
-from feelahead.benchmarks.link.samples import LinkSample, play
+from feelahead.lab.link.samples import LinkSample, play
 from tests.kernel.machine import MachineError
 from tests.kernel.skipped import SkippedError
 from tests.netem.cases import CASES, Case

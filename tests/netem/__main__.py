@@ -9,8 +9,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from feelahead.benchmarks.link.samples import LinkSample, read_link_sample
 from feelahead.benchmarks.report import short, show
+from feelahead.lab.link.samples import LinkSample, read_link_sample
 from tests.kernel.debian import default_cache
 from tests.kernel.machine import MachineError
 from tests.kernel.skipped import SkippedError

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.emulation.profile import LinkProfile
-from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band
-from feelahead.benchmarks.link.samples import LinkSample, play
-from feelahead.benchmarks.report import Goal, Table
+from feelahead.benchmarks.report import Table
+from feelahead.lab.goals import Goal
+from feelahead.lab.link.samples import LinkSample, compare, independent_delays, judge, measure_band, play
 from tests.netem.cases import PATH_CASE, PAYLOAD_BYTES, PERIOD_NS, Case
 from tests.netem.stalls import stalled
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.timing.clock_offset import MAX_SKEW
-from feelahead.benchmarks.delay.traffic import Estimate, Scenario, Traffic, Way
+from feelahead.lab.link.clocks import Estimate, Scenario, Traffic, Way
 from tests.helpers.felt import felt
 
 CLOCK = "one clock"
