@@ -81,7 +81,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
 bench = Menu(
     "bench",
     "benchmark",
-    ("link",),
+    ("link", "tick"),
     {
         "overlap": Entry(
             "feelahead.benchmarks.overlap.bench",
@@ -117,12 +117,6 @@ bench = Menu(
             "feelahead.benchmarks.effects.effect_latency",
             "bench_effects",
             "how long it takes from a change of stiffness until the controller is told",
-        ),
-        "tick": Entry(
-            "feelahead.benchmarks.tick.bench",
-            "bench_tick",
-            "what a tick of the robot side costs in the real process, stage by stage and by objects",
-            _BOTH_SIDES,
         ),
         "felt": Entry(
             "feelahead.benchmarks.felt.bench",

@@ -12,7 +12,7 @@ from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
 from robot_side.cameras.pictures import RETRY_S
-from tests.helpers.viewer import Seen, Viewer, companion_of, look
+from tests.robot_side.cameras.viewer import Seen, Viewer, companion_of, look
 
 pytestmark = pytest.mark.processes
 PATIENCE_S = 120.0
