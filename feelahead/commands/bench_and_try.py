@@ -90,7 +90,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
 bench = Menu(
     "bench",
     "benchmark",
-    (),
+    ("link", "tick"),
     {
         "overlap": Entry(
             "feelahead.benchmarks.overlap.bench",
@@ -116,38 +116,11 @@ bench = Menu(
             "how often full stiffness stands in time, and how often without need, for each law",
             "pip install 'feelahead[robot,operator,bench]'",
         ),
-        "link": Entry(
-            "feelahead.benchmarks.link.bench",
-            "bench_link",
-            "the emulated link beside what was asked, and beside recordings of the kernel's netem",
-        ),
-        "delay": Entry(
-            "feelahead.benchmarks.delay.estimates",
-            "bench_delay",
-            "clock offsets and one-way delays, as estimated from ordinary traffic, beside the truth",
-        ),
-        "wake": Entry(
-            "feelahead.benchmarks.link.wake_error",
-            "bench_wake",
-            "how late a 1 kHz loop wakes, by how it waits and by what the system was asked for",
-        ),
-        "tick": Entry(
-            "feelahead.benchmarks.tick.bench",
-            "bench_tick",
-            "what a tick of the robot side costs in the real process, stage by stage and by objects",
-            _BOTH_SIDES,
-        ),
         "felt": Entry(
             "feelahead.benchmarks.felt.bench",
             "bench_felt",
             "run time against error of what is felt, as the look ahead is set otherwise",
             "pip install 'feelahead[robot,operator,bench]'",
-        ),
-        "viewing": Entry(
-            "feelahead.benchmarks.viewing.bench",
-            "bench_viewing",
-            "what pictures and the scene's state cost a real robot side while somebody looks",
-            "pip install 'feelahead[robot]'",
         ),
     },
 )
@@ -179,12 +152,6 @@ try_out = Menu(
             "feelahead.experiments.hostile.run",
             "try_hostile_input",
             "hostile input at a real robot side's port, and what it costs the tick",
-            _BOTH_SIDES,
-        ),
-        "revocation": Entry(
-            "feelahead.experiments.revocation",
-            "try_revocation",
-            "how soon a revoked key is out, and what the others notice",
             _BOTH_SIDES,
         ),
         "soak": Entry(

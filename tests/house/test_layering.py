@@ -103,7 +103,7 @@ What has no row of its own counts to the room around it.
 LIBRARIES = {
     "viser": ("operator_side/console",),
     "websockets": ("operator_side/console",),
-    "zmq": ("common/sockets", "feelahead/benchmarks/link/peers.py"),
+    "zmq": ("common/sockets", "feelahead/lab/link/bare.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
     "mujoco": ("robot_side/simulation", "robot_side/cameras", "feelahead/benchmarks/overlap/distances.py"),
@@ -114,6 +114,7 @@ LIBRARIES = {
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",
+        "feelahead/lab",
         "feelahead/commands",
         "feelahead/containers",
         "feelahead/benchmarks",
@@ -127,7 +128,7 @@ LIBRARIES = {
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
         "operator_side/terminal_view",
-        "feelahead/lab/progress.py",
+        "feelahead/lab",
         "feelahead/both_sides",
         "feelahead/commands",
         "feelahead/containers",

@@ -7,7 +7,7 @@ due earlier. Leaving that out favours no delay: when the host stalls has nothing
 import numpy as np
 
 from common.arrays import BoolArray
-from feelahead.benchmarks.link.samples import LinkSample
+from feelahead.lab.link.samples import LinkSample
 
 LATE_S = 0.5e-3
 """An idle machine sends within 0.2 ms."""

@@ -8,8 +8,15 @@ import pytest
 
 from common.arrays import FloatArray
 from common.emulation.profile import LinkProfile
-from feelahead.benchmarks.link.reference import compare, independent_delays, judge, measure_band
-from feelahead.benchmarks.link.samples import LinkSample, play, read_link_sample
+from feelahead.lab.link.samples import (
+    LinkSample,
+    compare,
+    independent_delays,
+    judge,
+    measure_band,
+    play,
+    read_link_sample,
+)
 from tests.netem.cases import CASES, PATH_CASE, PAYLOAD_BYTES, PERIOD_NS, Case
 from tests.netem.stalls import stalled
 from tests.netem.uml import provide, run_machine

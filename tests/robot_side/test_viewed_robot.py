@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
-from feelahead.benchmarks.viewing.companion_process import companion_of
-from feelahead.benchmarks.viewing.viewer import Seen, Viewer, look
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
 from robot_side.cameras.pictures import RETRY_S
+from tests.robot_side.cameras.viewer import Seen, Viewer, companion_of, look
 
 pytestmark = pytest.mark.processes
 PATIENCE_S = 120.0

@@ -10,11 +10,11 @@ from robot_side.objects.movers import OF_OBJECTS, Movers
 from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
-"""Of the built-in table's things."""
+"""The middle of the built-in table's things."""
 NEAREST_M, FARTHEST_M = 0.6, 3.0
 _SIZES_M: Final = (0.005, 0.03)
 _FASTEST_M_S: Final = 0.2
-_KINDS: Final = ("spheres", "boxes", "tetrahedra")
+_KINDS: Final = 3
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,6 @@ class Crowd:
 
     count: int
     moving: int = 0
-    kind: str = "mixed"
     seed: int = 1
     centers_m: FloatArray = field(init=False)
     """(n, 3) at the time 0"""
@@ -33,8 +32,6 @@ class Crowd:
     """(n,) into spheres, boxes, tetrahedra"""
 
     def __post_init__(self) -> None:
-        if self.kind not in (*_KINDS, "mixed"):
-            raise ValueError(f"--kind {self.kind}: valid: mixed, {', '.join(_KINDS)}")
         if not 0 <= self.moving <= self.count:
             raise ValueError(f"--moving {self.moving}: valid: 0 to --objects")
         generator = np.random.default_rng(self.seed)
@@ -43,20 +40,18 @@ class Crowd:
         apart_m = generator.uniform(NEAREST_M, FARTHEST_M, self.count)
         object.__setattr__(self, "centers_m", MIDDLE_M + apart_m[:, None] * away)
         object.__setattr__(self, "radii_m", generator.uniform(*_SIZES_M, self.count))
-        one = _KINDS.index(self.kind) if self.kind in _KINDS else None
-        kinds = np.arange(self.count) % len(_KINDS) if one is None else np.full(self.count, one)
-        object.__setattr__(self, "kinds", kinds)
+        object.__setattr__(self, "kinds", np.arange(self.count) % _KINDS)
 
     def at(self, time_s: float, count: int) -> FloatArray:
-        """Where the centres (count, 3) of the first are: the first `moving` go to and fro."""
+        """Place the first centres (count, 3): the first `moving` go to and fro."""
         moving, centers_m = min(self.moving, count), self.centers_m[:count].copy()
         centers_m[:moving, 0] += _FASTEST_M_S * np.sin(time_s + np.arange(moving))
         return centers_m
 
     def seen(self, time_s: float, count: int) -> PerceivedObjects:
-        """The first `count` of them as a frame."""
+        """Make a frame of the first `count` of them."""
         at, radii_m, kinds = self.at(time_s, count), self.radii_m[:count], self.kinds[:count]
-        spheres, boxes, tetrahedra = (np.flatnonzero(kinds == kind) for kind in range(len(_KINDS)))
+        spheres, boxes, tetrahedra = (np.flatnonzero(kinds == kind) for kind in range(_KINDS))
         edge = 1.0 / np.sqrt(3.0)
         corners = edge * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
         return PerceivedObjects(
@@ -92,7 +87,7 @@ class CrowdedCamera:
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """The camera's frame and the crowd as it was then; the same until there is a newer one."""
+        """Return the camera's frame with the crowd of that time; the same one until there is a newer one."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
             self._before, self._own = self._own, own
@@ -100,7 +95,7 @@ class CrowdedCamera:
         return self._shown
 
     def set_role(self, name: str, role: Role) -> None:
-        """Of one of the camera's own."""
+        """Set it for one of the camera's own."""
         self._camera.set_role(name, role)
 
     def _with_crowd(self, own: PerceivedObjects) -> PerceivedObjects:
@@ -123,7 +118,7 @@ class CrowdedCamera:
 
 
 def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:
-    """The objects of both, as they are seen when `one` is; how fast they go nobody knows. The meshes of `one` alone."""
+    """Join the objects of both in a frame of `one`'s time, speeds unknown, with the meshes of `one` alone."""
     arrays: dict[str, Any] = {}
     for kind in KINDS[:-1]:
         arrays[kind.owner] = np.concatenate([getattr(one, kind.owner), len(one.names) + getattr(other, kind.owner)])

@@ -1,12 +1,16 @@
+"""`bench tick`: what its figures mean, and the crowd that stands around."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.benchmarks.tick.bench import Ticks, bench_tick
-from feelahead.benchmarks.tick.crowd import MIDDLE_M, NEAREST_M, Crowd, CrowdedCamera
-from feelahead.benchmarks.tick.timed_robot import COLUMNS, STAGES
+from feelahead.lab.questions.tick import QUESTION, Case, TickSweep, goals, rows, run
+from feelahead.lab.sweep import ask
+from feelahead.lab.table import Table
+from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, Crowd, CrowdedCamera
+from feelahead.lab.tick.timed_robot import COLUMNS
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.objects.validity import require_valid
 from robot_side.simulation.camera import MujocoCamera
@@ -15,7 +19,7 @@ from tests.helpers.perceived_scenes import Scene
 
 
 class Seen:
-    """A camera whose frame is the same until it is told of another."""
+    """A camera whose frame is the same until it is given another one."""
 
     def __init__(self, frame: PerceivedObjects) -> None:
         self.frame = frame
@@ -28,11 +32,9 @@ class Seen:
         del name, role
 
 
-@pytest.mark.parametrize("kind", ["mixed", "spheres", "boxes", "tetrahedra"])
-def test_a_crowd_is_valid_and_out_of_the_way(kind: str) -> None:
-    crowd = Crowd(100, 10, kind)
-    camera = Seen(Scene().objects())
-    frame = CrowdedCamera(camera, crowd).perceive(0.0)
+def test_a_crowd_is_valid_and_out_of_the_way() -> None:
+    crowd = Crowd(100, 10)
+    frame = CrowdedCamera(Seen(Scene().objects()), crowd).perceive(0.0)
     require_valid(frame)
     assert len(frame.names) == len(set(frame.names)) == 100
     owners = np.concatenate([frame.sphere_object, frame.box_object, frame.tetrahedron_object])
@@ -42,23 +44,21 @@ def test_a_crowd_is_valid_and_out_of_the_way(kind: str) -> None:
 
 def test_the_crowd_is_the_same_until_there_is_a_newer_frame() -> None:
     camera = Seen(Scene().objects())
-    crowded = CrowdedCamera(camera, Crowd(6, 3, "spheres"))
+    crowded = CrowdedCamera(camera, Crowd(6, 3))
     first = crowded.perceive(0.0)
     assert crowded.perceive(0.001) is first
     camera.frame = replace(Scene().objects(), time_s=1.0)
     second = crowded.perceive(1.0)
-    moved = np.any(second.sphere_centers_m != first.sphere_centers_m, axis=1)
-    assert moved.tolist() == [True] * 3 + [False] * 3
+    assert np.any(second.sphere_centers_m != first.sphere_centers_m, axis=1).tolist() == [True, False]
 
 
-def test_of_a_crowd_around_what_a_camera_sees_a_frame_says_what_moves() -> None:
+def test_of_a_crowd_around_a_cameras_objects_a_frame_says_what_moves() -> None:
     scene = load_scene()
     camera = CrowdedCamera(MujocoCamera(scene), Crowd(300, 9))
     first, second = camera.perceive(0.0), camera.perceive(0.5)
     require_valid(first)
     assert second.since is not None
     assert second.since[0].first is first
-    assert second.roles is first.roles
     moved = second.since[1]
     own = [thing.name for thing in scene.objects if thing.name not in scene.fixed]
     assert list(moved.names) == own + [f"crowd {k}" for k in range(9)]
@@ -68,7 +68,7 @@ def test_of_a_crowd_around_what_a_camera_sees_a_frame_says_what_moves() -> None:
     assert int(changed[of_crowd].sum()) == 3
     assert len(second.roles) == len(second.names) == len(scene.objects) + 300
     # As long as nobody changes a role, all frames share one tuple.
-    assert camera.perceive(1.0).roles is second.roles
+    assert camera.perceive(1.0).roles is second.roles is first.roles
     camera.set_role(own[0], Role.TARGET)
     assert camera.perceive(1.5).roles[second.names.index(own[0])] is Role.TARGET
 
@@ -81,21 +81,42 @@ def test_alone_a_crowd_is_all_there_is() -> None:
         assert frame.names == tuple(f"crowd {k}" for k in range(30))
 
 
-def test_what_is_asked_of_the_way_from_look_to_message_leaves_out_physics_and_frames() -> None:
-    row = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 100e-6, "physics": 30e-6, "frame": 20e-6, STAGES[3]: 40e-6}
-    ticks = Ticks("one", np.array([[row[column] for column in COLUMNS]] * 3), {}, 0.5)
-    assert ticks.look_to_message_us == pytest.approx([50.0] * 3)
-    assert ticks.without_physics_us == pytest.approx([70.0] * 3)
+def test_look_to_message_leaves_out_physics_and_frames() -> None:
+    tick = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 100e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
+    ticks = np.array([[tick[column] for column in COLUMNS]] * 3)
+    ticks[:, 0], ticks[:, COLUMNS.index("thread_s")] = (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)
+    found = {row["part"]: row for row in rows(ticks, stages=True, overruns=0)}
+    assert found["look to message"]["p50_us"] == pytest.approx(50.0)
+    assert found["tick without physics"]["p50_us"] == pytest.approx(70.0)
+    assert found["the rest"]["p50_us"] == pytest.approx(10.0)
+    assert found["tick"]["share"] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"], ["--seconds", "nan"]])
+def test_memory_that_grows_is_told_apart_from_memory_that_does_not() -> None:
+    for last_mb, verdict in ((101.0, "met"), (110.0, "missed")):
+        table = Table({"resident_mb": value} for value in (90.0, 100.0, last_mb))
+        [goal] = goals(TickSweep(allocations=1000), table)
+        assert goal.verdict == verdict
+
+
+def test_memory_is_said_at_even_points(capsys: pytest.CaptureFixture[str]) -> None:
+    assert ask(QUESTION, ["--allocations", "200"]) == 0
+    assert "resident memory grows by" in capsys.readouterr().out
+
+
+@pytest.mark.processes
+def test_a_real_robot_side_is_timed() -> None:
+    found = {row["part"]: row for row in run(Case("10 objects", 1.5, stages=True, objects=10), 0)}
+    assert found["tick"]["p50_us"] > found["look to message"]["p50_us"] > 0.0
+    assert found["law"]["p50_us"] > 0.0
+
+
+@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"], ["--allocations", "1"]])
 def test_values_out_of_range_are_refused(arguments: list[str]) -> None:
     with pytest.raises(ConfigurationError, match="valid"):
-        bench_tick(arguments)
+        ask(QUESTION, arguments)
 
 
 def test_a_crowd_that_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match="--kind stars"):
-        Crowd(3, 0, "stars")
     with pytest.raises(ValueError, match="--moving 4"):
         Crowd(3, 4)

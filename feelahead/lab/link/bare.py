@@ -1,82 +1,63 @@
-"""Sockets reduced to what a measurement needs: the robot side's, bare ZeroMQ ones and bare UDP.
+"""Sockets reduced to what a measurement needs: bare UDP, bare ZeroMQ, and the robot side's.
 
-The bare ones show what waking and Python cost by themselves, and what ZeroMQ's own threads add to it.
+Bare ones show what waking and Python cost by themselves, and what ZeroMQ's own threads add to it.
 """
 
 import select
 import socket
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
 
 import zmq
 
 from common.sockets.robot import RobotSockets
-
-_LARGEST_BYTES = 65536
-_EVENTS, _POLLIN = int(zmq.EVENTS), int(zmq.POLLIN)
 
 
 class Link(Protocol):
     """One end's sockets, reduced to what a measurement needs."""
 
     def receive(self) -> list[bytes]:
-        """Everything that has arrived."""
+        """Take everything that has arrived, oldest first."""
         ...
 
     def send(self, payload: bytes) -> bool:
-        """Send to the other end; whether that could be done at once."""
+        """Send at once; False when that cannot be done, or the peer is unknown."""
         ...
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; whether it has."""
+        """Wait for something to arrive; say whether it has."""
         ...
 
 
 class DatagramLink:
-    """A UDP socket on loopback that talks to whoever spoke to it last, or to `address`."""
+    """A UDP socket on loopback that talks to `address`, or to the peer that spoke last."""
 
     def __init__(self, address: tuple[str, int] | None = None) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.bind(("127.0.0.1", 0))
         self._peer = address
-
-    @property
-    def address(self) -> tuple[str, int]:
-        """Where to reach this end."""
-        host, port = self._socket.getsockname()
-        return str(host), int(port)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._socket.close()
+        self.address = self._socket.getsockname()
+        self.close = self._socket.close
 
     def receive(self) -> list[bytes]:
-        """Everything that has arrived, oldest first."""
+        """Take everything that has arrived, oldest first."""
         received: list[bytes] = []
         while True:
             try:
-                payload, self._peer = self._socket.recvfrom(_LARGEST_BYTES)
+                payload, self._peer = self._socket.recvfrom(65536)
             except (BlockingIOError, ConnectionRefusedError):
                 return received
             received.append(payload)
 
     def send(self, payload: bytes) -> bool:
-        """Send to the other end; False when nobody is known there, or the system's buffer is full."""
-        if self._peer is None:
-            return False
+        """Send at once; False when that cannot be done, or the peer is unknown."""
         try:
-            self._socket.sendto(payload, self._peer)
+            return self._peer is not None and self._socket.sendto(payload, self._peer) > 0
         except (BlockingIOError, ConnectionRefusedError):
             return False
-        return True
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; whether it has."""
+        """Wait for something to arrive; say whether it has."""
         return bool(select.select([self._socket], [], [], timeout_s)[0])
 
 
@@ -92,21 +73,16 @@ class BareZeroMQLink:
         else:
             self._socket.connect(address)
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
-        """Where to reach this end."""
         self._descriptor = self._socket.fileno()
         self._routes = address is None
         self._peer: bytes | None = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Hang up."""
         self._context.destroy(linger=0)
 
     def receive(self) -> list[bytes]:
-        """Everything that has arrived, oldest first."""
+        """Take everything that has arrived, oldest first."""
         received: list[bytes] = []
         while self._readable():
             if self._routes:
@@ -115,7 +91,7 @@ class BareZeroMQLink:
         return received
 
     def send(self, payload: bytes) -> bool:
-        """Send to the other end; False when nobody is known there, or it cannot be done at once."""
+        """Send at once; False when that cannot be done, or the peer is unknown."""
         try:
             if self._routes:
                 if self._peer is None:
@@ -127,34 +103,30 @@ class BareZeroMQLink:
         return True
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; whether it has."""
+        """Wait for something to arrive; say whether it has."""
         if not self._readable():
             select.select([self._descriptor], [], [], timeout_s)
         return self._readable()
 
     def _readable(self) -> bool:
         # The descriptor tells of changes only, and a send may have taken notice of one.
-        return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
+        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & int(zmq.POLLIN))
 
 
 class RobotLink:
-    """The robot side's sockets as the end of a link to whoever spoke last."""
+    """The robot side's sockets, talking to the peer that spoke last."""
 
     def __init__(self, sockets: RobotSockets) -> None:
-        self._sockets = sockets
-        self._peer = b""
+        self._sockets, self._peer = sockets, b""
+        self.wait = sockets.wait
 
     def receive(self) -> list[bytes]:
-        """Everything that has arrived, oldest first."""
+        """Take everything that has arrived, oldest first."""
         received = self._sockets.receive()
         if received:
             self._peer = received[-1][0]
         return [payload for _, payload in received]
 
     def send(self, payload: bytes) -> bool:
-        """Send to the other end; whether that could be done at once."""
+        """Send at once; False when that cannot be done."""
         return self._sockets.send(self._peer, payload)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; whether it has."""
-        return self._sockets.wait(timeout_s)

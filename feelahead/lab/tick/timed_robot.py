@@ -1,7 +1,7 @@
-"""A robot side that writes down what each of its ticks cost: `python -m ... --log=FILE.npz` and its own flags.
+"""A robot side that writes down the cost of each of its ticks: `python -m ... --log=FILE.npy` and its own flags.
 
 --objects=N puts N more perceived objects around, which physics knows nothing of; --moving of them move; --only takes
-the scene's own objects away. With `--record` it notes what happens and makes pictures only while somebody looks.
+the scene's own objects away.
 """
 
 import time
@@ -15,13 +15,11 @@ import tyro
 
 import robot_side.main
 from common.command.command_line import parse_settings, run_command
-from feelahead.benchmarks.tick.crowd import Crowd, CrowdedCamera
+from feelahead.lab.tick.crowd import Crowd, CrowdedCamera
 from robot_side.assembly import Assembled, assemble
-from robot_side.core import RobotSide
-from robot_side.looking import Looking
 from robot_side.outgoing_messages import Outgoing
 
-PROGRAM = "python -m feelahead.benchmarks.tick.timed_robot"
+PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")
 AWAY: Final = ("physics", "frame")
 """No part of the way from look to message: a real arm has no physics, and a frame comes 30 times a second."""
@@ -35,67 +33,53 @@ _PLACES: Final = (
     ("", "_outgoing"),
 )
 COLUMNS: Final = ("now_s", "tick_s", "thread_s", "wall_s", *STAGES)
-"""Of the log: when, the tick's processor time, that of the thread until then, the tick's wall time, each stage's."""
+"""Columns of the log: time, the tick's processor time, the thread's until then, the tick's wall time, each stage's."""
 
 
 @dataclass(frozen=True)
 class TimedSettings:
-    """What is ours; all else is the robot side's."""
+    """Flags besides the robot side's."""
 
     log: Path = Path("ticks.npy")
     """Where the figures go, as .npy: a row a tick, see COLUMNS."""
     objects: int = 0
-    """So many more."""
+    """Number of further objects."""
     moving: int = 0
-    """Of them."""
-    kind: str = "mixed"
-    """spheres, boxes, tetrahedra or mixed."""
+    """Number of them that move."""
     stages: tyro.conf.FlagConversionOff[bool] = True
     """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
     """Without the scene's own."""
 
 
-def main() -> None:
+def command(arguments: Sequence[str]) -> int:
     """Run the robot side's own command with a timed core."""
-    run_command(PROGRAM, _command)
-
-
-def _command(arguments: Sequence[str]) -> int:
     ours = tuple(f"--{one.name}=" for one in fields(TimedSettings))
     mine = [argument for argument in arguments if argument.startswith(ours)]
     settings = parse_settings(TimedSettings, PROGRAM, mine)
     ticks: list[tuple[float, ...]] = []
     robot_side.main.assemble = _timed(settings, ticks)  # type: ignore[assignment,attr-defined]
-    robot_side.main.Looking = _only_when_asked  # type: ignore[assignment,attr-defined]
     try:
         return robot_side.main.command([argument for argument in arguments if argument not in mine])
     finally:
         np.save(settings.log, np.array(ticks).reshape(-1, len(COLUMNS)))
 
 
-def _only_when_asked(*arguments: Any, **others: Any) -> Looking:
-    """As Looking, which makes for a recording what nobody looks at."""
-    return Looking(*arguments, **others | {"always": ()})
-
-
 def _timed(settings: TimedSettings, ticks: list[tuple[float, ...]]) -> object:
-    """As `assemble`; each tick adds a row."""
+    """Make an `assemble` whose core adds a row with each tick."""
 
     def build(*arguments: object, **others: object) -> Assembled:
         assembled = assemble(*arguments, **others)  # type: ignore[arg-type]
         core = assembled.core
         if settings.objects or settings.only:
-            crowd = Crowd(settings.objects, settings.moving, settings.kind)
-            core._camera = CrowdedCamera(core._camera, crowd, only=settings.only)
+            core._camera = CrowdedCamera(core._camera, Crowd(settings.objects, settings.moving), only=settings.only)
         took_s = np.zeros(len(STAGES))
         for stage, (part, name) in enumerate(_PLACES):
             if settings.stages or STAGES[stage] in AWAY:
                 _time(getattr(core, part) if part else core, name, took_s, stage)
-        noted, plain = core.tick, RobotSide.tick.__get__(core)
+        tick = core.tick
 
         def timed(now_s: float) -> list[Outgoing]:
-            tick = noted if core.session.watchers.looked_at(now_s) else plain
             took_s[:] = 0.0
             began_wall_s, began_s = time.perf_counter(), time.thread_time()
             outgoing = tick(now_s)
@@ -123,4 +107,4 @@ def _time(owner: Any, name: str, took_s: Any, stage: int) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(PROGRAM, command)

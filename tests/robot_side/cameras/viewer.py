@@ -1,7 +1,9 @@
-"""Those who look: they say Hello and Watch to a real robot side, and take what comes."""
+"""A viewer of a real robot side: it says Hello and Watch, and takes what comes."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
@@ -12,35 +14,34 @@ from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, AnyViewMessa
 from common.sockets.operator import OperatorSockets
 
 _WATCH_PERIOD_S = 0.25
+_COMPANION = b"robot_side.cameras.companion"
 
 
 @dataclass
 class Seen:
-    """What came in one stretch of time; ages are those on arrival, by the clock that both processes share."""
+    """Messages of one stretch of time; ages are those on arrival, by the clock that both processes share."""
 
     began_s: float
     ended_s: float = 0.0
     views: list[tuple[float, AnyViewMessage]] = field(default_factory=list)
-    """(when it arrived, what)"""
+    """(time of arrival, message)"""
     stiffness_ages_s: list[float] = field(default_factory=list)
-    lengths: list[int] = field(default_factory=list)
-    """Bytes of each of `views`"""
 
 
 class Viewer:
-    """One participant: the first is the owner, but it drives nothing."""
+    """A participant that looks; the first one is the owner, but drives nothing."""
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
         self._end = LinkEnd("operator", epoch, clock_domain())
 
     def say(self, now_s: float, what: Mapping[str, bool]) -> None:
-        """What is looked at, of overview, first_person and scene; the others no more."""
+        """Ask for some of overview, first_person and scene, and for the others no more."""
         self._sockets.send(encode(self._end.hello(now_s)))
         self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
 
     def take(self, seen: Seen, now_s: float) -> None:
-        """What has come."""
+        """Take in all that has arrived."""
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
@@ -49,10 +50,9 @@ class Viewer:
                 self._end.arrived(message, now_s)
         for _, payload in self._sockets.receive_view():
             seen.views.append((now_s, decode_view(payload)))
-            seen.lengths.append(len(payload))
 
     def wait(self, seconds: float) -> None:
-        """Until something comes."""
+        """Wait until something comes."""
         self._sockets.wait(seconds)
 
     def close(self) -> None:
@@ -61,7 +61,7 @@ class Viewer:
 
 
 def look(viewers: Sequence[Viewer], seconds: float, **what: bool) -> Seen:
-    """All of them, for so long; what the first one sees."""
+    """Let all of them look for a while; return what the first one sees."""
     clock = MonotonicClock()
     next_s = began_s = clock.now()
     seen, others = Seen(began_s), Seen(began_s)
@@ -75,3 +75,13 @@ def look(viewers: Sequence[Viewer], seconds: float, **what: bool) -> Seen:
             viewer.take(seen if viewer is viewers[0] else others, clock.now())
     seen.ended_s = clock.now()
     return seen
+
+
+def companion_of(process_id: int) -> int | None:
+    """Return the number of the process that renders for the robot side `process_id`; None while there is none."""
+    for children in Path(f"/proc/{process_id}/task").glob("*/children"):
+        for child in children.read_text(encoding="ascii").split():
+            with contextlib.suppress(OSError):
+                if _COMPANION in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0"):
+                    return int(child)
+    return None

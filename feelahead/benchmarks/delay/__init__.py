@@ -1,1 +1,0 @@
-"""Clock offsets and one-way delays against the truth."""

@@ -1,1 +1,0 @@
-"""The emulated link beside netem, and how late a loop wakes."""

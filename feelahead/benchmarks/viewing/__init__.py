@@ -1,1 +1,0 @@
-"""What it costs the robot side that somebody looks."""

@@ -1,0 +1,21 @@
+"""Memory and descriptors of a process, as Linux tells of them."""
+
+from pathlib import Path
+
+from common.errors import FeelaheadError
+
+
+def resident_mb(process_id: int | str = "self") -> float:
+    """Return the resident memory in MB; FeelaheadError where the system does not say."""
+    try:
+        for line in Path(f"/proc/{process_id}/status").read_text(encoding="ascii").splitlines():
+            if line.startswith("VmRSS:"):
+                return int(line.split()[1]) / 1024.0
+    except OSError:
+        pass
+    raise FeelaheadError(f"process {process_id} tells no VmRSS; valid: a running process on Linux")
+
+
+def descriptors(process_id: int | str = "self") -> int:
+    """Return the number of open descriptors."""
+    return sum(1 for _ in Path(f"/proc/{process_id}/fd").iterdir())

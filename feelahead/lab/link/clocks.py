@@ -1,0 +1,276 @@
+"""Traffic between two clocks in virtual time, through both ends of a link, with the truth beside it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from rich.box import MARKDOWN
+from rich.table import Table as Shown
+from rich.text import Text
+
+from common.arrays import FloatArray
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Hello, MotionCommand, StiffnessUpdate
+from common.protocol.uniform_field import FAR_M, uniform_field
+from feelahead.lab.goals import Goal
+from feelahead.lab.table import Row, Table
+
+ROBOT_PERIOD_S = 1 / 1000
+OPERATOR_PERIOD_S = 1 / 250
+_HELLO_S = 0.25
+_LIMIT_MS = 0.5
+_LAST_S = 0.5
+"""One-way delays are judged over the end of a run."""
+_FREE = uniform_field(0)
+
+Shape = Literal["normal", "exponential"]
+
+
+@dataclass(frozen=True)
+class Way:
+    """One direction's delays in seconds: normal about `base_s`, or exponential above it; `loss` is a share."""
+
+    shape: Shape
+    base_s: float
+    spread_s: float
+    loss: float = 0.0
+
+    def draw(self, generator: np.random.Generator, count: int) -> FloatArray:
+        """Draw (count,) independent delays, none below 0; infinite for a lost message."""
+        if self.shape == "normal":
+            delays_s = np.maximum(generator.normal(self.base_s, self.spread_s, count), 0.0)
+        else:
+            delays_s = self.base_s + generator.exponential(self.spread_s, count)
+        return np.where(generator.random(count) < self.loss, np.inf, delays_s)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A link and two clocks."""
+
+    name: str
+    to_robot: Way
+    to_operator: Way
+    skew: float
+    """The share by which the operator's clock gains on the robot's."""
+    asymmetry_s: float = 0.0
+    """The least delay to the robot minus that to the operator."""
+
+
+@dataclass(frozen=True)
+class OperatorClock:
+    """The operator's clock by the robot's, which shows the true time."""
+
+    ahead_s: float
+    skew: float
+
+    def reads(self, true_s: float) -> float:
+        """Read it at `true_s`."""
+        return true_s * (1.0 + self.skew) + self.ahead_s
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One end's opinion of the other's clock on an arrival, beside the truth."""
+
+    side: Literal["robot", "operator"]
+    at_s: float
+    offset_error_s: float | None
+    bound_s: float | None
+    one_way_error_s: float | None
+
+
+class Traffic:
+    """Two ends that talk at their real rates for `duration_s`; iterate to let it happen."""
+
+    def __init__(self, scenario: Scenario, seed: int, duration_s: float) -> None:
+        generator = np.random.default_rng([seed, 4])
+        self.clock = OperatorClock(float(generator.uniform(-1e5, 1e5)), scenario.skew)
+        self.robot = LinkEnd("robot", 1, "robot's clock", seed, scenario.asymmetry_s)
+        self.operator = LinkEnd("operator", 2, "operator's clock", seed, scenario.asymmetry_s)
+        self.exchanges: list[tuple[float, float, float, float]] = []
+        """Four stamps of each arrival at the robot's end that echoed one, for other estimators"""
+        self.robot_asymmetry_s = scenario.asymmetry_s
+        self._duration_s = duration_s
+        # Their ticks have nothing to do with each other.
+        phase_s = float(generator.uniform(0.0, OPERATOR_PERIOD_S))
+        self._robot_sends_s = np.arange(0.0, duration_s, ROBOT_PERIOD_S)
+        self._operator_sends_s = np.arange(phase_s, duration_s, OPERATOR_PERIOD_S)
+        self._to_operator_s = scenario.to_operator.draw(generator, self._robot_sends_s.size)
+        self._to_robot_s = scenario.to_robot.draw(generator, self._operator_sends_s.size)
+
+    def __iter__(self) -> Iterator[Estimate]:
+        sends = (self._robot_sends_s, self._operator_sends_s)
+        arrivals = (sends[0] + self._to_operator_s, sends[1] + self._to_robot_s)
+        times_s = np.concatenate([*sends, *arrivals])
+        sizes = [part.size for part in (*sends, *arrivals)]
+        kinds = np.repeat(np.arange(4), sizes)
+        indices = np.concatenate([np.arange(size) for size in sizes])
+        order = np.argsort(times_s, kind="stable")
+        from_robot: list[Hello | StiffnessUpdate] = []
+        from_operator: list[Hello | MotionCommand] = []
+        for at_s, kind, index in zip(
+            times_s[order].tolist(), kinds[order].tolist(), indices[order].tolist(), strict=True
+        ):
+            if at_s > self._duration_s:
+                return
+            if kind == 0:
+                from_robot.append(self._say_robot(at_s))
+            elif kind == 1:
+                from_operator.append(self._say_operator(self.clock.reads(at_s)))
+            elif kind == 2:
+                yield self._arrive_at_operator(from_robot[index], at_s, float(self._to_operator_s[index]))
+            else:
+                yield self._arrive_at_robot(from_operator[index], at_s, float(self._to_robot_s[index]))
+
+    def _say_robot(self, now_s: float) -> Hello | StiffnessUpdate:
+        if self.robot.peer_epoch is None or now_s < _HELLO_S:
+            return self.robot.hello(now_s)
+        return StiffnessUpdate(
+            self.robot.stamp(now_s), _FREE, _FREE, speed_m_s=0.0, horizon_m=FAR_M, rumble=0.0, state="disarmed"
+        )
+
+    def _say_operator(self, now_s: float) -> Hello | MotionCommand:
+        if self.operator.peer_epoch is None:
+            return self.operator.hello(now_s)
+        return MotionCommand(self.operator.stamp(now_s), l2=0.0, r2=0.0)
+
+    def _arrive_at_operator(self, message: Hello | StiffnessUpdate, at_s: float, delay_s: float) -> Estimate:
+        now_s = self.clock.reads(at_s)
+        one_way_s = self.operator.arrived(message, now_s).one_way_s
+        return _judged("operator", self.operator, at_s, now_s, at_s - now_s, one_way_s, delay_s)
+
+    def _arrive_at_robot(self, message: Hello | MotionCommand, at_s: float, delay_s: float) -> Estimate:
+        one_way_s = self.robot.arrived(message, at_s).one_way_s
+        header = message.header
+        sent_s, held_s = header.echo_sent_s, header.echo_held_s
+        if header.last_sent_s is not None:  # the stamp that arrived last is a fair sample
+            sent_s, held_s = header.last_sent_s, header.last_held_s
+        if sent_s is not None and held_s is not None:
+            self.exchanges.append((sent_s, header.sent_s - held_s, header.sent_s, at_s))
+        return _judged("robot", self.robot, at_s, at_s, self.clock.reads(at_s) - at_s, one_way_s, delay_s)
+
+
+def _judged(
+    side: Literal["robot", "operator"],
+    end: LinkEnd,
+    at_s: float,
+    now_s: float,
+    true_offset_s: float,
+    one_way_s: float | None,
+    delay_s: float,
+) -> Estimate:
+    offset_s, bound_s = end.clock_offset.offset_at(now_s), end.clock_offset.bound_at(now_s)
+    return Estimate(
+        side,
+        at_s,
+        None if offset_s is None else offset_s - true_offset_s,
+        bound_s,
+        None if one_way_s is None else one_way_s - delay_s,
+    )
+
+
+def other_errors_s(traffic: Traffic) -> dict[str, float]:
+    """Give the errors that other estimators of the operator's clock make at the newest arrival, by their names.
+
+    All have the same stamps and know the asymmetry if the ends do.
+    """
+    sent_s, peer_received_s, peer_sent_s, received_s = np.array(traffic.exchanges).T
+    offsets_s = ((peer_received_s - sent_s) + (peer_sent_s - received_s)) / 2.0
+    round_trips_s = (received_s - sent_s) - (peer_sent_s - peer_received_s)
+    found_s = {
+        "mean of offsets": offsets_s.mean(),
+        # NTP's clock filter (RFC 5905, section 10)
+        "best round trip of 8": offsets_s[-8:][np.argmin(round_trips_s[-8:])],
+        "least both ways": ((peer_received_s - sent_s).min() - (received_s - peer_sent_s).min()) / 2.0,
+    }
+    true_s = traffic.clock.reads(float(received_s[-1])) - received_s[-1] - traffic.robot_asymmetry_s / 2.0
+    return {name: float(offset_s - true_s) for name, offset_s in found_s.items()}
+
+
+_QUEUES, _JITTER = Way("exponential", 0.050, 0.010), Way("normal", 0.050, 0.010)
+_NEARER = Way("exponential", 0.030, 0.010)
+SCENARIOS = {
+    "50 + exp(10) both ways": (_QUEUES, _QUEUES, 0.0),
+    "N(50, 10) both ways": (_JITTER, _JITTER, 0.0),
+    "50 + exp(10) / 50 + exp(1)": (_QUEUES, Way("exponential", 0.050, 0.001), 0.0),
+    "50 + exp(10) / 30 + exp(10)": (_QUEUES, _NEARER, 0.0),
+    "likewise, asymmetry told": (_QUEUES, _NEARER, 0.020),
+}
+"""Links in milliseconds, to the robot and to the operator, and the asymmetry in seconds that both ends know.
+
+50 + exp(10) is a floor of 50 with exponential delays of mean 10 above it. The goals are about the first one.
+"""
+
+
+def scenario(name: str, skew_ppm: float) -> Scenario:
+    """Make one of these with a clock that gains `skew_ppm`."""
+    to_robot, to_operator, asymmetry_s = SCENARIOS[name]
+    return Scenario(name, to_robot, to_operator, 1e-6 * skew_ppm, asymmetry_s)
+
+
+@dataclass(frozen=True)
+class ClockCell:
+    """One link between two clocks."""
+
+    part: str
+    link: str
+    skew_ppm: float
+    seconds: float
+
+
+def run(cell: ClockCell, seed: int) -> Iterator[Row]:
+    """Let traffic happen; yield each side's errors at the end."""
+    traffic = Traffic(scenario(cell.link, cell.skew_ppm), seed, cell.seconds)
+    newest: dict[str, Estimate] = {}
+    rows: dict[str, Row] = {
+        side: {"side": side, "judged": 0, "violations": 0, "good_after_s": 0.0} for side in ("robot", "operator")
+    }
+    one_way_s: dict[str, list[float]] = {side: [] for side in rows}
+    for estimate in traffic:
+        row = rows[estimate.side]
+        if estimate.offset_error_s is None or estimate.bound_s is None:
+            row["good_after_s"] = estimate.at_s
+            continue
+        newest[estimate.side] = estimate
+        row["judged"] += 1
+        row["violations"] += abs(estimate.offset_error_s) > estimate.bound_s
+        if 1e3 * abs(estimate.offset_error_s) > _LIMIT_MS:
+            row["good_after_s"] = estimate.at_s
+        if estimate.one_way_error_s is not None and estimate.at_s > cell.seconds - _LAST_S:
+            one_way_s[estimate.side].append(estimate.one_way_error_s)
+    for side, row in rows.items():
+        if side in newest and one_way_s[side]:
+            last = newest[side]
+            row |= {"offset_error_ms": 1e3 * (last.offset_error_s or 0.0), "bound_ms": 1e3 * (last.bound_s or 0.0)}
+            row["one_way_error_ms"] = 1e3 * float(np.sqrt(np.mean(np.square(one_way_s[side]))))
+        if side == "robot":
+            row |= {f"{name}, ms": 1e3 * error_s for name, error_s in other_errors_s(traffic).items()}
+        yield row
+
+
+def tables(found: Table) -> Iterator[Shown]:
+    """Make a table for each link and skew."""
+    for (link, skew), rows in found.groups("link", "skew_ppm"):
+        shown = Shown(title=Text(f"{link}, {skew:g} ppm: errors in ms at the end"), box=MARKDOWN)
+        for heading in ("estimate", "rms", "p99", "max"):
+            shown.add_column(heading, justify="left" if heading == "estimate" else "right")
+        others = [name for name in rows.columns if name.endswith(", ms")]
+        for name in ("offset_error_ms", "one_way_error_ms", "bound_ms", *others):
+            sizes = np.abs(rows.values(name) or [np.nan])
+            figures = (np.sqrt(np.mean(sizes**2)), np.quantile(sizes, 0.99), sizes.max())
+            shown.add_row(name.removesuffix(", ms"), *(f"{value:.3f}" for value in figures))
+        yield shown
+
+
+def goals(found: Table) -> Iterator[Goal]:
+    """Hold the first link's errors against their limit, and the bound against the truth on every link."""
+    first = found.where(link=next(iter(SCENARIOS)))
+    for name in ("offset_error_ms", "one_way_error_ms"):
+        errors = first.values(name)
+        # A missing figure must not pass for a good one.
+        worst = max(map(abs, errors)) if len(errors) == len(first) else None
+        yield Goal(f"{name} of the first link, the worst", worst, _LIMIT_MS, detail=f"{len(first)} estimates")
+    judged = f"{sum(found.values('judged'))} arrivals"
+    yield Goal("violations of the bound", sum(found.values("violations")), 0, detail=judged)

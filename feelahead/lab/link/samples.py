@@ -1,0 +1,262 @@
+"""Delays of a link as arrays, of the model in virtual time and of a recording, and how far two of them differ."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import stats
+
+from common.arrays import FloatArray
+from common.emulation.delay_line import DelayLine
+from common.emulation.distribution import moments
+from common.emulation.profile import LinkProfile
+from common.emulation.trace import read_samples
+from common.errors import ConfigurationError
+from feelahead.lab.goals import Goal
+
+STALL_S = 1e-3
+"""A delay that exceeds the model's greatest by more than this is the host's doing, not the link's."""
+LARGEST_DISTANCE = 0.03
+LARGEST_MOMENT_ERROR_MS = 0.3
+LARGEST_LATE_ERROR = 0.02
+_BAND = (0.005, 0.995)
+_FIRST_SEED_OF_BAND = 1000
+
+
+@dataclass(frozen=True)
+class LinkSample:
+    """Messages in order of sending."""
+
+    sent_s: FloatArray
+    """(n,) when each was sent."""
+    delay_s: FloatArray
+    """(n,) how long its first copy took; NaN: lost."""
+
+    @property
+    def arrived_s(self) -> FloatArray:
+        """(m,) the delays of those that arrived."""
+        return self.delay_s[~np.isnan(self.delay_s)]
+
+    @property
+    def mean_s(self) -> float:
+        """The mean delay of those that arrived."""
+        return float(self.arrived_s.mean())
+
+    @property
+    def sd_s(self) -> float:
+        """The standard deviation of those delays."""
+        return float(self.arrived_s.std())
+
+    @property
+    def loss_share(self) -> float:
+        """The share of messages lost."""
+        return float(np.isnan(self.delay_s).mean())
+
+    @property
+    def mean_burst(self) -> float:
+        """The mean number of messages lost in a row; 0 without loss."""
+        lost = np.isnan(self.delay_s).astype(np.int8)
+        bursts = int((np.diff(lost, prepend=0) == 1).sum())
+        return float(lost.sum()) / bursts if bursts else 0.0
+
+    @property
+    def late_share(self) -> float:
+        """The share of arrivals overtaken by a later message (RFC 4737, type-P-reordered)."""
+        arrived = np.flatnonzero(~np.isnan(self.delay_s))
+        order = arrived[np.argsort(self.sent_s[arrived] + self.delay_s[arrived], kind="stable")]
+        return float(np.mean(order < np.maximum.accumulate(order))) if order.size else 0.0
+
+    def without_stalls(self, profile: LinkProfile) -> tuple["LinkSample", int]:
+        """Leave out the delays that the model cannot give; also return how many these were."""
+        stalled = self.delay_s > greatest_delay_s(profile) + STALL_S
+        return LinkSample(self.sent_s[~stalled], self.delay_s[~stalled]), int(stalled.sum())
+
+
+def greatest_delay_s(profile: LinkProfile) -> float:
+    """Return the longest delay of a datagram; infinity where there is no such limit or it is not known."""
+    if profile.model == "stream" or profile.slot is not None:
+        return math.inf
+    if profile.trace is not None:
+        return max(delay_s for delay_s in profile.trace.delays_s if delay_s is not None)
+    return moments(profile.delay_s, profile.jitter_s, profile.distribution)[2]
+
+
+def read_link_sample(path: Path, flag: str) -> LinkSample:
+    """Read a recording with send times; ConfigurationError, in one line that names `flag`, for anything else."""
+    samples = read_samples(path, flag)
+    if len(samples) < 2 or any(sample.sent_s is None for sample in samples):
+        raise ConfigurationError(f"{flag}: {path} lacks send times; valid: two messages or more with sent_ns")
+    return LinkSample(
+        np.array([sample.sent_s for sample in samples], dtype=np.float64),
+        np.array([math.nan if sample.delay_s is None else sample.delay_s for sample in samples]),
+    )
+
+
+def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tuple[LinkSample, DelayLine[int]]:
+    """Run the model once in virtual time: each message is released exactly when it is due."""
+    line: DelayLine[int] = DelayLine(profile)
+    delay_s = np.full(len(sent_s), math.nan)
+
+    def deliver(until_s: float) -> None:
+        while (due_s := line.next_due()) is not None and due_s <= until_s:
+            for number in line.pop(due_s):
+                # Of two copies the first counts.
+                if math.isnan(delay_s[number]):
+                    delay_s[number] = due_s - sent_s[number]
+
+    for number, now_s in enumerate(sent_s):
+        deliver(now_s)
+        line.push(now_s, number, size_bytes)
+    deliver(math.inf)
+    return LinkSample(np.array(sent_s), delay_s), line
+
+
+def distance(one: LinkSample, other: LinkSample) -> float:
+    """Return the Kolmogorov-Smirnov statistic D of their delays; 1 where nothing arrives of one of them."""
+    if one.arrived_s.size == 0 or other.arrived_s.size == 0:
+        return 1.0
+    return float(stats.ks_2samp(one.arrived_s, other.arrived_s, method="asymp").statistic)
+
+
+@dataclass(frozen=True)
+class SeedResult:
+    """One run of the model beside the recording."""
+
+    seed: int
+    distance: float | None
+    """Kolmogorov-Smirnov D; None where nothing varies."""
+    mean_error_ms: float
+    sd_error_ms: float
+    late_share: float
+    loss_share: float
+    mean_burst: float
+
+
+@dataclass(frozen=True)
+class Band:
+    """The range in which the model's own runs differ."""
+
+    pairs: int
+    distance: float
+    """99 % of pairs of runs are closer than this."""
+    figures: dict[str, tuple[float, float]]
+    """The range in which 99 % of runs lie, by name."""
+
+
+FIGURES: dict[str, Callable[[LinkSample], float]] = {
+    "mean delay, ms": lambda sample: 1e3 * sample.mean_s,
+    "sd of delay, ms": lambda sample: 1e3 * sample.sd_s,
+    "lost share": lambda sample: sample.loss_share,
+    "messages lost in a row": lambda sample: sample.mean_burst,
+}
+
+
+def independent_delays(profile: LinkProfile) -> bool:
+    """Say whether each delay is drawn by itself: a run then has the model's distribution up to sampling error."""
+    correlated = profile.delay_correlation > 0.0 and profile.correlation_model == "proper"
+    return (
+        profile.model == "datagram"
+        and profile.jitter_s > 0.0
+        and not correlated
+        and profile.rate is None
+        and profile.slot is None
+        and profile.trace is None
+    )
+
+
+def needs_band(profile: LinkProfile) -> bool:
+    """Say whether delays or losses depend on the past, so that only the model's own band can judge a recording."""
+    return profile.loss is not None or not independent_delays(profile)
+
+
+def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> SeedResult:
+    """Run the model with the recording's send times and this seed."""
+    run = _run(profile, reference, seed, size_bytes)
+    varies = profile.jitter_s > 0.0 or profile.trace is not None
+    return SeedResult(
+        seed,
+        distance(run, reference) if varies else None,
+        1e3 * (run.mean_s - reference.mean_s),
+        1e3 * (run.sd_s - reference.sd_s),
+        run.late_share,
+        run.loss_share,
+        run.mean_burst,
+    )
+
+
+def compare(
+    profile: LinkProfile, reference: LinkSample, seeds: int, size_bytes: int, advance: Callable[[], object]
+) -> list[SeedResult]:
+    """Compare the seeds 0 to `seeds` − 1; `advance` is called after each."""
+    results = []
+    for seed in range(seeds):
+        results.append(compare_one(profile, reference, seed, size_bytes))
+        advance()
+    return results
+
+
+def pair_of_runs(
+    profile: LinkProfile, reference: LinkSample, pair: int, size_bytes: int
+) -> tuple[float, list[list[float]]]:
+    """Run the model twice, with seeds of the pair's own; return D between the runs, and the figures of each."""
+    first = _FIRST_SEED_OF_BAND + 2 * pair
+    runs = [_run(profile, reference, seed, size_bytes) for seed in (first, first + 1)]
+    return distance(*runs), [[measure(run) for measure in FIGURES.values()] for run in runs]
+
+
+def band_of(pairs: Sequence[tuple[float, Sequence[Sequence[float]]]]) -> Band:
+    """Make the band of many pairs of runs."""
+    low, high = np.quantile([figures for _, both in pairs for figures in both], _BAND, axis=0)
+    ranges = {name: (float(low[place]), float(high[place])) for place, name in enumerate(FIGURES)}
+    return Band(len(pairs), float(np.quantile([apart for apart, _ in pairs], 0.99)), ranges)
+
+
+def measure_band(
+    profile: LinkProfile, reference: LinkSample, pairs: int, size_bytes: int, advance: Callable[[], object]
+) -> Band:
+    """Measure the band by `pairs` pairs of runs; `advance` is called after each."""
+    found = []
+    for pair in range(pairs):
+        found.append(pair_of_runs(profile, reference, pair, size_bytes))
+        advance()
+    return band_of(found)
+
+
+def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[SeedResult], band: Band | None) -> list[Goal]:
+    """Hold independent delays against fixed limits, and those that depend on the past against the model's own band."""
+
+    def median(name: str) -> float:
+        values = [value for result in results if (value := getattr(result, name)) is not None]
+        return float(np.median(values)) if values else math.nan
+
+    goals = []
+    apart = "median Kolmogorov-Smirnov D"
+    if independent_delays(profile):
+        late_error = abs(median("late_share") - reference.late_share)
+        goals += [
+            Goal(apart, median("distance"), LARGEST_DISTANCE),
+            Goal("median error of the mean, ms", abs(median("mean_error_ms")), LARGEST_MOMENT_ERROR_MS),
+            Goal("median error of the sd, ms", abs(median("sd_error_ms")), LARGEST_MOMENT_ERROR_MS),
+            Goal(
+                "median error of the reordered share",
+                late_error,
+                LARGEST_LATE_ERROR,
+                detail=f"recorded {reference.late_share:.3f}",
+            ),
+        ]
+    elif band is not None and not math.isnan(median("distance")):
+        detail = f"99 % of {band.pairs} pairs of the model's own runs"
+        goals.append(Goal(apart, median("distance"), band.distance, detail=detail))
+    if band is not None:
+        for name in (name for name in FIGURES if ("delay" in name) == (profile.loss is None)):
+            value, (low, high) = FIGURES[name](reference), band.figures[name]
+            claim = f"recorded {name}, in the model's own 99 % band"
+            goals += [Goal(claim, value, low, "at least"), Goal(claim, value, high)]
+    return goals
+
+
+def _run(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> LinkSample:
+    return play(dataclasses.replace(profile, seed=seed), reference.sent_s.tolist(), size_bytes)[0]
