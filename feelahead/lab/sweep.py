@@ -40,6 +40,8 @@ _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
 _RESTARTS = 3
 """How often a pool is started again after one of its processes was killed."""
 _WORKERS = 2
+_WIDTH = 200
+"""Columns of output that no terminal shows."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
         raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
     table, failures, left = sweep(question, settings)
     _write(question, settings, table)  # before anything is printed: a reader may leave early, as `head` does
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH, highlight=False, markup=False)
     if len(table):
         for shown in question.show(settings, table):
             console.print(shown)
