@@ -133,6 +133,8 @@ def disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> None:
 
 
 def armed(robot: Watched) -> None:
+    """Wait until it is, from now on."""
+    robot.new_events()
     robot.wait_for("armed", state_is("armed"), 120.0)
 
 
