@@ -37,7 +37,7 @@ class CalibrateSettings:
     """Measure one controller's triggers and sticks: half a minute with the controller in your hands.
 
     It says what to do, and shows what the controller reports. What it finds is kept for that controller, on USB and
-    Bluetooth alike, in your configuration folder, where feelahead-operator looks for it.
+    Bluetooth, in your configuration folder, where feelahead-operator looks for it.
     """
 
     device: Literal["hid", "simulated"] = "hid"
@@ -124,7 +124,9 @@ def _measure(
             procedure.feed(state, now_s)
             show(procedure, state, now_s)
         elif now_s - heard_s > _SILENT_S:
-            raise DeviceError(f"the controller has said nothing for {_SILENT_S:.0f} s: plug it in again and start anew")
+            raise DeviceError(
+                f"the controller has said nothing for {_SILENT_S:.0f} s: plug it in again and start again"
+            )
         if isinstance(clock, VirtualClock):
             clock.advance_to(now_s + _POLL_S)
         else:

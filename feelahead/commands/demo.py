@@ -47,8 +47,8 @@ _ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config 
 class DemoSettings(RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
-    The person arms the arm, pulls R2 to advance towards the target, feels the trigger stiffen as things come
-    near, grasps the target, lifts it, and sets it down again. Nothing is needed but this machine.
+    The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen as things come
+    near. Then they grasp the target, lift it, and set it down again. Nothing is needed but this machine.
 
     Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
     """

@@ -22,7 +22,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator,record]'"
 
 @dataclass(frozen=True)
 class ReplaySettings:
-    """Show a recording in the console, or compute its cores anew.
+    """Show a recording in the console, or compute its cores again.
 
     Try: feelahead demo --record run.mcap, then feelahead replay run.mcap --check.
     """
@@ -30,7 +30,7 @@ class ReplaySettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     check: bool = False
-    """Compute every stiffness, command and report to the controller anew from the recorded inputs, and compare. Exit
+    """Compute every stiffness, command and report to the controller again from the recorded inputs, and compare. Exit
     code 1 where they differ by more than another processor may: 1 of 8 in strength, 1e-12 m in ways."""
     speed: Annotated[float, Meta(ge=0.01, le=1000.0)] = 1.0
     """The playing speed, 1 being the recorded one."""
@@ -115,7 +115,7 @@ def _check(recording: Recording) -> int:
     said = [line for one in compared for line in one.lines()]
     within = all(one.within for one in compared)
     if not sum(one.made for one in compared):
-        said.append("nothing was compared: it holds nothing to make anew")
+        said.append("nothing was compared: it holds nothing to make again")
         within = False
     else:
         said.append("the same, within what is promised" if within else "NOT the same")

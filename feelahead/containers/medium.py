@@ -33,7 +33,7 @@ def open_medium() -> Iterator["ContainerMedium"]:
 
 
 class ContainerMedium:
-    """Two networks and a router for each link, which stay; both sides anew for each trial."""
+    """Two networks and a router for each link, which stay; both sides again for each trial."""
 
     name = "containers"
 

@@ -5,7 +5,7 @@ address, so that neither side needs a route or a right of its own; and it applie
 direction, to what leaves it. Where the kernel has no netem, or the link asks for more than netem can do, the sides
 emulate the link themselves: they wait for the file `--said`, which has what they are to emulate. The log says which.
 
-Containers come and go, and so do addresses and interfaces: it looks twice a second, and sets up anew what changed.
+Containers come and go, and so do addresses and interfaces: it looks twice a second, and sets up again what changed.
 """
 
 import json
@@ -93,8 +93,8 @@ class Router:
             _say(f"NO netem ({reason}): the sides emulate the link themselves: {settings.link!r}")
 
     def look(self) -> None:
-        """Set up anew what has changed; CommandFailedError where it may not."""
-        cable = self._find() or self._cable  # whoever is away comes back, most often to the same place
+        """Set up again what has changed; CommandFailedError where it may not."""
+        cable = self._find() or self._cable  # a side that is away comes back, most often to the same place
         if cable is None:
             return
         if cable != self._cable:
@@ -104,7 +104,7 @@ class Router:
             if self._cable is None:
                 _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
             self._cable = cable
-        if not self._settings.said.exists():  # the service `keys`, which each `up` runs anew, takes it away
+        if not self._settings.said.exists():  # the service `keys`, which each `up` runs again, takes it away
             with output_file("--said", self._settings.said) as file:
                 file.write("" if self._words is not None else self._settings.link)
 

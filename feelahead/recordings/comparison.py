@@ -42,7 +42,7 @@ class Comparison:
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
     def take(self, first: bytes | None, second: bytes | None, *, report: bool = False) -> None:
-        """One message as recorded and as made anew; None for one that is missing. `report`: for the controller."""
+        """One message as recorded and as made again; None for one that is missing. `report`: for the controller."""
         counts = report or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
@@ -67,7 +67,7 @@ class Comparison:
         elif self.worst_eighths or self.worst_m or self.equal < self.made:
             difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in ways"
         lines = [
-            f"{self.side}: {self.made} {self.counted} made anew, {self.equal} of them equal bit for bit;"
+            f"{self.side}: {self.made} {self.counted} made again, {self.equal} of them equal bit for bit;"
             f" largest difference: {difference}"
         ]
         if self.others:
@@ -76,7 +76,7 @@ class Comparison:
 
 
 def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Iterator[Entry]:
-    """Every entry of a side in order, up to the first gap: a core cannot be made anew beyond one."""
+    """Every entry of a side in order, up to the first gap: a core cannot be made again beyond one."""
     began_s = None
     for expected, message in enumerate(recording.messages([f"/{side}/inputs"])):
         block: Block = unpack_block(message.content)

@@ -68,7 +68,7 @@ def _side(
 
 
 def replay_robot(recording: Recording) -> Comparison:
-    """Make every stiffness message of the robot side anew; ConfigurationError where it was not recorded."""
+    """Make every stiffness message of the robot side again; ConfigurationError where it was not recorded."""
     header = require_side(recording, "robot")
     given = _Given()
     settings = settings_from(header["settings"], RobotSettings)
@@ -113,7 +113,7 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
 
 
 def replay_operator(recording: Recording) -> Comparison:
-    """Make every motion command and report to the controller anew; ConfigurationError where it was not recorded."""
+    """Make every motion command and report to the controller again; ConfigurationError where it was not recorded."""
     header = require_side(recording, "operator")
     settings = settings_from(header["settings"], OperatorSettings)
     core = build_operator_side(settings, header["epoch"], header["clock_domain"])

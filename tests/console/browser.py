@@ -166,7 +166,7 @@ class Page:
 
 
 def brightness(pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """(height, width), 0 to 255: what is left for whoever sees no colours."""
+    """(height, width), 0 to 255: the picture for a person who sees no colours."""
     made: np.ndarray[Any, np.dtype[np.float64]] = pixels.astype(np.float64) @ np.asarray(_BRIGHTNESS)
     return made
 

@@ -16,6 +16,7 @@ from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
 from tests.console.browser import Page, browser
 from tests.console.pictures_of_recording import record_demo
+from tests.helpers.machines.waiting import wait_until
 
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
@@ -66,9 +67,9 @@ def _pictures(console: Console, page: Page, playback: Playback) -> Iterator[Imag
 
 
 def _until(console: Console, holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + _START_S
-    while not holds():
+    def received() -> bool:
         console.receive()
-        if console.gone or time.monotonic() > end_s:
-            raise AssertionError(f"no page of the console within {_START_S:g} s: {console.take_notes()}")
-        time.sleep(0.01)
+        assert not console.gone
+        return holds()
+
+    wait_until("a page of the console", received, _START_S, instead=console.take_notes)

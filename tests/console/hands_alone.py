@@ -48,7 +48,7 @@ class _Handler(SimpleHTTPRequestHandler):
         self.wfile.write(_PAGE)
 
     def log_message(self, *arguments: object) -> None:
-        """Nothing: whoever runs this looks at the checks."""
+        """Log nothing."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Make the documents' pictures of real runs anew, into docs/: `python -m tests.console.pictures [PART...]`."""
+"""Make the documents' pictures of real runs again, into docs/: `python -m tests.console.pictures [PART...]`."""
 
 import sys
 import tempfile

@@ -40,7 +40,7 @@ def make_pictures_of_recording(folder: Path, paths: Sequence[Path]) -> None:
 
 
 def record_demo(recording: Path, duration_s: float) -> list[dict[str, Any]]:
-    """Run a demo for so long; what it said."""
+    """Run a demo for `duration_s`; return its events."""
     recording.unlink(missing_ok=True)
     asked = ("--no-console", "--status=facts", f"--duration={duration_s}", f"--record={recording}")
     return [json.loads(line) for line in _feelahead("demo", *asked).splitlines()]

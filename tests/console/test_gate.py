@@ -70,7 +70,7 @@ def test_another_site_is_refused(browser: Browser, demo: Run) -> None:
         assert not seen["opened"], "its WebSocket was let in"
         assert not seen["read"], "it could read the page"
     with browser.page(demo.address) as page:
-        page.wait(DRAWN, "drawn for whoever may see it")
+        page.wait(DRAWN, "drawn for a person who may see it")
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def test_gamepad_drives(browser: Browser, demo: Run) -> None:
 
 
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
-    """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
+    """Esc stops each driver: here the scripted person, while another element of the page has the focus."""
     with browser.page(fresh_demo.address) as page:
         fresh_demo.wait_until("armed", is_armed, 60.0)
         page.press("Tab")

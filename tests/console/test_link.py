@@ -38,7 +38,7 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
         assert words != words_before
         colour = np.abs(before.mean(axis=0) - lost.mean(axis=0)).max()
         assert colour > 40
-        # One flat brightness while armed, stripes while lost: seen by whoever sees no colours.
+        # One flat brightness while armed, stripes while lost: seen without colours, too.
         flat, striped = brightness(before).std(), brightness(lost).std()
         assert flat < 10
         assert striped > 50

@@ -92,7 +92,7 @@ def test_the_robot_side_killed(running: Engine) -> None:
     heard = operator.wait_for("link up", link_up)
     without = [event for event in heard if event.get("event") == "status" and event.get("link") != "up"]
     assert not any(event["R2"] for event in without)
-    robot.wait_for("started anew", lambda event: event.get("event") == "listening")
+    robot.wait_for("started again", lambda event: event.get("event") == "listening")
     came_back_disarmed(robot)
 
 
@@ -133,6 +133,8 @@ def disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> None:
 
 
 def armed(robot: Watched) -> None:
+    """Wait until it is, from now on."""
+    robot.new_events()
     robot.wait_for("armed", state_is("armed"), 120.0)
 
 

@@ -28,7 +28,7 @@ class Compose:
 
 
 class Watched:
-    """One service's container, from now on."""
+    """One service's container, from its beginning."""
 
     def __init__(self, engine: Engine, service: str) -> None:
         self._engine = engine
@@ -36,7 +36,6 @@ class Watched:
         self.container = engine.container(service)
         self._seen = 0
         self._waiting: list[Event] = []
-        self.new_events()
 
     def new_events(self) -> list[Event]:
         """Return the events that `--status json` printed since the last call."""

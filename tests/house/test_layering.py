@@ -131,7 +131,6 @@ LIBRARIES = {
         "feelahead/lab",
         "feelahead/both_sides",
         "feelahead/commands",
-        "feelahead/containers",
         "feelahead/benchmarks",
         "feelahead/experiments",
     ),

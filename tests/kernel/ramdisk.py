@@ -13,7 +13,7 @@ WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playsta
 RESULT_MARK: Final = "kernel test: exit code "
 """The prefix of the line with the test program's exit code."""
 WRITABLE: Final = "/dev/shm"  # noqa: S108  # the guest's own, in memory
-"""The one folder that the guest can write to."""
+"""The guest's writable folder."""
 
 _FOLDER, _EXECUTABLE = 0o040755, 0o100755
 

@@ -32,7 +32,7 @@ def guided() -> Iterator[Lan]:
 
 @pytest.fixture
 def lan(guided: Lan, request: pytest.FixtureRequest) -> Lan:
-    """After a test that has failed, the network as it was and both sides anew."""
+    """After a test that has failed, the network as it was and both sides again."""
     if request.session.testsfailed > guided.mended:
         guided.mended = request.session.testsfailed
         guided.mend()

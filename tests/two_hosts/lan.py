@@ -106,7 +106,7 @@ class Side:
 
 
 class Lan:
-    """Both hosts and the present sides; whoever is not told otherwise is robot or operator as the guide starts them."""
+    """Both hosts and the present sides, started by the guide's commands."""
 
     def __init__(self, robot: Machine, operator: Machine, folder: Path) -> None:
         clock = ("unshare", "--time", "--monotonic", str(_CLOCK_AHEAD_S), "--boottime", str(_CLOCK_AHEAD_S))
@@ -173,7 +173,7 @@ class Lan:
             os.kill(process.process_id, signal.SIGKILL)
 
     def restart(self, host: Callable[[Host], Host] = lambda host: host) -> None:
-        """Both sides anew, the robot side first, with a fresh scene; `host` may change their surroundings."""
+        """Both sides again, the robot side first, with a fresh scene; `host` may change their surroundings."""
         self.end_all()
         self.start("robot", host(self.robot_host))
         self.until("robot", "it listens", bool)
@@ -187,7 +187,7 @@ class Lan:
         self._sides.clear()
 
     def mend(self) -> None:
-        """The network as it was, after a row that has failed, and both sides anew."""
+        """The network as it was, after a row that has failed, and both sides again."""
         for host, address in zip((self.robot_host, self.operator_host), self._addresses, strict=True):
             host.machine.plug_in()
             host.machine.set_link("mtu", "1500")
@@ -228,7 +228,7 @@ class Lan:
         return wait_until(f"{called}: {what}", found, limit_s, instead=lambda: _short(side.status))
 
     def watch(self, for_s: float) -> Iterator[None]:
-        """Let time pass, listening; whoever asks looks in between."""
+        """Let time pass, listening; the caller looks in between."""
         end_s = time.monotonic() + for_s
         while time.monotonic() < end_s:
             time.sleep(0.1)
@@ -236,7 +236,7 @@ class Lan:
             yield
 
     def moving(self) -> None:
-        """Wait until the person has the arm armed and moves it; who is done begins anew."""
+        """Wait until the person has the arm armed and moves it; who is done begins again."""
         for attempt in range(4):
             status = self.until("operator", "armed and moving", lambda status: is_done(status) or is_moving(status))
             if is_moving(status):
@@ -249,15 +249,15 @@ class Lan:
         raise AssertionError("the person is done each time before anything moves")
 
     def back(self) -> None:
-        """Wait until the link is up, disarmed, with hands at rest; then armed anew."""
+        """Wait until the link is up, disarmed, with hands at rest; then armed again."""
         began_s = time.monotonic()
         status = self.until("operator", "the link is up", lambda status: status["link"] == "up")
         print(f"back after {time.monotonic() - began_s:.1f} s")
         assert status["state"] == "disarmed"
-        fresh = self.until("operator", "armed anew", lambda status: is_done(status) or _is_armed_and_shown(status))
+        fresh = self.until("operator", "armed again", lambda status: is_done(status) or _is_armed_and_shown(status))
         if is_done(fresh):  # they were at the end of the task
             self.moving()
-        self.until("robot", "armed anew", is_armed)
+        self.until("robot", "armed again", is_armed)
 
 
 def is_armed(status: Status) -> bool:

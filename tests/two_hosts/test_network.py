@@ -47,11 +47,11 @@ def test_an_address_that_changes(lan: Lan, side: str) -> None:
     stop = lan.until("robot", "the arm is stopped", lambda status: not is_armed(status))
     lan.until("operator", "the link is lost", lambda status: status["link"] != "up")
     lan.back()
-    print(f"stopped after {gap_ms(stop):.0f} ms; armed anew {time.monotonic() - began_s:.1f} s after the change")
+    print(f"stopped after {gap_ms(stop):.0f} ms; armed again {time.monotonic() - began_s:.1f} s after the change")
 
 
 def test_a_network_that_swallows_everything(lan: Lan) -> None:
-    """Nothing answers, not even that there is nobody: attempts to connect are made anew all the same."""
+    """Nothing answers, not even that there is nobody: attempts to connect are made again all the same."""
     if shutil.which("nft") is None:
         pytest.skip("no nft here (apt install nftables)")
     lan.moving()
@@ -79,7 +79,7 @@ def test_packets_of_576_bytes(lan: Lan) -> None:
 
 
 def test_a_name_server_that_is_silent(lan: Lan) -> None:
-    """Views connect anew after a revocation, control runs on; both sides end in good time, one of them while asking."""
+    """Views connect again after a revocation, control runs on; both sides end in time, one of them while asking."""
     key = lan.words["OPERATOR-KEY"][:-4]
 
     def undisturbed(attempt: int) -> bool:
@@ -109,7 +109,7 @@ def once_in(lan: Lan, tried: Callable[[int], bool], undo: Callable[[], None]) ->
 
 
 def stopped(lan: Lan, for_s: float) -> None:
-    """Wait until the arm is stopped and the triggers are free, and see it stand for so long."""
+    """Wait until the arm is stopped and the triggers are free, and see it stand for `for_s`."""
     stop = lan.until("robot", "the arm is stopped", lambda status: not is_armed(status))
     lan.until("operator", "the triggers are free", lambda status: status["triggers_released"] is True)
     lan.until("operator", "it is blind", lambda status: status["feel"] == "blind")

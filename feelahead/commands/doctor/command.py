@@ -32,9 +32,9 @@ class DoctorSettings:
     Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
     without, "missing" is what does not work as it is.
 
-    With --connect: the way from here to a robot side instead, in one line: the first thing that is wrong with it and
-    what mends it (code 1), or how long a round trip takes and whether somebody has the arm (code 0). Whoever drives
-    notices nothing of it. The wall clocks are no matter, and not looked at.
+    With --connect: look at the way from here to a robot side instead, and say one line. Code 1: the first thing that
+    is wrong with it and what mends it. Code 0: how long a round trip takes, and whether somebody has the arm. The
+    person who drives notices nothing of it. The wall clocks are no matter, and not looked at.
 
     With --compile: compile all that any scene may need, for this machine's processor, instead of at the first start:
     about half a minute on two processors. It is kept in $NUMBA_CACHE_DIR, else ~/.cache/feelahead/kernels; what is

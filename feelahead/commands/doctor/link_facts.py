@@ -1,6 +1,6 @@
 """Look at the way to a robot side, no farther than to the first thing that is wrong with it.
 
-Harmless to whoever drives: two connections to each port, one after the other, and questions that the robot side
+Harmless to the person who drives: two connections to each port, one after the other, and questions that the robot side
 answers without letting anybody in. A Hello would ask for the arm, so none is sent.
 """
 

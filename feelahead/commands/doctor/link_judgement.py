@@ -215,7 +215,7 @@ def _judge_stranger(place: str, opening: Opening) -> Fault:
             Wrong.OTHER,
             f"{place} takes connections and hangs up at once: a forwarded port with nothing behind it, or a robot side "
             "with too many connections",
-            "start the robot side behind it, or end whoever keeps connecting",
+            "start the robot side behind it, or end the program that keeps connecting",
         )
     return Fault(
         Wrong.OTHER,
@@ -261,7 +261,7 @@ def _judge_handshake(facts: LinkFacts, place: str, handshake: str) -> Fault:
         )
     return Fault(
         Wrong.ROBOT_KEY,
-        f"whoever is at {place} has another key than --robot-key says, or is no such port of a robot side",
+        f"the program at {place} has another key than --robot-key says, or is no such port of a robot side",
         "--robot-key with what is shown on the robot's machine by: feelahead keys show robot",
     )
 

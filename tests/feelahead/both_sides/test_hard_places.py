@@ -100,20 +100,6 @@ STALLS = pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal
 
 @pytest.mark.processes
 @STALLS
-@pytest.mark.parametrize(("module", "arguments"), [("operator_side", NOWHERE), ("robot_side", ROBOT)])
-def test_the_loop_goes_on_whoever_stalls_its_output(
-    module: str, arguments: Sequence[str], kind: str, mode: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "out.json"
-    more = ("--duration=1", f"--status={mode}", f"--summary={path}")
-    with stalled(kind) as output, start(module, output, *arguments, *more) as process:
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, complaint) == (0, "")
-    assert json.loads(path.read_text())["errors"] == []
-
-
-@pytest.mark.processes
-@STALLS
 def test_a_signal_ends_the_robot_side_whoever_stalls_its_output(kind: str, mode: str) -> None:
     control, view = (f"tcp://127.0.0.1:{port}" for port in free_ports(2))
     arguments = [f"--connect={control}", f"--view-connect={view}", "--device=simulated"]

@@ -1,4 +1,4 @@
-"""The two real processes over loopback sockets: clean ends, crashes, and either side starting first."""
+"""The two real processes over loopback sockets: clean ends and crashes."""
 
 import json
 import os
@@ -12,7 +12,6 @@ import pytest
 
 from common.errors import ConfigurationError
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.experiments.faults.first_side import free_ports
 
 pytestmark = pytest.mark.processes
 
@@ -118,16 +117,6 @@ def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:
         _, complaint = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 1
     assert "Traceback" not in complaint
-
-
-def test_the_operator_side_may_start_first() -> None:
-    control, view = free_ports(2)
-    listening = {"control": f"tcp://127.0.0.1:{control}", "view": f"tcp://127.0.0.1:{view}"}
-    with operator(listening) as operator_side:
-        assert operator_side.wait_for("status", LIMIT_S)["link"] == "waiting for the robot side"
-        arguments = [f"--bind={listening['control']}", f"--view-bind={listening['view']}"]
-        with SideProcess("robot_side.main", "robot", arguments):
-            wait_for_link(operator_side)
 
 
 # Ends at a signal as the interpreter itself does before any of our handlers stands.

@@ -1,7 +1,6 @@
 """`feelahead calibrate`, and the operator side that uses what it has stored."""
 
 import math
-import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -127,17 +126,6 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
         command(["calibrate", "--out", out])
     assert handle.now_s == 0.0
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_pipe_where_it_is_kept_is_refused_before_anything_is_measured(handle: PlayedHandle) -> None:
-    path = calibration_path(ADDRESS)
-    path.parent.mkdir(parents=True)
-    os.mkfifo(path)
-    with pytest.raises(ConfigurationError, match="is no regular file"):
-        command(["calibrate"])
-    assert handle.now_s == 0.0
-    assert handle.closed == handle.times_opened > 0
-    assert path.is_fifo()
 
 
 # The operator side

@@ -1,4 +1,4 @@
-"""The commands on recordings: bad input in one line, and a real demo that is computed anew to the same bits."""
+"""The commands on recordings: bad input in one line, and a real demo that is computed again to the same bits."""
 
 import json
 import subprocess

@@ -29,7 +29,7 @@ def wait_until(
 
 
 def stays(otherwise: str, condition: Callable[[], bool], for_s: float = 1.0) -> None:
-    """AssertionError with the text `otherwise` unless `condition` holds for so long."""
+    """AssertionError with the text `otherwise` unless `condition` holds for `for_s`."""
     end_s = time.monotonic() + for_s
     while time.monotonic() < end_s:
         assert condition(), otherwise
