@@ -1,14 +1,179 @@
+"""Who is heard, who is told and who is hung up on: a state machine over the robot side's end, and what it rests on."""
+
+from collections import Counter, defaultdict
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from common.clock import MonotonicClock
+from common.sockets import robot as robot_sockets
 from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
+from common.sockets.crowd import Crowd
+from common.sockets.robot import RobotSockets
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
+
+LIMIT_PER_S = 8
+"""In the machine, so that floods are short."""
+KEYS = ("anna's", "ben's", "carl's")
+DESCRIPTORS = range(10_000, 10_003)
+
+
+class Clock(MonotonicClock):
+    def __init__(self) -> None:
+        self.second = 0
+
+    def now(self) -> float:
+        return float(self.second)
+
+
+class Frame:
+    """One that came by a connection."""
+
+    def __init__(self, key: str, descriptor: int) -> None:
+        self._properties: dict[Any, Any] = {"User-Id": key, robot_sockets.zmq.SRCFD: descriptor}
+        self.bytes = b"payload"
+
+    def get(self, name: Any) -> Any:
+        return self._properties[name]
+
+
+class Connections(RuleBasedStateMachine):
+    """Peers with keys that come, speak, flood, leave and are revoked, while descriptors are used again.
+
+    What the gates know of a connection comes late, as from ZeroMQ: `unseen` holds it.
+    """
+
+    @initialize()
+    def start(self) -> None:
+        self.patch = pytest.MonkeyPatch()
+        self.allowed = dict.fromkeys(KEYS, "")
+        self.robot = RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S)
+        self.clock = Clock()
+        self.patch.setattr(self.robot, "_clock", self.clock)
+        keys = SimpleNamespace(allowed=SimpleNamespace(names=self.allowed))
+        self.patch.setattr(self.robot, "_keys", keys)
+        self.patch.setattr(self.robot, "_watch_connections", lambda: None)
+        self.patch.setattr(robot_sockets, "_shut_down", self.hang_up)
+        self.patch.setattr(robot_sockets, "PEER_LIMIT_PER_S", LIMIT_PER_S)
+        self.patch.setattr(self.robot, "send_frames", lambda _, frames, limit: self.told.append(frames[0]) or True)
+        self.patch.setattr(self.robot._inbox, "read", lambda: self.arriving)
+        self.crowd = self.robot._gates[0].crowd
+        self.robot._all_seen = True
+        self.arriving: list[Any] = []
+        self.told: list[bytes] = []
+        self.owners: dict[int, bytes] = {}
+        self.keys: dict[bytes, str] = {}
+        self.unseen: list[tuple[str, int]] = []
+        self.speaking: bytes = b""
+        self.heard: dict[bytes, Counter[int]] = defaultdict(Counter)
+
+    def hang_up(self, descriptor: int) -> None:
+        assert self.owners.get(descriptor) == self.speaking, "somebody else's connection was ended"
+        self.go(descriptor)
+
+    def go(self, descriptor: int) -> None:
+        del self.owners[descriptor]
+        self.unseen.append(("went", descriptor))
+        self.robot._all_seen = False
+
+    @rule(data=st.data(), key=st.sampled_from(KEYS))
+    def come(self, data: st.DataObject, key: str) -> None:
+        free = [descriptor for descriptor in DESCRIPTORS if descriptor not in self.owners]
+        if free:
+            descriptor = data.draw(st.sampled_from(free))
+            name = b"peer%d" % len(self.keys)
+            self.owners[descriptor], self.keys[name] = name, key
+            self.unseen.append(("came", descriptor))
+            self.robot._all_seen = False
+
+    @precondition(lambda self: self.owners)
+    @rule(data=st.data())
+    def leave(self, data: st.DataObject) -> None:
+        self.go(data.draw(st.sampled_from(sorted(self.owners))))
+
+    @rule()
+    def the_gates_hear_of_all(self) -> None:
+        for event, descriptor in self.unseen:
+            if event == "came":
+                self.crowd.came(descriptor, self.clock.now())
+            else:
+                self.crowd.went(descriptor)
+        self.unseen.clear()
+        self.robot._all_seen = True
+
+    @rule(key=st.sampled_from(KEYS))
+    def allow_or_revoke(self, key: str) -> None:
+        if self.allowed.pop(key, None) is None:
+            self.allowed[key] = ""
+
+    @rule()
+    def a_second_passes(self) -> None:
+        self.clock.second += 1
+
+    @precondition(lambda self: self.keys)
+    @rule(data=st.data(), count=st.sampled_from([1, 3, LIMIT_PER_S + 1]), left=st.booleans())
+    def speak(self, data: st.DataObject, count: int, left: bool) -> None:
+        """Messages of one peer are read, who may have left since: then another one may have its descriptor."""
+        owned = {owner: descriptor for descriptor, owner in self.owners.items()}
+        names = sorted(set(self.robot._peers) - set(owned)) if left else sorted(owned)
+        if not names:
+            return
+        name = data.draw(st.sampled_from(names))
+        allowed = self.keys[name] in self.allowed
+        before = self.heard[name][self.clock.second]
+        self.speaking = name
+        descriptor = owned.get(name, self.robot._peers[name].descriptor if name in self.robot._peers else -1)
+        self.arriving = [[SimpleNamespace(bytes=name), Frame(self.keys[name], descriptor)]] * count
+        seen = not self.unseen
+        received = self.robot.receive()
+        assert received == [(name, b"payload")] * (min(count, max(0, LIMIT_PER_S - before)) if allowed else 0)
+        self.heard[name][self.clock.second] += len(received)
+        if seen and not left and len(received) < count:
+            assert descriptor not in self.owners, "who floods or was revoked keeps its connection"
+
+    @precondition(lambda self: self.keys)
+    @rule(data=st.data())
+    def tell(self, data: st.DataObject) -> None:
+        name = data.draw(st.sampled_from([*sorted(self.robot._peers), b"nobody"]))
+        self.told.clear()
+        dropped = self.robot.dropped
+        sent = self.robot.send(name, b"stiffness")
+        may = name in self.robot._peers and self.keys[name] in self.allowed
+        assert (sent, self.told) == ((True, [name]) if may else (False, []))
+        assert self.robot.dropped == dropped + (not may)
+
+    @invariant()
+    def the_crowd_is_bounded(self) -> None:
+        assert len(self.robot._peers) <= robot_sockets._REMEMBERED_PEERS
+
+    def teardown(self) -> None:
+        if hasattr(self, "patch"):
+            self.patch.undo()
+            self.robot.close()
+
+
+TestConnections = Connections.TestCase
+TestConnections.settings = settings(derandomize=True, deadline=None, max_examples=120, stateful_step_count=30)
+
+
+def test_five_thousand_messages_a_second_are_heard_of_each_peer(monkeypatch: pytest.MonkeyPatch) -> None:
+    with RobotSockets(EPHEMERAL) as robot:
+        monkeypatch.setattr(robot, "_clock", Clock())
+        frames = [[SimpleNamespace(bytes=b"peer"), Frame("", -1)]] * 5100
+        monkeypatch.setattr(robot._inbox, "read", lambda: frames)
+        assert len(robot.receive()) == 5000
+        assert robot.flooding == 100
+
+
+# Within a tick
 
 
 def admitted(admission: Admission, *peers: bytes, operator: bytes | None = b"operator") -> list[bytes]:
     return [peer for peer, _ in admission.admitted([(peer, b"") for peer in peers], operator)]
-
-
-def test_the_operator_is_always_heard() -> None:
-    admission = Admission()
-    assert admitted(admission, *[b"operator"] * 100) == [b"operator"] * 100
-    assert admission.unread == 0
 
 
 def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_strangers() -> None:
@@ -16,6 +181,7 @@ def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_stran
     seen = admitted(admission, *[b"flood"] * 1000, b"observer", b"operator", *[b"flood"] * 1000, b"operator")
     assert seen == [b"flood"] * EACH_OTHER_PER_TICK + [b"observer", b"operator", b"operator"]
     assert admission.unread == 2000 - EACH_OTHER_PER_TICK
+    assert admitted(Admission(), *[b"operator"] * 100, operator=None) == [b"operator"] * EACH_OTHER_PER_TICK
 
 
 def test_a_crowd_of_strangers_is_bounded_as_a_whole_in_each_tick() -> None:
@@ -29,6 +195,59 @@ def test_a_crowd_of_strangers_is_bounded_as_a_whole_in_each_tick() -> None:
     assert admission.unread == 3 * (200 - OTHERS_PER_TICK)
 
 
-def test_without_an_operator_everybody_is_a_stranger() -> None:
-    admission = Admission()
-    assert admitted(admission, *[b"operator"] * 100, operator=None) == [b"operator"] * EACH_OTHER_PER_TICK
+# At one port
+
+
+LIMIT, INTRODUCED_S = 3, 2.0
+
+
+def surplus(crowd: Crowd, now_s: float) -> list[int]:
+    return list(crowd.surplus(now_s))
+
+
+def full(now_s: float = 0.0) -> Crowd:
+    crowd = Crowd(LIMIT, INTRODUCED_S)
+    for descriptor in range(LIMIT):
+        crowd.came(descriptor, now_s)
+    assert surplus(crowd, now_s) == []
+    return crowd
+
+
+def test_the_oldest_newcomer_goes_when_another_one_comes() -> None:
+    crowd = full()
+    crowd.came(10, 0.1)
+    crowd.came(11, 0.1)
+    assert surplus(crowd, 0.1) == [0, 1]
+    assert surplus(crowd, 0.1) == []
+    assert crowd.hung_up == 2
+
+
+def test_who_has_spoken_stays_and_so_does_who_has_been_there_for_long() -> None:
+    crowd = full()
+    crowd.spoke(1)
+    crowd.came(10, 1.9)
+    assert surplus(crowd, 1.9) == [0]
+    crowd.came(11, 2.1)
+    # 2 has been introduced by now, or it would have ended.
+    assert surplus(crowd, 2.1) == [10]
+
+
+def test_when_all_the_others_are_in_the_new_one_goes() -> None:
+    crowd = full()
+    crowd.came(10, 5.0)
+    assert surplus(crowd, 5.0) == [10]
+
+
+def test_who_went_leaves_room_and_its_number_stands_for_another_one() -> None:
+    crowd = full()
+    for descriptor in range(LIMIT):
+        crowd.spoke(descriptor)
+    crowd.went(1)
+    crowd.came(1, 1.0)
+    assert surplus(crowd, 1.0) == []
+    crowd.came(10, 1.1)
+    assert surplus(crowd, 1.1) == [1]
+    crowd.went(1)
+    crowd.went(1)
+    crowd.spoke(99)
+    assert surplus(crowd, 1.2) == []

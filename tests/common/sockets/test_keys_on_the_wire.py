@@ -196,6 +196,8 @@ def test_a_revoked_peer_that_keeps_its_connection_is_dropped_message_by_message(
         assert gets_in(robot, anna)
         robot.folder.revoke("anna")
         robot.sockets.refresh_keys()
+        [peer] = robot.sockets._peers
+        assert not robot.sockets.send(peer, b"stiffness")  # although its connection still stands
         clock = MonotonicClock()
         end_s = clock.now() + LIMIT_S
         while robot.sockets.revoked == 0 and clock.now() < end_s:
