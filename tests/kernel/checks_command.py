@@ -5,10 +5,10 @@ import subprocess
 import sys
 import threading
 
-from operator_side.dualsense.effects.official import Feedback
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import identity
+from tests.helpers.felt import feedback
 from tests.kernel.evdev import ABS_RZ, ABS_X, InputDevice
 from tests.kernel.kernel_view import seen_device
 from tests.kernel.plugged import Variant
@@ -44,8 +44,8 @@ def lives(variant: Variant) -> str:
             wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
         hidraw = view.hidraw()
         assert hidraw is not None
-        hidraw.write_bytes(build_output_report(OutputReport(r2=Feedback(position=3, strength=6)), transport))
-        said = "R2: Feedback, position 3, strength 6\n"
+        hidraw.write_bytes(build_output_report(OutputReport(r2=feedback(position=3, strength=6)), transport))
+        said = "R2: strengths 0 0 0 6 6 6 6 6 6 6\n"
         wait_until("it says the effect", lambda: said in lines, instead=lambda: lines)
         process.send_signal(signal.SIGTERM)
         code = process.wait(30.0)

@@ -19,7 +19,7 @@ from feelahead.commands.doctor.python_checks import EXTRAS, modules_of
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import sightings
 from operator_side.dualsense.hid.udev import RULE_FOLDERS
-from operator_side.dualsense.reports.attachments import Battery
+from operator_side.dualsense.reports.battery import Battery
 from operator_side.dualsense.reports.feature_report import Firmware
 from operator_side.dualsense.reports.input_report import parse_input_report
 

@@ -1,11 +1,13 @@
 """The Device port: what feelahead asks of a controller, real or simulated.
 
-Bytes only: input_report.py and output_report.py know what is in them.
+Input reports come as bytes, to be read by input_report.py; what to do goes as a value.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
+
+from operator_side.dualsense.reports.output_report import OutputReport
 
 
 class Device(Protocol):
@@ -20,8 +22,8 @@ class Device(Protocol):
         """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
         ...
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Send an output report; ValueError, and nothing sent, for one that output_report.py cannot read."""
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Have the controller do what `output` sets; ValueError, and nothing sent, for an effect never to be sent."""
         ...
 
     def close(self) -> None:

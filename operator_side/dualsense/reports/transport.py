@@ -58,9 +58,7 @@ def transport_of_input(report: bytes) -> Transport:
 
 def is_simple_report(report: bytes) -> bool:
     """A Bluetooth input report of the simple mode: sticks, triggers and buttons only."""
-    return (
-        bool(report) and report[0] == SIMPLE_REPORT_ID and len(report) in (SIMPLE_REPORT_LENGTH, PADDED_REPORT_LENGTH)
-    )
+    return report[:1] == b"\x01" and len(report) in (SIMPLE_REPORT_LENGTH, PADDED_REPORT_LENGTH)
 
 
 def described(report: bytes) -> str:
