@@ -45,12 +45,12 @@ class OpenController:
 
     device: Device
     name: str
-    """For people: what it is and how it is connected."""
+    """Model and transport, for people."""
     address: str | None = None
-    """Its own, "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not tell."""
+    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
     path: bytes | None = None
-    """Where the system has it; None for what is no hardware."""
+    """Device node; None without hardware."""
     release: bytes = b""
-    """The output report, as it goes over the wire, that takes every effect off; for the watchdog."""
+    """Output report, ready for the wire, that takes every effect off; for the watchdog."""
     stalls: Callable[[float], bool] = _never_stalls
     """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""

@@ -10,7 +10,7 @@ _FULLEST: Final = 10
 
 
 class BatteryState(Enum):
-    """What the battery is doing; the faults are those that Linux hid-playstation names."""
+    """Charging state; the faults are those that Linux hid-playstation names."""
 
     DISCHARGING = "discharging"
     CHARGING = "charging"
@@ -34,7 +34,7 @@ _CODES: Final = {state: code for code, state in _STATES.items()} | {BatteryState
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """How full the battery is, and what it is doing."""
+    """Charge and charging state."""
 
     fraction: Share | None = 1.0
     """0 to 1 in steps of a tenth, the middle of each; None when the controller reports a fault instead."""

@@ -1,4 +1,4 @@
-"""What one input report says of the controller, in units a program can use."""
+"""The controller's state by one input report, in units that a program can use."""
 
 from dataclasses import dataclass
 from enum import Enum

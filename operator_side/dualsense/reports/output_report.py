@@ -1,8 +1,8 @@
 """Output reports, values to bytes and back: USB's 0x02, Bluetooth's 0x31.
 
-A report has a flag for each part of the controller that it sets; what has no flag stays as it is. Only the flags
-of what is asked for are ever set here, so that the lights and the mute key stay the system driver's but for a warning,
-and the sound whosever it is. Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
+A report has a flag for each part of the controller that it sets; a part without its flag stays as it is. Only the flags
+of the parts that `OutputReport` sets are set here: the other lights, the mute key and the sound stay the system's.
+Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ Color = tuple[Byte, Byte, Byte]
 
 WARNING_LIGHT: Final[Color] = (255, 0, 0)
 USUAL_LIGHT: Final[Color] = (0, 0, 128)
-"""What Linux hid-playstation sets it to: what it shows once we have changed it and do so no more."""
+"""The color that Linux hid-playstation sets; we set it again after a warning."""
 
 _COMMON_LENGTH: Final = 47
 _USB_MAX_LENGTH: Final = 64  # some programs pad it to the length of an input report
@@ -79,7 +79,7 @@ class OutputReport:
         return OutputReport(*(old if new is None else new for new, old in pairs))
 
     def change_from(self, before: "OutputReport") -> "OutputReport":
-        """The parts of this one that `before` does not set alike; the others are None."""
+        """The parts of this one that differ from those of `before`; the others are None."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return OutputReport(*(None if new == old else new for new, old in pairs))
 
@@ -161,7 +161,7 @@ def parse_output_report(report: bytes) -> OutputReport:
 
 
 def transport_of_output(report: bytes) -> Transport:
-    """Tell by an output report's id and length what it is for; RemoteProtocolError for any other id or length."""
+    """Tell the transport by the report's id and length; RemoteProtocolError for any other id or length."""
     usb, bluetooth = OUTPUT_FRAMING[Transport.USB], OUTPUT_FRAMING[Transport.BLUETOOTH]
     if report and report[0] == usb.report_id and usb.length <= len(report) <= _USB_MAX_LENGTH:
         return Transport.USB

@@ -123,7 +123,7 @@ class SimulatedDualSense:
         if pressed != self._held.pressed:
             self._held = replace(self._held, pressed=pressed)
 
-    # What it does
+    # State
 
     @property
     def travel(self) -> tuple[float, float]:
@@ -158,7 +158,7 @@ class SimulatedDualSense:
     # The cable, or the radio
 
     def unplug(self) -> None:
-        """Be gone: whatever is asked of it raises DeviceError. It forgets what it was told (assumed)."""
+        """Be gone: every other call raises DeviceError. All effects are forgotten (assumed)."""
         self._plugged_in = False
         self._start()
 

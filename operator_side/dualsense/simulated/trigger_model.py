@@ -1,8 +1,7 @@
 """A finger on an adaptive trigger, as mechanics: where it comes to rest, and how fast it gets there.
 
-Travel here is mechanical, 0 at rest to 1 at the stop. Every force is an assumption of this model, chosen so
-that a steadily pressing finger feels the whole range of effects: no public measurement of the DualSense's
-trigger forces exists.
+Travel here is mechanical, 0 at rest to 1 at the stop. Every force is an assumption: no public measurement of the
+DualSense's trigger forces exists. A steadily pressing finger feels the whole range of effects.
 """
 
 import math
@@ -12,7 +11,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, A
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 
 SPRING_PRELOAD_N: Final = 0.5
-"""What it takes to move the trigger at all (assumed)."""
+"""Force at which the trigger begins to move (assumed)."""
 SPRING_RISE_N: Final = 4.0
 """How much more it takes at the end of the travel, growing linearly (assumed)."""
 STRENGTH_STEP_N: Final = 0.25
@@ -20,8 +19,8 @@ STRENGTH_STEP_N: Final = 0.25
 FINGER_TIME_CONSTANT_S: Final = 0.04
 """How fast a finger gets to where its force balances (assumed)."""
 NORMAL_FINGER_FORCE_N: Final = 3.7
-"""A normal pull (assumed): it rests at 80 % of the travel against the bare spring, which the controller reports
-as full, and at 30 %, reported as 40 %, against the strongest effect: it overcomes any stiffness."""
+"""A normal pull (assumed). Against the bare spring it rests at 80 % of the travel, which is reported as full. Against
+the strongest effect it rests at 30 %, reported as 40 %: it overcomes any stiffness."""
 
 
 def equilibrium_travel(
@@ -53,12 +52,12 @@ def zone_of(travel: float) -> int:
 class SimulatedTrigger:
     """A trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
 
-    The finger's force and the effect are constant between the calls that set them, so that `advance` is
-    exact: one long step and many short ones agree to rounding.
+    Force and effect are constant between the calls that set them. `advance` is exact: one long step and many short ones
+    agree to rounding.
     """
 
     def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
-        """`strength_step_n`: what one strength resists; 0 for a trigger whose effects are told and not felt."""
+        """`strength_step_n`: resistance of one strength; with 0 effects are shown and not felt."""
         self.effect: AnyEffect = Off()
         """The effect in force; `set_effect` changes it."""
         self.travel = 0.0

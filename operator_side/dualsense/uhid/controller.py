@@ -1,4 +1,4 @@
-"""A simulated controller offered to Linux through /dev/uhid: what it says to the kernel, still without I/O."""
+"""A simulated controller offered to Linux through /dev/uhid: its side of the protocol, without I/O."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -44,7 +44,7 @@ class OfferedController(Protocol):
 
 
 def identity(transport: Transport = Transport.USB, model: Model = Model.DUALSENSE, unique_id: str = "") -> UhidIdentity:
-    """What the kernel is told of a controller on USB or on Bluetooth."""
+    """The identity of a controller on USB or on Bluetooth, for the kernel."""
     bluetooth = transport is Transport.BLUETOOTH
     maker = "" if bluetooth else "Sony Interactive Entertainment "
     return UhidIdentity(

@@ -15,7 +15,7 @@ from msgspec import Meta
 from common.limits import check_limits
 
 EVENT_LENGTH: Final = 4380
-"""sizeof(struct uhid_event), the end of its union padded to 8 bytes; what to ask for with each read."""
+"""sizeof(struct uhid_event), padded to 8 bytes; the length to ask for with each read."""
 REPORT_MAX_LENGTH: Final = 4096
 BUS_USB: Final = 0x03
 BUS_BLUETOOTH: Final = 0x05
@@ -56,7 +56,7 @@ _SET_REPLY = struct.Struct("=IIH")
 
 @dataclass(frozen=True, slots=True)
 class UhidIdentity:
-    """What the kernel is told of a device when it is created."""
+    """Identity of a device, for the kernel."""
 
     name: Annotated[str, Meta(max_length=127)]
     vendor_id: HalfWord

@@ -67,7 +67,7 @@ class SimulatedSystem:
         self.clock = VirtualClock(1.0)
         self.devices: dict[bytes, SimulatedDualSense] = {}
         self.failing = 0
-        """So many transfers to any controller will fail."""
+        """Number of transfers, to any controller, that will fail."""
 
     def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:
         """Hand an output report over; False for a transfer that failed."""
@@ -106,7 +106,7 @@ class StallingWrites:
         return self._waiting is not None and now_s - self._since_s > STALL_S
 
     def waits_since(self, now_s: float) -> float:
-        """How long a write has waited; 0 for none."""
+        """Seconds for which a write has waited; 0 for none."""
         return 0.0 if self._waiting is None else max(now_s - self._since_s, 1e-9)
 
     def read(self, now_s: float) -> bytes | None:

@@ -1,4 +1,4 @@
-"""A controller that comes and goes, in virtual time: who is told what, and that no trigger is left stiff."""
+"""A controller that comes and goes, in virtual time: notices, looks, and no trigger left stiff."""
 
 from dataclasses import dataclass, field
 
@@ -69,7 +69,7 @@ class FakeDevice:
 
 @dataclass
 class FakeSearch:
-    """What the next look will find."""
+    """A search whose next result is chosen."""
 
     result: OpenController | DeviceError | None = None
     looks: list[str | None] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""The simulated controller: its finger's mechanics, its reports in time, its modes, the cable, and what it is told."""
+"""The simulated controller: its finger's mechanics, its reports in time, its modes, the cable, and commands."""
 
 import math
 from collections.abc import Callable
@@ -201,7 +201,7 @@ def test_a_pull_is_full_when_free_and_less_as_an_effect_gets_stronger_or_begins_
 @given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))
 @settings(derandomize=True, deadline=None, max_examples=40)
 def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[int, ...], int, bool]]) -> None:
-    """The same hands and writes, read once a phase or 20 times a report: the same travel and report."""
+    """Read once a phase or 20 times a report, travel and report are the same."""
     coarse, fine = SimulatedDualSense(), SimulatedDualSense()
     tick = 0
     for device in (coarse, fine):
@@ -219,12 +219,12 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
         assert coarse.travel == pytest.approx(fine.travel, abs=1e-11)
 
 
-# What it is told
+# Commands
 
 
 @TRANSPORTS
 def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
-    """By value as by the wire."""
+    """A value and a report on the wire do the same."""
     by_value, by_wire = SimulatedDualSense(transport), SimulatedDualSense(transport)
     third = MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0))
     for number, (output, l2, r2) in enumerate(
