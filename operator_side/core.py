@@ -18,6 +18,7 @@ from common.protocol.session import OWNING, SessionState
 from common.statistics import RunningStatistics
 from operator_side.commanding import STOPPING, StopButton, motion_command
 from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.feel.blindness import Blindness, Sight
 from operator_side.feel.haptics import Haptics
 from operator_side.feel.rendering import RenderingSettings
@@ -81,8 +82,7 @@ class OperatorSide:
         self._blindness = Blindness()
         self._standing = Standing()
         self._intent: OperatorIntent | None = None
-        self._intent_s = 0.0
-        self.stiffness_s = 0.0
+        self._intent_s = self.stiffness_s = 0.0
         self._hello_s = -math.inf
         self._screen_order = (-1, -1)
         self._lost_s: float | None = None
@@ -232,7 +232,7 @@ class OperatorSide:
             self._lost_s = None
         return self._lost_s is not None
 
-    def output_report(self, now_s: float) -> bytes | None:
+    def output_report(self, now_s: float) -> OutputReport | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait."""
         self._look(now_s)
         felt, intent = self.stiffness, self._present_intent(now_s)

@@ -14,6 +14,7 @@ from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
 from operator_side.commanding import StopButton
 from operator_side.core import OperatorSide
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 
@@ -72,7 +73,7 @@ class RecordedOperatorSide(OperatorSide):
         self._note((Kind.MOTION, now_s, payloads))
         return payloads
 
-    def output_report(self, now_s: float) -> bytes | None:
+    def output_report(self, now_s: float) -> OutputReport | None:
         """As the core's."""
         self._now_s = now_s
         report = super().output_report(now_s)
@@ -106,7 +107,8 @@ class OperatorEncoder:
             return now_s, b"".join((entry(kind, now_s), *sent))
         if kind == Kind.OUTPUT:
             asked = entry(kind, now_s)
-            return now_s, asked if content is None else asked + entry(Kind.WRITTEN, now_s, content)
+            written = b"" if content is None else entry(Kind.WRITTEN, now_s, build_output_report(content))
+            return now_s, asked + written
         if kind == Kind.RECEIVED:
             return now_s, entry(kind, now_s, _NOBODY, content)
         if kind == Kind.SEEN:

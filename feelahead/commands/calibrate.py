@@ -23,7 +23,7 @@ from operator_side.dualsense.hid.finding import find_controller
 from operator_side.dualsense.hid.port import Device, OpenController
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.simulated_person.calibrating_hands import CalibratingHands
 
@@ -108,7 +108,7 @@ def _measure(
     """Feed the procedure until it is done; False when it was stopped. CalibrationError and DeviceError say why not."""
     start_s = heard_s = clock.now()
     # An effect that somebody left on would count as travel that cannot be reached.
-    device.write(build_output_report(RELEASED), start_s)
+    device.write(RELEASED, start_s)
     while procedure.step is not Step.DONE:
         if stop.is_set:
             return False

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import tyro
@@ -12,7 +12,7 @@ from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.limits import check_limits
-from operator_side.dualsense.effects.official import AnyEffect
+from operator_side.dualsense.effects.official import AnyEffect, Off, OtherEffect
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import INPUT_REPORT_PERIOD_S, SimulatedDualSense
@@ -120,9 +120,9 @@ class _Narrated:
         """Pass on the controller's own answer."""
         return self._controller.get_feature(report_id)
 
-    def write(self, report: bytes, now_s: float) -> None:
+    def take_report(self, report: bytes, now_s: float) -> None:
         """Pass the report to the controller, and say the changes."""
-        self._controller.write(report, now_s)
+        self._controller.take_report(report, now_s)
         told = self._told()
         for part, doing in told.items():
             if doing != self._shown[part]:
@@ -139,8 +139,6 @@ class _Narrated:
             "lightbar": "as it was"
             if output.lightbar is None
             else "red {}, green {}, blue {}".format(*output.lightbar),
-            "player lights": "as they were" if output.player_leds is None else f"{output.player_leds:05b}",
-            "mute light": "as it was" if output.mute_led is None else output.mute_led.name.lower(),
         }
 
 
@@ -153,6 +151,7 @@ def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
 
 
 def described(effect: AnyEffect) -> str:
-    """An effect for people: "Feedback, position 3, strength 6"."""
-    values = (f"{field.name.replace('_', ' ')} {getattr(effect, field.name)}" for field in fields(effect))
-    return ", ".join([type(effect).__name__, *values])
+    """An effect for people: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or the bytes of one that feelahead never sends."""
+    if isinstance(effect, OtherEffect):
+        return f"another effect, {effect.encoded.hex(' ')}"
+    return "Off" if effect == Off() else f"strengths {' '.join(map(str, effect.zone_strengths))}"

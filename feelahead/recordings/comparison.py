@@ -151,10 +151,7 @@ def _report_difference(first: bytes, second: bytes) -> tuple[float, float]:
         one, other = parse_output_report(first), parse_output_report(second)
     except RemoteProtocolError:
         return math.inf, 0.0
-    if _without_effects(one) != _without_effects(other) or (one.l2 is None, one.r2 is None) != (
-        other.l2 is None,
-        other.r2 is None,
-    ):
+    if _without_strengths(one) != _without_strengths(other):
         return math.inf, 0.0
     apart = [0.0]
     for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
@@ -163,5 +160,5 @@ def _report_difference(first: bytes, second: bytes) -> tuple[float, float]:
     return max(apart), 0.0
 
 
-def _without_effects(report: OutputReport) -> tuple[object, ...]:
-    return report.rumble, report.lightbar, report.player_leds, report.mute_led, report.trigger_power_reduction
+def _without_strengths(report: OutputReport) -> tuple[object, ...]:
+    return report.rumble, report.lightbar, report.l2 is None, report.r2 is None

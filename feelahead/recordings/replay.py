@@ -15,6 +15,7 @@ from common.recording.reading import Recording
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
 from operator_side.assembly import build_operator_side
 from operator_side.core import OperatorSide
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
@@ -132,7 +133,7 @@ def replay_operator(recording: Recording) -> Comparison:
             case Kind.OUTPUT:
                 _compare_rest(compared, written, report=True)
                 if (report := core.output_report(now_s)) is not None:
-                    written.append(report)
+                    written.append(build_output_report(report))
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
                 compared.take(payload, sent.popleft() if sent else None)

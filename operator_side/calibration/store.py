@@ -16,7 +16,7 @@ from typing import Any, Final
 from common.errors import ConfigurationError
 from common.files.toml_file import read_toml
 from common.files.user_folders import configuration_folder
-from operator_side.dualsense.reports.address import checked_address
+from operator_side.dualsense.reports.feature_report import checked_address
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _VERSION: Final = 1

@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, build_output_report
+from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
@@ -67,7 +67,7 @@ class Haptics:
 
     def output_report(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
-    ) -> bytes | None:
+    ) -> OutputReport | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait.
 
         felt: the newest field, None while there is none or the arm is not armed. pulled: as TriggerRendering's.
@@ -86,7 +86,7 @@ class Haptics:
         if shown is None:
             return None
         self._written, self.writes = shown, self.writes + 1
-        return build_output_report(shown if before is None else shown.change_from(before))
+        return shown if before is None else shown.change_from(before)
 
     def _displacement(self, felt: StiffnessUpdate, now_s: float) -> Displacement | None:
         """δ and w by our own commands under way, from where the gripper was when `felt` was sent."""

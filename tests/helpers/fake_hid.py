@@ -8,9 +8,7 @@ from operator_side.dualsense.hid.device import HidHandle
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
-    CALIBRATION_ID,
     FIRMWARE_ID,
-    CalibrationReport,
     Firmware,
     build_address,
 )
@@ -19,15 +17,6 @@ from operator_side.dualsense.reports.transport import Transport
 
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
-CALIBRATION = CalibrationReport(
-    gyro_bias=(1, -2, 3),
-    gyro_plus=(8861, 8800, 8900),
-    gyro_minus=(-8861, -8800, -8900),
-    speed_plus=540,
-    speed_minus=540,
-    acceleration_plus=(8192, 8200, 8180),
-    acceleration_minus=(-8192, -8180, -8200),
-)
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
@@ -85,7 +74,6 @@ class FakeHandle:
             raise OSError("read error")
         report = bytearray(
             {
-                CALIBRATION_ID: CALIBRATION.build(self.transport),
                 ADDRESS_ID: build_address(self.address, self.transport),
                 FIRMWARE_ID: FIRMWARE.build(self.transport),
             }[report_num]

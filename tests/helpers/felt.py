@@ -1,4 +1,4 @@
-"""What a robot side may say is ahead: fields that tests need often."""
+"""Fields that a robot side may send, and effects that they become: what tests need often."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ import msgspec
 
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, TriggerField, Ways
 from common.protocol.uniform_field import FAR_M, uniform_field
+from operator_side.dualsense.effects.official import MultiPositionFeedback
 
 
 def ways(*metres: float) -> Ways:
@@ -26,3 +27,8 @@ def felt(
     return StiffnessUpdate(
         header, uniform_field(l2), uniform_field(r2), speed_m_s=0.0, horizon_m=FAR_M, rumble=rumble, state=state
     )
+
+
+def feedback(position: int, strength: int) -> MultiPositionFeedback:
+    """One strength from a zone to the end of the travel."""
+    return MultiPositionFeedback((0,) * position + (strength,) * (10 - position))

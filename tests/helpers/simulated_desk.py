@@ -10,7 +10,7 @@ import msgspec
 from common.protocol.messages import Header, Telemetry, Vector3
 from operator_side.dualsense.effects.official import Off, TriggerEffect
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, Stick
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -130,7 +130,7 @@ class Desk:
         self.tell(OutputReport(l2=l2 or Off(), r2=r2))
 
     def tell(self, output: OutputReport) -> None:
-        self.device.write(build_output_report(output), self.now_s)
+        self.device.write(output, self.now_s)
 
     def _frames(self, screen: Telemetry | None) -> Iterator[Telemetry | None]:
         sequence = self.ticks

@@ -57,7 +57,7 @@ ARROWS = """
         common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled
         robot_side/enlargement robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
 
-    operator_side/dualsense/effects: common
+    operator_side/dualsense/effects:
     operator_side/dualsense/reports: common operator_side/dualsense/effects
     operator_side/dualsense/hid: common operator_side/dualsense/reports
     operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports

@@ -9,6 +9,7 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
@@ -54,9 +55,9 @@ class Socket:
         self._check()
         return self.device.read(now_s)
 
-    def write(self, report: bytes, now_s: float) -> None:
+    def write(self, output: OutputReport, now_s: float) -> None:
         self._check()
-        self.device.write(report, now_s)
+        self.device.write(output, now_s)
         self.written_since_found.append(self.device.released)
 
     def close(self) -> None:

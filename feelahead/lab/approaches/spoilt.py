@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Literal
 
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 Spoil = Literal["nothing", "delayed", "swapped"]
@@ -21,11 +21,11 @@ class DelayedDualSense(SimulatedDualSense):
 
     def __init__(self, strength_step_n: float) -> None:
         super().__init__(strength_step_n=strength_step_n)
-        self._waiting: deque[tuple[float, bytes]] = deque()
+        self._waiting: deque[tuple[float, OutputReport]] = deque()
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Take an output report, to follow it later."""
-        self._waiting.append((now_s + SPOILING_DELAY_S, report))
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Take what it is told, to follow it later."""
+        self._waiting.append((now_s + SPOILING_DELAY_S, output))
         self._follow(now_s)
 
     def read(self, now_s: float) -> bytes | None:
@@ -41,24 +41,23 @@ class DelayedDualSense(SimulatedDualSense):
 class SwappedDualSense(SimulatedDualSense):
     """Feels L2 on R2 and R2 on L2."""
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Take an output report, with the triggers' effects exchanged."""
-        told = parse_output_report(report, unofficial=True)
-        super().write(build_output_report(replace(told, l2=told.r2, r2=told.l2)), now_s)
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Do what it is told with the triggers' effects exchanged."""
+        super().write(replace(output, l2=output.r2, r2=output.l2), now_s)
 
 
 class FullDualSense(SimulatedDualSense):
     """Resists with the strongest effect everywhere, whatever it is told."""
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Take an output report, and do something else."""
-        del report
-        super().write(build_output_report(_FULL), now_s)
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Do something else than it is told."""
+        del output
+        super().write(_FULL, now_s)
 
     def read(self, now_s: float) -> bytes | None:
         """As any controller; it resists from the first time on."""
         if self.released:
-            super().write(build_output_report(_FULL), now_s)
+            super().write(_FULL, now_s)
         return super().read(now_s)
 
 

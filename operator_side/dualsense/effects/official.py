@@ -1,106 +1,94 @@
-"""The official trigger effects as values: what may be asked of an adaptive trigger, and its exact eleven bytes.
+"""The trigger effects that feelahead commands, as values, and the exact eleven bytes of each.
 
-A value can encode no code but the four official ones, and in a file of their own the unofficial ones, so that the
-debug codes cannot be made at all. `zone_strengths` of each is what holds against the finger in the ten zones.
+A trigger's mechanical travel is divided into ten zones, 0 where the finger starts, each with a strength of 0 (none)
+to 8. A value encodes one of two official codes, so that no value can make a debug code. Sources: Nielk1's notes on
+trigger effects, revision 6; dualsensectl has the same.
 """
 
-from collections.abc import Callable
-from typing import Final, Literal, overload
+from dataclasses import dataclass
+from typing import ClassVar, Final, final
 
-from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects.effect_codes import FEEDBACK_CODE, OFF_CODE, VIBRATION_CODE, WEAPON_CODE
-from operator_side.dualsense.effects.resisting_effects import (
-    Feedback,
-    MultiPositionFeedback,
-    Off,
-    SlopeFeedback,
-    Weapon,
-)
-from operator_side.dualsense.effects.unofficial_effects import UNOFFICIAL_DECODERS, UnofficialEffect
-from operator_side.dualsense.effects.vibration_effects import MultiPositionVibration, Vibration
-from operator_side.dualsense.effects.zone_packing import (
-    EFFECT_LENGTH,
-    MAX_STRENGTH,
-    ZONE_COUNT,
-    one_step,
-    stray,
-    unpack_ends,
-    unpack_zones,
-)
-
-__all__ = [
-    "EFFECT_LENGTH",
-    "MAX_STRENGTH",
-    "ZONE_COUNT",
-    "AnyEffect",
-    "Feedback",
-    "MultiPositionFeedback",
-    "MultiPositionVibration",
-    "Off",
-    "SlopeFeedback",
-    "TriggerEffect",
-    "Vibration",
-    "Weapon",
-    "decode_effect",
-]
-
-TriggerEffect = Off | Feedback | MultiPositionFeedback | SlopeFeedback | Weapon | Vibration | MultiPositionVibration
-AnyEffect = TriggerEffect | UnofficialEffect
+ZONE_COUNT: Final = 10
+MAX_STRENGTH: Final = 8
+EFFECT_LENGTH: Final = 11
+"""Bytes of one encoded effect: the code and ten parameters."""
+DEBUG_CODES: Final = frozenset({0xFC, 0xFD, 0xFE})
+"""Never to reach a controller: they corrupt a trigger until it is reset."""
+_OFF_CODE: Final = 0x05
+_FEEDBACK_CODE: Final = 0x21
+COMMANDED_CODES: Final = frozenset({_OFF_CODE, _FEEDBACK_CODE})
+"""The codes that a report to a controller may hold."""
+_NO_ZONES: Final = (0,) * ZONE_COUNT
 
 
-@overload
-def decode_effect(encoded: bytes, *, unofficial: Literal[False] = False) -> TriggerEffect: ...
-@overload
-def decode_effect(encoded: bytes, *, unofficial: bool) -> AnyEffect: ...
-def decode_effect(encoded: bytes, *, unofficial: bool = False) -> AnyEffect:
-    """Read the eleven bytes that `encode` makes; whatever decodes, encodes to the same bytes again.
+@final
+@dataclass(frozen=True, slots=True)
+class Off:
+    """The trigger's own spring and nothing else."""
 
-    Where several values have the same bytes (a slope, a one-step profile) they decode to the simplest of them:
-    one step, then multi-position. `unofficial`: accept those effects, too. RemoteProtocolError for another length
-    or code, and for stray bits outside the packing.
-    """
-    if len(encoded) != EFFECT_LENGTH:
-        raise RemoteProtocolError(f"a trigger effect of {len(encoded)} bytes; valid: {EFFECT_LENGTH}")
-    code = encoded[0]
-    decoder: Callable[[bytes], AnyEffect] | None = _DECODERS.get(code)
-    if decoder is None and unofficial:
-        decoder = UNOFFICIAL_DECODERS.get(code)
-    if decoder is None:
-        valid = ", ".join(f"0x{known:02x}" for known in (*_DECODERS, *(UNOFFICIAL_DECODERS if unofficial else ())))
-        raise RemoteProtocolError(f"trigger effect code 0x{code:02x}; valid: {valid}")
-    try:
-        effect = decoder(encoded)
-    except ValueError as error:  # a field out of its range
-        raise stray(encoded) from error
-    if effect.encode() != encoded:
-        raise stray(encoded)
-    return effect
+    zone_strengths: ClassVar[tuple[int, ...]] = _NO_ZONES
+
+    def encode(self) -> bytes:
+        """The code and ten zeros."""
+        return bytes((_OFF_CODE,)).ljust(EFFECT_LENGTH, b"\0")
 
 
-def _decode_off(encoded: bytes) -> Off:
-    del encoded
-    return Off()
+@final
+@dataclass(frozen=True, slots=True)
+class MultiPositionFeedback:
+    """A resistance for each zone."""
+
+    zone_strengths: tuple[int, ...]
+    """Ten strengths, 0 to 8, the first for the zone where the finger starts; ten zeros encode as off."""
+
+    def __post_init__(self) -> None:
+        strengths = self.zone_strengths
+        try:
+            # Made at 1 kHz: `bytes` takes whole numbers only, and is quick.
+            valid = isinstance(strengths, tuple) and max(bytes(strengths)) <= MAX_STRENGTH
+        except (TypeError, ValueError):
+            valid = False
+        if not valid or len(strengths) != ZONE_COUNT:
+            raise ValueError(
+                f"zone_strengths = {strengths!r}; valid: a tuple of {ZONE_COUNT} whole numbers from 0 to {MAX_STRENGTH}"
+            )
+
+    def encode(self) -> bytes:
+        """The code, a mask of the zones with a strength, and in three bits a zone the strength less one."""
+        mask = fields = 0
+        for zone, strength in enumerate(self.zone_strengths):
+            if strength:
+                mask |= 1 << zone
+                fields |= (strength - 1) << (3 * zone)
+        if not mask:
+            return Off().encode()
+        parameters = mask.to_bytes(2, "little") + fields.to_bytes(4, "little")
+        return (bytes((_FEEDBACK_CODE,)) + parameters).ljust(EFFECT_LENGTH, b"\0")
 
 
-def _decode_feedback(encoded: bytes) -> Feedback | MultiPositionFeedback:
-    strengths, _ = unpack_zones(encoded)
-    simple = Feedback(*one_step(strengths))
-    return simple if simple.zone_strengths == strengths else MultiPositionFeedback(strengths)
+@final
+@dataclass(frozen=True, slots=True)
+class OtherEffect:
+    """An effect that another program told a virtual controller. It has no `encode`: it is shown and never sent."""
+
+    zone_strengths: ClassVar[tuple[int, ...]] = _NO_ZONES
+    """What holds against the finger is not simulated."""
+
+    encoded: bytes
 
 
-def _decode_weapon(encoded: bytes) -> Weapon:
-    return Weapon(*unpack_ends(encoded), encoded[3] + 1)
+TriggerEffect = Off | MultiPositionFeedback
+AnyEffect = TriggerEffect | OtherEffect
 
 
-def _decode_vibration(encoded: bytes) -> Vibration | MultiPositionVibration:
-    amplitudes, frequency_hz = unpack_zones(encoded)
-    simple = Vibration(*one_step(amplitudes), frequency_hz)
-    return simple if simple.zone_amplitudes == amplitudes else MultiPositionVibration(amplitudes, frequency_hz)
-
-
-_DECODERS: Final[dict[int, Callable[[bytes], TriggerEffect]]] = {
-    OFF_CODE: _decode_off,
-    FEEDBACK_CODE: _decode_feedback,
-    WEAPON_CODE: _decode_weapon,
-    VIBRATION_CODE: _decode_vibration,
-}
+def decode_effect(encoded: bytes) -> AnyEffect:
+    """Read the eleven bytes of an effect; `OtherEffect` for what no value here encodes to."""
+    if encoded[0] == _FEEDBACK_CODE:
+        mask, fields = int.from_bytes(encoded[1:3], "little"), int.from_bytes(encoded[3:7], "little")
+        zones = range(ZONE_COUNT)
+        effect: TriggerEffect = MultiPositionFeedback(
+            tuple((fields >> (3 * zone) & 7) + 1 if mask >> zone & 1 else 0 for zone in zones)
+        )
+    else:
+        effect = Off()
+    return effect if effect.encode() == encoded else OtherEffect(encoded)

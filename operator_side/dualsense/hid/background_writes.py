@@ -7,9 +7,9 @@ on a bad cable. Only the newest of what waits goes out, part by part: latest win
 import threading
 from typing import Final
 
-from common.errors import DeviceError, RemoteProtocolError
+from common.errors import DeviceError
 from operator_side.dualsense.hid.port import Device
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report, parse_output_report
+from operator_side.dualsense.reports.output_report import OutputReport
 
 CLOSE_TIMEOUT_S: Final = 0.3
 """A write that has not returned by then is left to itself; the watchdog releases the triggers."""
@@ -51,15 +51,8 @@ class BackgroundWrites:
         self._raise_failure()
         return self._device.read(now_s)
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Have it written soon; ValueError, and nothing sent, for one that output_report.py cannot read.
-
-        DeviceError when an earlier write has failed.
-        """
-        try:
-            output = parse_output_report(report)
-        except RemoteProtocolError as error:
-            raise ValueError(f"report: {error}") from error
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Have it written soon; DeviceError when an earlier write has failed."""
         self._raise_failure()
         with self._changed:
             self._waiting = output if self._waiting is None else output.following(self._waiting)
@@ -85,7 +78,7 @@ class BackgroundWrites:
                     return
                 self._written_since_s = now_s
             try:
-                self._device.write(build_output_report(output), now_s)
+                self._device.write(output, now_s)
             except Exception as error:  # raised again where it can be answered
                 self._failure = error
                 return

@@ -1,18 +1,16 @@
 """The controller as something that comes and goes: looks for one, loses it, finds it again.
 
-Without I/O: the search that opens a controller is an argument, and so is `now_s`. What follows from what is one
-table, as for the session.
+Without I/O: the search that opens a controller is an argument, and so is `now_s`.
 """
 
-from collections.abc import Mapping
-from enum import Enum, StrEnum
-from types import MappingProxyType
+from enum import StrEnum
 from typing import Final, Protocol
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
 from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import Guard
 from operator_side.dualsense.hid.search import Search
+from operator_side.dualsense.reports.output_report import OutputReport
 
 BEAT_PERIOD_S: Final = 0.05
 """From one sign of life for the watchdog to the next, while an effect is on."""
@@ -31,31 +29,6 @@ class ConnectionState(StrEnum):
     CONNECTED = "connected"
     LOST = "lost"
     """There was one."""
-
-
-class ConnectionEvent(Enum):
-    """What can happen to it."""
-
-    OPENED = "a look found and opened one"
-    NONE_FOUND = "a look found none"
-    REFUSED = "a look found one that cannot be opened"
-    GONE = "reading or writing failed"
-
-
-def _build() -> dict[tuple[ConnectionState, ConnectionEvent], ConnectionState]:
-    state, event = ConnectionState, ConnectionEvent
-    return {
-        (state.ABSENT, event.OPENED): state.CONNECTED,
-        (state.ABSENT, event.NONE_FOUND): state.ABSENT,
-        (state.ABSENT, event.REFUSED): state.ABSENT,
-        (state.CONNECTED, event.GONE): state.LOST,
-        (state.LOST, event.OPENED): state.CONNECTED,
-        (state.LOST, event.NONE_FOUND): state.LOST,
-        (state.LOST, event.REFUSED): state.LOST,
-    }
-
-
-TABLE: Final[Mapping[tuple[ConnectionState, ConnectionEvent], ConnectionState]] = MappingProxyType(_build())
 
 
 class Listener(Protocol):
@@ -108,11 +81,9 @@ class Connection:
         if isinstance(found, NoDriverError):
             raise found
         if isinstance(found, NoDeviceError):
-            self._handle(ConnectionEvent.NONE_FOUND)
             if self.state is not ConnectionState.LOST:  # that it is gone has been said
                 self._say_once(f"{found}; waiting for one")
         elif found is not None:
-            self._handle(ConnectionEvent.REFUSED)
             # The system gives permission a moment after the controller appears: once is no trouble yet.
             if str(found) == self._refused:
                 self._say_once(f"{found}; trying again until it works")
@@ -157,15 +128,15 @@ class Connection:
             self._lose(error, now_s)
             return None
 
-    def write(self, report: bytes, now_s: float) -> bool:
-        """Send an output report, if there is anybody to send it to; whether it went out."""
+    def write(self, output: OutputReport, now_s: float) -> bool:
+        """Tell the controller, if there is one; whether it went out."""
         if self._controller is None:
             return False
         if self._guard is not None and self._held and self._beat_s is None:
             self._beat_s = now_s  # before the effect is on: we may hang at once
             self._guard.beat()
         try:
-            self._controller.device.write(report, now_s)
+            self._controller.device.write(output, now_s)
         except DeviceError as error:
             self._lose(error, now_s)
             return False
@@ -194,7 +165,7 @@ class Connection:
             self._guard.hold(controller.path, controller.release)
         known, self._address = self._address, controller.address
         self._controller = controller
-        self._handle(ConnectionEvent.OPENED)
+        self.state = ConnectionState.CONNECTED
         self.found += 1
         self._said.clear()
         self._refused = None
@@ -202,7 +173,7 @@ class Connection:
         self._listener.controller_found(now_s)
 
     def _lose(self, error: DeviceError, now_s: float) -> None:
-        self._handle(ConnectionEvent.GONE)
+        self.state = ConnectionState.LOST
         self._next_look_s = now_s + LOOK_PERIOD_S
         self._say_once(
             f"{error}; until it is back nothing is sent to move the robot, which stops: then release the triggers and"
@@ -220,9 +191,6 @@ class Connection:
         # A controller that could not be released stays with the watchdog, which will try once more when we end.
         if self.released and self._guard is not None:
             self._guard.let_go()
-
-    def _handle(self, event: ConnectionEvent) -> None:
-        self.state = TABLE[self.state, event]
 
     def _say_once(self, text: str) -> None:
         if text not in self._said:

@@ -9,19 +9,13 @@ from common.errors import DeviceError, NoDriverError, RemoteProtocolError
 from operator_side.dualsense.hid.device_messages import INSTALL, gone, no_dualsense, not_opened, silent
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
-    CALIBRATION_ID,
     FEATURE_LENGTHS,
     FIRMWARE_ID,
     Firmware,
     parse_address,
 )
 from operator_side.dualsense.reports.input_report import is_input_report
-from operator_side.dualsense.reports.motion_sensors import NOMINAL_MOTION, MotionCalibration
-from operator_side.dualsense.reports.output_report import (
-    OutputReport,
-    build_output_report,
-    parse_output_report,
-)
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.reports.transport import Transport, transport_of_input
 
 Read = TypeVar("Read")
@@ -32,7 +26,6 @@ _FIRST_REPORT_MS: Final = 100
 _FIRST_REPORT_ATTEMPTS: Final = 5
 _FEATURE_ATTEMPTS: Final = 3
 """A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
-_SEQUENCES: Final = 16
 
 
 class HidHandle(Protocol):
@@ -112,7 +105,6 @@ class Identity:
     address: str | None
     """Its Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
     firmware: Firmware | None
-    motion: MotionCalibration
     first_report: bytes
     """The input report by which the transport was told."""
 
@@ -142,8 +134,6 @@ class HidDualSense:
         self._sequence = 0
         self._written = False
         self._released = True
-        self.bad_reports = 0
-        """Input reports of a wrong id, length or checksum that were met while looking for a good one."""
         self._told = OutputReport()
 
     @property
@@ -154,8 +144,8 @@ class HidDualSense:
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
 
-        One that no controller sends is passed over and counted (`bad_reports`) as long as there is a good one; else
-        the newest is returned as it is, and whoever parses it says what is wrong.
+        One that no controller sends is passed over as long as there is a good one; else the newest is returned as it
+        is, and parsing it says what is wrong.
         """
         del now_s  # a real controller has a clock of its own
         self._require_open()
@@ -168,27 +158,19 @@ class HidDualSense:
                 drained.append(report)
         except OSError as error:
             raise gone(str(error)) from error
-        for report in reversed(drained):
-            newest = bytes(report)
-            if is_input_report(newest):
-                return newest
-            self.bad_reports += 1
-        return bytes(drained[-1]) if drained else None
+        reports = [bytes(report) for report in reversed(drained)]
+        return next(filter(is_input_report, reports), reports[0] if reports else None)
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Send an output report, of whichever transport, in this controller's framing.
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Send an output report in this controller's framing; DeviceError when the controller is gone.
 
-        ValueError, and nothing sent, for bytes that parse_output_report refuses: this is the last gate before
-        the controller, and no debug effect code passes it. DeviceError when the controller is gone.
+        ValueError, and nothing sent, where build_output_report refuses: no debug effect code passes it.
         """
         del now_s
         self._require_open()
-        try:
-            output = parse_output_report(report)
-        except RemoteProtocolError as error:
-            raise ValueError(f"report: {error}") from error
+        report = self._packed(output)
         self._written, self._released = True, False
-        self._send(output)
+        _write(self._writing, report)
         self._told = output.following(self._told)
         self._released = self._told.releases
 
@@ -199,7 +181,7 @@ class HidDualSense:
         self._closed = True
         try:
             if self._written:
-                self._send(self._told.farewell)
+                _write(self._writing, self._packed(self._told.farewell))
                 self._released = True
         except DeviceError:
             pass  # it is gone: nothing more can be told to it
@@ -215,10 +197,10 @@ class HidDualSense:
         if self._closed:
             raise DeviceError("the controller is closed; open a new one")
 
-    def _send(self, output: OutputReport) -> None:
+    def _packed(self, output: OutputReport) -> bytes:
         report = build_output_report(output, self.identity.transport, self._sequence)
-        self._sequence = (self._sequence + 1) % _SEQUENCES
-        _write(self._writing, report)
+        self._sequence += 1
+        return report
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
@@ -272,12 +254,10 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
         transport = transport_of_input(first_report)
     except RemoteProtocolError as error:
         raise no_dualsense(path, str(error)) from error
-    motion = _feature(handle, CALIBRATION_ID, lambda report: MotionCalibration.parse(report, transport))
     return Identity(
         transport=transport,
         address=_feature(handle, ADDRESS_ID, lambda report: parse_address(report, transport)),
         firmware=_feature(handle, FIRMWARE_ID, lambda report: Firmware.parse(report, transport)),
-        motion=NOMINAL_MOTION if motion is None else motion,
         first_report=first_report,
     )
 

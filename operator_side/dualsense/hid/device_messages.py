@@ -52,5 +52,5 @@ def silent(path: bytes) -> DeviceError:
 
 
 def gone(reason: str) -> DeviceError:
-    """It was there a moment ago."""
+    """The controller was there a moment ago."""
     return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")

@@ -13,7 +13,7 @@ from operator_side.dualsense.reports.output_report import RELEASED, build_output
 from operator_side.dualsense.reports.transport import Transport
 
 LOOKS_FOR_THE_SAME: Final = 3
-"""So many looks in a row are for the controller from before alone; then another one will do."""
+"""Number of looks in a row for the controller from before alone; then another one will do."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
     """Open the controller of the address `preferred`, else the first; NoDeviceError and DeviceError say why none.
 
     A controller that is there on USB and on Bluetooth at once is one: USB is taken, the other way is left alone.
-    With a `preferred` one, another is taken only if `others` allows it and none refuses to be opened, for that may be
-    the one: the system gives permission a moment after a controller appears.
+    With a `preferred` one, another is taken only if `others` allows it and none refuses to be opened. That one may be
+    it: the system gives permission a moment after a controller appears.
     """
     seen = sightings(backend)
     if not seen:

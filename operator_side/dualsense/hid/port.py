@@ -1,11 +1,13 @@
 """The Device port: what feelahead asks of a controller, real or simulated.
 
-Bytes only: input_report.py and output_report.py know what is in them.
+Input reports come as bytes, to be read by input_report.py; what to do goes as a value.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
+
+from operator_side.dualsense.reports.output_report import OutputReport
 
 
 class Device(Protocol):
@@ -20,8 +22,8 @@ class Device(Protocol):
         """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
         ...
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Send an output report; ValueError, and nothing sent, for one that output_report.py cannot read."""
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Have the controller do what `output` sets; ValueError, and nothing sent, for an effect never to be sent."""
         ...
 
     def close(self) -> None:
@@ -43,12 +45,12 @@ class OpenController:
 
     device: Device
     name: str
-    """For people: what it is and how it is connected."""
+    """Model and transport, for people."""
     address: str | None = None
-    """Its own, "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not tell."""
+    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
     path: bytes | None = None
-    """Where the system has it; None for what is no hardware."""
+    """Device node; None without hardware."""
     release: bytes = b""
-    """The output report, as it goes over the wire, that takes every effect off; for the watchdog."""
+    """Output report, ready for the wire, that takes every effect off; for the watchdog."""
     stalls: Callable[[float], bool] = _never_stalls
     """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""

@@ -40,7 +40,7 @@ _BUTTON_BITS: Final = {
     Button.LEFT_PADDLE: 22,
     Button.RIGHT_PADDLE: 23,
 }
-"""Of the three bytes as one number, little-endian; the low nibble is the directional pad's hat."""
+"""Bit numbers in the three bytes as one little-endian number; the low nibble is the directional pad's hat."""
 
 
 def _axis(byte: int) -> float:
@@ -51,7 +51,7 @@ def _axis(byte: int) -> float:
 AXIS: Final = tuple(_axis(byte) for byte in range(256))
 """A stick's byte to -1 to 1."""
 AXIS_DOWN: Final = tuple(0.0 - _axis(byte) for byte in range(256))
-"""The same for a vertical axis: down is positive on the wire."""
+"""A stick's byte of a vertical axis to -1 to 1: down is positive on the wire."""
 TRAVEL: Final = tuple(byte / 255 for byte in range(256))
 """A trigger's byte to 0 to 1."""
 
@@ -63,7 +63,7 @@ def byte_of_axis(axis: float) -> int:
 
 @lru_cache(maxsize=4096)
 def pressed_of(code: int) -> frozenset[Button]:
-    """What is pressed by the three bytes as one number; hands hold few combinations, so they are remembered."""
+    """Decode the three bytes as one number; results are cached, as hands hold few combinations."""
     pressed = {button for button, bit in _BUTTON_BITS.items() if code >> bit & 1}
     hat = code & 0x0F
     return frozenset(pressed | _HAT_DIRECTIONS[hat] if hat < len(_HAT_DIRECTIONS) else pressed)

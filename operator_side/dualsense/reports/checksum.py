@@ -19,7 +19,6 @@ class Seed(IntEnum):
     OUTPUT = 0xA2
     FEATURE = 0xA3
     """A feature that was read."""
-    FEATURE_WRITE = 0x53
 
 
 _STARTS: Final = {seed: zlib.crc32(bytes([seed])) for seed in Seed}
@@ -38,16 +37,9 @@ def sealed(seed: Seed, content: bytes) -> bytes:
     return content + checksum(seed, content).to_bytes(CHECKSUM_LENGTH, "little")
 
 
-def is_sealed(seed: Seed, report: bytes) -> bool:
-    """The report ends in its checksum."""
-    return zlib.crc32(report, _STARTS[seed]) == _RESIDUE and len(report) > CHECKSUM_LENGTH
-
-
 def check(seed: Seed, report: bytes) -> None:
     """RemoteProtocolError for a report that does not end in its checksum."""
-    if not is_sealed(seed, report):
+    if zlib.crc32(report, _STARTS[seed]) != _RESIDUE or len(report) <= CHECKSUM_LENGTH:
         found = int.from_bytes(report[-CHECKSUM_LENGTH:], "little")
         valid = checksum(seed, report[:-CHECKSUM_LENGTH])
-        raise RemoteProtocolError(
-            f"{seed.name.lower().replace('_', ' ')} report: checksum 0x{found:08x}; valid: 0x{valid:08x}"
-        )
+        raise RemoteProtocolError(f"{seed.name.lower()} report: checksum 0x{found:08x}; valid: 0x{valid:08x}")

@@ -3,13 +3,16 @@
 On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation and the controllers wiki.
 """
 
+import re
+import reprlib
 import struct
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Annotated, Final, Self
 
-from common.checks import check_integer, check_integers
+from msgspec import Meta
+
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.reports.address import checked_address
+from common.limits import check_limits
 from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
 from operator_side.dualsense.reports.transport import Transport, described
 
@@ -19,10 +22,12 @@ FIRMWARE_ID: Final = 0x20
 FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
 """In bytes, with the id."""
 
-_CALIBRATION: Final = struct.Struct("<17h")
-_HARDWARE, _FIRMWARE, _UPDATE = 24, 28, 44
+_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
+_VERSIONS: Final = struct.Struct("<II")
+_HARDWARE, _UPDATE = 24, 44
 
-Three = tuple[int, int, int]
+Word = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+HalfWord = Annotated[int, Meta(ge=0, le=2**16 - 1)]
 
 
 def _checked(report: bytes, report_id: int, transport: Transport) -> bytes:
@@ -34,56 +39,28 @@ def _checked(report: bytes, report_id: int, transport: Transport) -> bytes:
     return report
 
 
-def _finished(report: bytearray, transport: Transport) -> bytes:
-    if transport is Transport.USB:
-        return bytes(report)
-    return sealed(Seed.FEATURE, bytes(report[:-CHECKSUM_LENGTH]))
+def _finished(report_id: int, content: bytes, transport: Transport) -> bytes:
+    """The report of `content`, filled up with zeros, and with its checksum where there is one."""
+    report = (bytes((report_id,)) + content).ljust(FEATURE_LENGTHS[report_id], b"\0")
+    return report if transport is Transport.USB else sealed(Seed.FEATURE, report[:-CHECKSUM_LENGTH])
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationReport:
-    """What the factory measured of the motion sensors: what they said, in units of 16 bits, of known motions."""
+def build_calibration(transport: Transport) -> bytes:
+    """Make feature report 0x05 of motion sensors without error: what hid-playstation wants to know at its start.
 
-    gyro_bias: Three
-    """x, y, z: what the gyroscope said at rest."""
-    gyro_plus: Three
-    """What it said while turning by `speed_plus`."""
-    gyro_minus: Three
-    speed_plus: int
-    """In degrees a second."""
-    speed_minus: int
-    acceleration_plus: Three
-    """What the accelerometer said of one standard gravity along each axis."""
-    acceleration_minus: Three
+    Gyroscope: bias 0, 8640 counts either way at 540 degrees a second. Accelerometer: 8192 counts for one gravity.
+    """
+    gyro, acceleration = (8640, -8640) * 3, (8192, -8192) * 3
+    return _finished(CALIBRATION_ID, struct.pack("<17h", 0, 0, 0, *gyro, 540, 540, *acceleration), transport)
 
-    def __post_init__(self) -> None:
-        for name in ("gyro_bias", "gyro_plus", "gyro_minus", "acceleration_plus", "acceleration_minus"):
-            check_integers(name, getattr(self, name), 3, -(2**15), 2**15 - 1)
-        for name in ("speed_plus", "speed_minus"):
-            check_integer(name, getattr(self, name), -(2**15), 2**15 - 1)
 
-    @classmethod
-    def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:
-        """Read feature report 0x05; RemoteProtocolError for another id, length or checksum."""
-        v = _CALIBRATION.unpack_from(_checked(report, CALIBRATION_ID, transport), 1)
-        return cls(
-            gyro_bias=(v[0], v[1], v[2]),
-            gyro_plus=(v[3], v[5], v[7]),
-            gyro_minus=(v[4], v[6], v[8]),
-            speed_plus=v[9],
-            speed_minus=v[10],
-            acceleration_plus=(v[11], v[13], v[15]),
-            acceleration_minus=(v[12], v[14], v[16]),
+def checked_address(address: object) -> str:
+    """Return `address` if it has the form "aa:bb:cc:dd:ee:ff"; ValueError for anything else."""
+    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
+        raise ValueError(
+            f"address = {reprlib.repr(address)}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff"
         )
-
-    def build(self, transport: Transport = Transport.USB) -> bytes:
-        """Make feature report 0x05, 41 bytes."""
-        report = bytearray(FEATURE_LENGTHS[CALIBRATION_ID])
-        report[0] = CALIBRATION_ID
-        pairs = [value for pair in zip(self.gyro_plus, self.gyro_minus, strict=True) for value in pair]
-        ends = [value for pair in zip(self.acceleration_plus, self.acceleration_minus, strict=True) for value in pair]
-        _CALIBRATION.pack_into(report, 1, *self.gyro_bias, *pairs, self.speed_plus, self.speed_minus, *ends)
-        return _finished(report, transport)
+    return address
 
 
 def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
@@ -96,42 +73,31 @@ def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
 
 def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
     """Make feature report 0x09, 20 bytes; ValueError for an address that is not "aa:bb:cc:dd:ee:ff"."""
-    report = bytearray(FEATURE_LENGTHS[ADDRESS_ID])
-    report[0] = ADDRESS_ID
-    report[6:0:-1] = bytes.fromhex(checked_address(address).replace(":", ""))
-    return _finished(report, transport)
+    return _finished(ADDRESS_ID, bytes.fromhex(checked_address(address).replace(":", ""))[::-1], transport)
 
 
 @dataclass(frozen=True, slots=True)
 class Firmware:
     """What runs in the controller."""
 
-    hardware_version: int
-    """32 bits."""
-    firmware_version: int
-    """32 bits."""
-    update_version: int
-    """16 bits; which features of the firmware to expect."""
+    hardware_version: Word
+    firmware_version: Word
+    update_version: HalfWord
+    """Which features of the firmware to expect."""
 
     def __post_init__(self) -> None:
-        for name, bits in (("hardware_version", 32), ("firmware_version", 32), ("update_version", 16)):
-            check_integer(name, getattr(self, name), 0, 2**bits - 1)
+        check_limits(self)
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:
         """Read feature report 0x20; RemoteProtocolError for another id, length or checksum."""
         _checked(report, FIRMWARE_ID, transport)
-        return cls(
-            hardware_version=int.from_bytes(report[_HARDWARE : _HARDWARE + 4], "little"),
-            firmware_version=int.from_bytes(report[_FIRMWARE : _FIRMWARE + 4], "little"),
-            update_version=int.from_bytes(report[_UPDATE : _UPDATE + 2], "little"),
-        )
+        hardware_version, firmware_version = _VERSIONS.unpack_from(report, _HARDWARE)
+        return cls(hardware_version, firmware_version, int.from_bytes(report[_UPDATE : _UPDATE + 2], "little"))
 
     def build(self, transport: Transport = Transport.USB) -> bytes:
         """Make feature report 0x20, 64 bytes."""
-        report = bytearray(FEATURE_LENGTHS[FIRMWARE_ID])
-        report[0] = FIRMWARE_ID
-        report[_HARDWARE : _HARDWARE + 4] = self.hardware_version.to_bytes(4, "little")
-        report[_FIRMWARE : _FIRMWARE + 4] = self.firmware_version.to_bytes(4, "little")
-        report[_UPDATE : _UPDATE + 2] = self.update_version.to_bytes(2, "little")
-        return _finished(report, transport)
+        content = bytearray(_UPDATE + 1)
+        _VERSIONS.pack_into(content, _HARDWARE - 1, self.hardware_version, self.firmware_version)
+        content[_UPDATE - 1 :] = self.update_version.to_bytes(2, "little")
+        return _finished(FIRMWARE_ID, bytes(content), transport)

@@ -35,7 +35,7 @@ SIMPLE_REPORT_ID: Final = 0x01
 SIMPLE_REPORT_LENGTH: Final = 10
 """Bluetooth starts with these short reports, under USB's id, until a feature is read or an effect written."""
 PADDED_REPORT_LENGTH: Final = 78
-"""Some systems pad every report to the longest of its transport, the simple one too (SDL)."""
+"""Some systems pad every report to the longest one, the simple one too (SDL)."""
 
 _INPUT_KINDS: Final = {
     (0x01, 64): Transport.USB,
@@ -58,9 +58,7 @@ def transport_of_input(report: bytes) -> Transport:
 
 def is_simple_report(report: bytes) -> bool:
     """A Bluetooth input report of the simple mode: sticks, triggers and buttons only."""
-    return (
-        bool(report) and report[0] == SIMPLE_REPORT_ID and len(report) in (SIMPLE_REPORT_LENGTH, PADDED_REPORT_LENGTH)
-    )
+    return report[:1] == b"\x01" and len(report) in (SIMPLE_REPORT_LENGTH, PADDED_REPORT_LENGTH)
 
 
 def described(report: bytes) -> str:

@@ -1,1 +1,1 @@
-"""A controller made of bytes, with a model of its triggers."""
+"""A controller without hardware, with a model of the triggers."""

@@ -1,24 +1,23 @@
-"""A DualSense made of bytes: the same port as a real one, with a simulated person's hands on it."""
+"""A simulated DualSense: the same port as a real one, with a simulated person's hands on it."""
 
 import math
+from dataclasses import replace
 from typing import Final
 
 from common.errors import DeviceError, RemoteProtocolError
 from operator_side.dualsense.effects.official import AnyEffect, Off
-from operator_side.dualsense.reports.attachments import CHARGED, ON_BLUETOOTH, ON_USB, Battery, BatteryState
-from operator_side.dualsense.reports.checksum import Seed, is_sealed
+from operator_side.dualsense.reports.battery import Battery, BatteryState
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState, Stick
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     CALIBRATION_ID,
-    FEATURE_LENGTHS,
     FIRMWARE_ID,
-    CalibrationReport,
     Firmware,
     build_address,
+    build_calibration,
 )
 from operator_side.dualsense.reports.input_report import build_input_report, build_simple_input_report
 from operator_side.dualsense.reports.models import Model
-from operator_side.dualsense.reports.motion_sensors import MotionCalibration
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
@@ -27,8 +26,7 @@ from operator_side.dualsense.reports.output_report import (
     transport_of_output,
 )
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.simulated.simulated_hands import SimulatedHands
-from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N
+from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
 """About 250 reports a second on USB (SDL)."""
@@ -36,29 +34,22 @@ SIMULATED_ADDRESS: Final = "02:00:00:00:0c:e6"
 """Locally administered, so that it is no real controller's."""
 SIMULATED_FIRMWARE: Final = Firmware(hardware_version=0x0413, firmware_version=0x0110_0224, update_version=0x0224)
 """Made up, but new enough for Linux hid-playstation's present way to rumble (2.21, so 0x0215)."""
-IDEAL_CALIBRATION: Final = CalibrationReport(
-    gyro_bias=(0, 0, 0),
-    gyro_plus=(8640, 8640, 8640),
-    gyro_minus=(-8640, -8640, -8640),
-    speed_plus=540,
-    speed_minus=540,
-    acceleration_plus=(8192, 8192, 8192),
-    acceleration_minus=(-8192, -8192, -8192),
-)
-"""That of sensors without error: the nominal resolution of hid-playstation."""
 
 _ROUNDING_OF_TICKS = 1e-6
 """So that a `now_s` of exactly n periods, in floating point, is the n-th report's time."""
 _BLUETOOTH_SEQUENCE = 1
 """What the common block says on Bluetooth, always (controllers wiki)."""
 _FULL_MODE_FEATURES = frozenset({ADDRESS_ID, FIRMWARE_ID})
+_TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
+_EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
 
-class SimulatedDualSense(SimulatedHands):
+class SimulatedDualSense:
     """The Device port without hardware, in virtual or real time: `now_s` is all it knows of clocks.
 
     It wakes at the first `now_s` it is given and makes an input report at once, then one a period. What the
-    `set_*` methods change holds from the last `now_s` on. On Bluetooth it starts with the simple reports.
+    `set_*` methods change holds from the last `now_s` on, until it is set again; at first nobody touches it. Forces are
+    those of trigger_model: assumptions. On Bluetooth it starts with the simple reports.
     """
 
     def __init__(
@@ -66,67 +57,78 @@ class SimulatedDualSense(SimulatedHands):
         transport: Transport = Transport.USB,
         model: Model = Model.DUALSENSE,
         *,
-        bluetooth_period_s: float = INPUT_REPORT_PERIOD_S,
         address: str = SIMULATED_ADDRESS,
-        calibration: CalibrationReport = IDEAL_CALIBRATION,
         strength_step_n: float = STRENGTH_STEP_N,
     ) -> None:
-        """`bluetooth_period_s`: a controller sends up to 1000 reports a second there (SDL), 250 on USB.
+        """`strength_step_n`: the resistance that one strength of an effect adds, an eighth of the strongest.
 
-        `strength_step_n`: the resistance that one strength of its triggers' effects adds, an eighth of the strongest.
-        `calibration`: what its motion sensors really are like, and what feature 0x05 says of them. ValueError for
-        a period that is not above 0, or an address that is none.
+        ValueError for an address that is none.
         """
-        if not (math.isfinite(bluetooth_period_s) and bluetooth_period_s > 0.0):
-            raise ValueError(f"bluetooth_period_s = {bluetooth_period_s}; valid: finite, above 0")
+        self.transport: Final = transport
+        self.model: Final = model
+        self.address: Final = address
+        self.write_count = 0
+        """Output reports that were accepted from outside."""
+        self._l2 = SimulatedTrigger(strength_step_n)
+        self._r2 = SimulatedTrigger(strength_step_n)
         wireless = transport is Transport.BLUETOOTH
-        super().__init__(
-            model,
-            Battery(0.95, BatteryState.DISCHARGING) if wireless else CHARGED,
-            ON_BLUETOOTH if wireless else ON_USB,
-            strength_step_n,
-        )
-        self._transport = transport
-        self._period_s = bluetooth_period_s if wireless else INPUT_REPORT_PERIOD_S
-        self._motion = MotionCalibration.of(calibration)
+        self._held = ControllerState(battery=Battery(0.95, BatteryState.DISCHARGING) if wireless else Battery())
         self._features = {
-            CALIBRATION_ID: calibration.build(transport),
+            CALIBRATION_ID: build_calibration(transport),
             ADDRESS_ID: build_address(address, transport),
             FIRMWARE_ID: SIMULATED_FIRMWARE.build(transport),
         }
-        self._address = address
         self._now_s = -math.inf
-        self._write_count = 0
-        self._bad_checksums = 0
         self._closed = False
         self._plugged_in = True
         self._start()
 
     def _start(self) -> None:
-        """As the controller is once it has found its host."""
+        """Begin as the controller does once it has found its host."""
         self._woke_s: float | None = None
         self._newest_report = -1
         self._unread: bytes | None = None
-        self._simple = self._transport is Transport.BLUETOOTH
+        self._simple = self.transport is Transport.BLUETOOTH
         self._told = RELEASED
         self._apply(RELEASED)
 
-    # What a test may look at
+    # The hands
+
+    def set_finger_force(self, l2_n: float, r2_n: float) -> None:
+        """Press the triggers with constant forces; ValueError for a negative or non-finite one."""
+        self._l2.set_finger_force(l2_n)
+        self._r2.set_finger_force(r2_n)
+
+    def set_travel(self, l2: float, r2: float) -> None:
+        """Hold the triggers at these travels as the controller reports them, 0 to 1, whatever resists, until a force
+        is set; ValueError beyond.
+        """
+        self._l2.hold_at(SENSED_TRAVEL * l2)
+        self._r2.hold_at(SENSED_TRAVEL * r2)
+
+    def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
+        """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError beyond."""
+        if (left, right) != (self._held.left_stick, self._held.right_stick):
+            self._held = replace(self._held, left_stick=left, right_stick=right)
+
+    def set_buttons(self, pressed: frozenset[Button]) -> None:
+        """Hold these buttons and no others.
+
+        ValueError for L2 and R2, which follow the fingers' force, and for the Edge's on a controller without them.
+        """
+        if pressed & _TRIGGER_BUTTONS:
+            raise ValueError("pressed has L2 or R2; valid: any other button, and set_finger_force for these")
+        if pressed & _EDGE_BUTTONS and self.model is not Model.EDGE:
+            raise ValueError("pressed has a paddle or a function key; valid: only on a DualSense Edge")
+        if pressed != self._held.pressed:
+            self._held = replace(self._held, pressed=pressed)
+
+    # State
 
     @property
-    def transport(self) -> Transport:
-        """What carries its reports."""
-        return self._transport
-
-    @property
-    def model(self) -> Model:
-        """Which controller it is."""
-        return self._model
-
-    @property
-    def address(self) -> str:
-        """What feature 0x09 says."""
-        return self._address
+    def travel(self) -> tuple[float, float]:
+        """Mechanical travel of L2 and R2, 0 to 1, at the last time given."""
+        return self._l2.travel, self._r2.travel
 
     @property
     def output(self) -> OutputReport:
@@ -135,7 +137,7 @@ class SimulatedDualSense(SimulatedHands):
 
     @property
     def effects(self) -> tuple[AnyEffect, AnyEffect]:
-        """The effects in force, L2 and R2, as decoded from the bytes."""
+        """The effects in force, L2 and R2."""
         return self._l2.effect, self._r2.effect
 
     @property
@@ -149,16 +151,6 @@ class SimulatedDualSense(SimulatedHands):
         return self._told.rumble or Rumble()
 
     @property
-    def write_count(self) -> int:
-        """Output reports that were accepted from outside."""
-        return self._write_count
-
-    @property
-    def bad_checksums(self) -> int:
-        """Output reports that were ignored, as their checksum was wrong."""
-        return self._bad_checksums
-
-    @property
     def simple_mode(self) -> bool:
         """It sends Bluetooth's simple reports: nobody has asked for more."""
         return self._simple
@@ -166,7 +158,7 @@ class SimulatedDualSense(SimulatedHands):
     # The cable, or the radio
 
     def unplug(self) -> None:
-        """Be gone: whatever is asked of it raises DeviceError. It forgets what it was told (assumed)."""
+        """Be gone: every other call raises DeviceError. All effects are forgotten (assumed)."""
         self._plugged_in = False
         self._start()
 
@@ -188,27 +180,31 @@ class SimulatedDualSense(SimulatedHands):
         report, self._unread = self._unread, None
         return report
 
-    def write(self, report: bytes, now_s: float) -> None:
-        """Take an output report at `now_s`; ValueError, and nothing changed, for one that cannot be read.
-
-        On Bluetooth one with a wrong checksum is counted and ignored, as nobody would tell the writer. DeviceError
-        when it is unplugged or closed.
-        """
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Do what `output` sets from `now_s` on; DeviceError when it is unplugged or closed."""
         self._require_open()
-        try:
-            if transport_of_output(report) is not self._transport:
-                raise ValueError(f"report: id 0x{report[0]:02x} is not for a controller on {self._transport.value}")
-            if self._transport is Transport.BLUETOOTH and not is_sealed(Seed.OUTPUT, report):
-                self._advance(now_s)
-                self._bad_checksums += 1
-                return
-            output = parse_output_report(report, unofficial=True)
-        except RemoteProtocolError as error:
-            raise ValueError(f"report: {error}") from error
         self._advance(now_s)
         self._simple = False
         self._apply(output)
-        self._write_count += 1
+        self.write_count += 1
+
+    def close(self) -> None:
+        """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
+        self._apply(self._told.farewell)
+        self._closed = True
+
+    # The wire, for a system that is offered this controller
+
+    def take_report(self, report: bytes, now_s: float) -> None:
+        """Take an output report off the wire; ValueError, and nothing changed, for one that cannot be read."""
+        self._require_open()
+        try:
+            if transport_of_output(report) is not self.transport:
+                raise ValueError(f"report: id 0x{report[0]:02x} is not for a controller on {self.transport.value}")
+            output = parse_output_report(report)
+        except RemoteProtocolError as error:
+            raise ValueError(f"report: {error}") from error
+        self.write(output, now_s)
 
     def get_feature(self, report_id: int) -> bytes:
         """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
@@ -217,16 +213,11 @@ class SimulatedDualSense(SimulatedHands):
         """
         self._require_open()
         if report_id not in self._features:
-            valid = ", ".join(f"0x{known:02x}" for known in FEATURE_LENGTHS)
+            valid = ", ".join(f"0x{known:02x}" for known in self._features)
             raise DeviceError(f"the simulated controller has no feature report 0x{report_id:02x}; valid: {valid}")
         if report_id in _FULL_MODE_FEATURES:
             self._simple = False
         return self._features[report_id]
-
-    def close(self) -> None:
-        """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
-        self._apply(self._told.farewell)
-        self._closed = True
 
     def _require_open(self) -> None:
         if not self._plugged_in:
@@ -236,9 +227,8 @@ class SimulatedDualSense(SimulatedHands):
 
     def _apply(self, output: OutputReport) -> None:
         self._told = output.following(self._told)
-        power = 1.0 - (self._told.trigger_power_reduction or 0) / 8.0
-        self._l2.set_effect(self._told.l2 or Off(), power)
-        self._r2.set_effect(self._told.r2 or Off(), power)
+        self._l2.set_effect(self._told.l2 or Off())
+        self._r2.set_effect(self._told.r2 or Off())
 
     def _advance(self, now_s: float) -> None:
         """Let time pass until `now_s`, and make the newest input report on the way that has come due."""
@@ -248,9 +238,9 @@ class SimulatedDualSense(SimulatedHands):
             raise ValueError(f"now_s = {now_s}; valid: not before {self._now_s}, the last time given")
         if self._woke_s is None:
             self._woke_s = self._now_s = now_s
-        due = math.floor((now_s - self._woke_s) / self._period_s + _ROUNDING_OF_TICKS)
+        due = math.floor((now_s - self._woke_s) / INPUT_REPORT_PERIOD_S + _ROUNDING_OF_TICKS)
         if due > self._newest_report:
-            made_s = self._woke_s + due * self._period_s
+            made_s = self._woke_s + due * INPUT_REPORT_PERIOD_S
             self._move_triggers(min(max(made_s, self._now_s), now_s))
             self._unread = self._report(due)
             self._newest_report = due
@@ -262,8 +252,19 @@ class SimulatedDualSense(SimulatedHands):
         self._now_s = to_s
 
     def _report(self, number: int) -> bytes:
-        clock_s = number * self._period_s
         if self._simple:
-            return build_simple_input_report(self._state(number % 64, clock_s))
-        sequence = number % 256 if self._transport is Transport.USB else _BLUETOOTH_SEQUENCE
-        return build_input_report(self._state(sequence, clock_s), self._transport, self._motion)
+            return build_simple_input_report(self._state(number % 64))
+        sequence = number % 256 if self.transport is Transport.USB else _BLUETOOTH_SEQUENCE
+        return build_input_report(self._state(sequence), self.transport, number * INPUT_REPORT_PERIOD_S)
+
+    def _state(self, sequence: int) -> ControllerState:
+        """What the sensors say now."""
+        triggers = {Button.L2: self._l2, Button.R2: self._r2}
+        moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
+        return replace(
+            self._held,
+            l2=self._l2.sensed_travel,
+            r2=self._r2.sensed_travel,
+            pressed=self._held.pressed | moved,
+            sequence=sequence,
+        )

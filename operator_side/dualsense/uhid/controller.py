@@ -1,4 +1,4 @@
-"""A simulated controller offered to Linux through /dev/uhid: what it says to the kernel, still without I/O."""
+"""A simulated controller offered to Linux through /dev/uhid: its side of the protocol, without I/O."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,9 +12,7 @@ from operator_side.dualsense.uhid.protocol import (
     BUS_USB,
     FEATURE_REPORT,
     OUTPUT_REPORT,
-    Closed,
     GetReport,
-    Opened,
     Output,
     SetReport,
     Started,
@@ -36,7 +34,7 @@ class OfferedController(Protocol):
         """The newest input report, or None when there is no new one."""
         ...
 
-    def write(self, report: bytes, now_s: float) -> None:
+    def take_report(self, report: bytes, now_s: float) -> None:
         """Take an output report; ValueError, and nothing changed, for one that it cannot read."""
         ...
 
@@ -46,7 +44,7 @@ class OfferedController(Protocol):
 
 
 def identity(transport: Transport = Transport.USB, model: Model = Model.DUALSENSE, unique_id: str = "") -> UhidIdentity:
-    """What the kernel is told of a controller on USB or on Bluetooth."""
+    """The identity of a controller on USB or on Bluetooth, for the kernel."""
     bluetooth = transport is Transport.BLUETOOTH
     maker = "" if bluetooth else "Sony Interactive Entertainment "
     return UhidIdentity(
@@ -78,8 +76,6 @@ class UhidController:
         self.counts = UhidCounts()
         self.driven = False
         """A driver has taken the device."""
-        self.opened = False
-        """Somebody reads it; drivers do as soon as they have taken it."""
         self._controller = controller
         self._identity = told
 
@@ -89,7 +85,7 @@ class UhidController:
 
     def unplug(self) -> bytes:
         """Let it disappear; `plug_in` may follow."""
-        self.driven = self.opened = False
+        self.driven = False
         return destroy()
 
     def handle(self, event: bytes, now_s: float) -> bytes | None:
@@ -98,19 +94,15 @@ class UhidController:
             case Started():
                 self.driven = True
             case Stopped():
-                self.driven = self.opened = False
-            case Opened():
-                self.opened = True
+                self.driven = False
             case Output(report, kind):
                 self._write(report, kind, now_s)
             case GetReport(request, report_id, kind):
                 return get_report_reply(request, self._answer(report_id, kind))
-            case SetReport(request, _, kind, report):
+            case SetReport(request, kind, report):
                 return set_report_reply(request, accepted=self._write(report, kind, now_s))
-            case Closed():
-                self.opened = False
             case None:
-                pass  # of a newer kernel
+                pass  # somebody opened or closed it, or a newer kernel said something
         return None
 
     def next_input(self, now_s: float) -> bytes | None:
@@ -125,7 +117,7 @@ class UhidController:
         try:
             if kind != OUTPUT_REPORT:
                 raise ValueError(f"kind = {kind}; valid: {OUTPUT_REPORT}")
-            self._controller.write(report, now_s)
+            self._controller.take_report(report, now_s)
         except ValueError:
             self.counts.refused += 1
             return False

@@ -8,29 +8,29 @@ byte order.
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Annotated, Final
+
+from msgspec import Meta
+
+from common.limits import check_limits
 
 EVENT_LENGTH: Final = 4380
-"""sizeof(struct uhid_event), the end of its union padded to 8 bytes; what to ask for with each read."""
+"""sizeof(struct uhid_event), padded to 8 bytes; the length to ask for with each read."""
 REPORT_MAX_LENGTH: Final = 4096
-DESCRIPTOR_MAX_LENGTH: Final = 4096
 BUS_USB: Final = 0x03
 BUS_BLUETOOTH: Final = 0x05
 FEATURE_REPORT: Final = 0
 OUTPUT_REPORT: Final = 1
-INPUT_REPORT: Final = 2
 INPUT_OUTPUT_ERROR: Final = 5
 """EIO, which hidraw and drivers report for an answer with an error."""
 
 
 class _Type(IntEnum):
-    """enum uhid_event_type, without what is obsolete."""
+    """enum uhid_event_type, without what is obsolete or not heeded."""
 
     DESTROY = 1
     START = 2
     STOP = 3
-    OPEN = 4
-    CLOSE = 5
     OUTPUT = 6
     GET_REPORT = 9
     GET_REPORT_REPLY = 10
@@ -40,11 +40,13 @@ class _Type(IntEnum):
     SET_REPORT_REPLY = 14
 
 
+HalfWord = Annotated[int, Meta(ge=0, le=0xFFFF)]
+
+_VERSION, _COUNTRY = 0x0100, 0
 _TYPE = struct.Struct("=I")
 # Name, physical place, unique id; the descriptor's size, bus; vendor, product, version, country.
 _CREATE = struct.Struct("=I128s64s64sHHIIII")
 _INPUT = struct.Struct("=IH")
-_DEVICE_FLAGS = struct.Struct("=Q")
 _OUTPUT_TAIL = struct.Struct("=HB")  # size and kind, after the full length of the data
 _GET = struct.Struct("=IBB")
 _GET_REPLY = struct.Struct("=IIHH")
@@ -54,63 +56,31 @@ _SET_REPLY = struct.Struct("=IIH")
 
 @dataclass(frozen=True, slots=True)
 class UhidIdentity:
-    """What the kernel is told of a device when it is created."""
+    """Identity of a device, for the kernel."""
 
-    name: str
-    vendor_id: int
-    product_id: int
-    bus: int
+    name: Annotated[str, Meta(max_length=127)]
+    vendor_id: HalfWord
+    product_id: HalfWord
+    bus: HalfWord
     """BUS_USB or BUS_BLUETOOTH."""
     descriptor: bytes
     """The report descriptor, 1 to 4096 bytes."""
-    unique_id: str = ""
+    unique_id: Annotated[str, Meta(max_length=63)] = ""
     """As a Bluetooth address; drivers may refuse a second device that has the same."""
-    physical_place: str = ""
-    version: int = 0x0100
-    country: int = 0
+    physical_place: Annotated[str, Meta(max_length=63)] = ""
 
     def __post_init__(self) -> None:
-        for field, text, length in (
-            ("name", self.name, 128),
-            ("unique_id", self.unique_id, 64),
-            ("physical_place", self.physical_place, 64),
-        ):
-            if len(text.encode()) >= length or "\0" in text:
-                raise ValueError(f"{field} = {text!r}; valid: below {length} bytes of UTF-8, none of them 0")
-        for field, number, highest in (
-            ("vendor_id", self.vendor_id, 0xFFFF),
-            ("product_id", self.product_id, 0xFFFF),
-            ("bus", self.bus, 0xFFFF),
-            ("version", self.version, 0xFFFFFFFF),
-            ("country", self.country, 0xFFFFFFFF),
-        ):
-            if not 0 <= number <= highest:
-                raise ValueError(f"{field} = {number}; valid: 0 to {highest}")
-        if not 0 < len(self.descriptor) <= DESCRIPTOR_MAX_LENGTH:
-            raise ValueError(f"descriptor has {len(self.descriptor)} bytes; valid: 1 to {DESCRIPTOR_MAX_LENGTH}")
+        check_limits(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Started:
     """A driver has taken the device."""
 
-    numbered: frozenset[int]
-    """The kinds of report that begin with an id: FEATURE_REPORT, OUTPUT_REPORT, INPUT_REPORT."""
-
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
     """The driver has let the device go."""
-
-
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """Somebody begins to read the device's reports."""
-
-
-@dataclass(frozen=True, slots=True)
-class Closed:
-    """Nobody reads them any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,17 +106,16 @@ class SetReport:
     """A report for the device that waits up to 5 s for `set_report_reply` with the same number."""
 
     request: int
-    report_id: int
     kind: int
     report: bytes
     """With its id in front."""
 
 
-UhidEvent = Started | Stopped | Opened | Closed | Output | GetReport | SetReport
+UhidEvent = Started | Stopped | Output | GetReport | SetReport
 
 
 def parse_event(event: bytes) -> UhidEvent | None:
-    """Read what the kernel says; None for a type that is not known here. ValueError for an impossible length."""
+    """Read what the kernel says; None for a type that is not heeded here. ValueError for an impossible length."""
     if not _TYPE.size <= len(event) <= EVENT_LENGTH:
         raise ValueError(f"event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
     (kind,) = _TYPE.unpack_from(event)
@@ -154,22 +123,17 @@ def parse_event(event: bytes) -> UhidEvent | None:
     parsed: UhidEvent | None = None
     match kind:
         case _Type.START:
-            (flags,) = _DEVICE_FLAGS.unpack_from(payload)
-            parsed = Started(frozenset(n for n in (FEATURE_REPORT, OUTPUT_REPORT, INPUT_REPORT) if flags >> n & 1))
+            parsed = Started()
         case _Type.STOP:
             parsed = Stopped()
-        case _Type.OPEN:
-            parsed = Opened()
-        case _Type.CLOSE:
-            parsed = Closed()
         case _Type.OUTPUT:
             size, report_kind = _OUTPUT_TAIL.unpack_from(payload, REPORT_MAX_LENGTH)
             parsed = Output(_sized(payload, 0, size), report_kind)
         case _Type.GET_REPORT:
             parsed = GetReport(*_GET.unpack_from(payload))
         case _Type.SET_REPORT:
-            request, report_id, report_kind, size = _SET.unpack_from(payload)
-            parsed = SetReport(request, report_id, report_kind, _sized(payload, _SET.size, size))
+            request, _, report_kind, size = _SET.unpack_from(payload)
+            parsed = SetReport(request, report_kind, _sized(payload, _SET.size, size))
     return parsed
 
 
@@ -190,8 +154,8 @@ def create(identity: UhidIdentity) -> bytes:
         identity.bus,
         identity.vendor_id,
         identity.product_id,
-        identity.version,
-        identity.country,
+        _VERSION,
+        _COUNTRY,
     )
     return head + identity.descriptor
 

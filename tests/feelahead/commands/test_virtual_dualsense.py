@@ -17,7 +17,7 @@ from feelahead.commands.virtual_dualsense import (
     live,
 )
 from feelahead.main import command
-from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.effects.official import Off, OtherEffect
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.feature_report import parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
@@ -25,6 +25,7 @@ from operator_side.dualsense.reports.output_report import OutputReport, Rumble, 
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.uhid.file import UHID_PATH
 from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
+from tests.helpers.felt import feedback
 
 INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
 
@@ -51,9 +52,9 @@ def sent_states(kernel: FakeKernel) -> list[ControllerState]:
 def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None:
     by = Transport.USB if transport == "usb" else Transport.BLUETOOTH
     told = [
-        OutputReport(l2=Feedback(position=3, strength=6), lightbar=(0, 0, 64)),
-        OutputReport(l2=Feedback(position=3, strength=6), r2=Off()),  # nothing new
-        OutputReport(l2=Off(), r2=Feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
+        OutputReport(l2=feedback(position=3, strength=6), lightbar=(0, 0, 64)),
+        OutputReport(l2=feedback(position=3, strength=6), r2=Off()),  # nothing new
+        OutputReport(l2=Off(), r2=feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
     ]
     events = [(0.0, get_report(1, 0x09)), (0.01, said(START))]
     events += [(0.02, output(build_output_report(one, by))) for one in told]
@@ -64,10 +65,10 @@ def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None
     assert lines == [
         f"plugging in: {first}, {address}",
         "a driver has taken it",
-        "L2: Feedback, position 3, strength 6",
+        "L2: strengths 0 0 0 6 6 6 6 6 6 6",
         "lightbar: red 0, green 0, blue 64",
         "L2: Off",
-        "R2: Feedback, position 0, strength 8",
+        "R2: strengths 8 8 8 8 8 8 8 8 8 8",
         "rumble: left 100%, right 0%",
         "its driver has let it go",
         "unplugged: 10 reports sent, 3 taken, 0 refused",

@@ -8,39 +8,25 @@ from typing import Final
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
-from operator_side.dualsense.effects.official import (
-    AnyEffect,
-    Feedback,
-    MultiPositionFeedback,
-    MultiPositionVibration,
-    Off,
-    Vibration,
-    Weapon,
-)
+from operator_side.dualsense.effects.official import AnyEffect, MultiPositionFeedback, Off
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import find_controller, sightings
 from operator_side.dualsense.reports.controller_state import Button, ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.motion_sensors import (
-    NOMINAL_ACCELERATION_M_S2,
-    NOMINAL_GYRO_RAD_S,
-    MotionCalibration,
-)
-from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.reports.output_report import OutputReport, Rumble
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
+from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.driver import bound
-from tests.kernel.inside.plugged import ADDRESS, CALIBRATION, Plugged
+from tests.kernel.inside.plugged import ADDRESS, Plugged
 
 _NOBODY: Final = 65534
 _EFFECTS: Final[tuple[tuple[AnyEffect, AnyEffect], ...]] = (
-    (Feedback(position=3, strength=6), Off()),
-    (Off(), Feedback(position=0, strength=8)),
+    (feedback(position=3, strength=6), Off()),
+    (Off(), feedback(position=0, strength=8)),
     (MultiPositionFeedback((0, 1, 2, 3, 4, 5, 6, 7, 8, 0)), MultiPositionFeedback((8, 0, 8, 0, 1, 0, 2, 0, 3, 4))),
-    (Weapon(start=2, end=6, strength=8), Vibration(position=3, amplitude=5, frequency_hz=40)),
-    (MultiPositionVibration((0, 0, 1, 2, 3, 4, 5, 6, 7, 8), frequency_hz=25), Weapon(start=7, end=8, strength=1)),
-    (Feedback(position=9, strength=1), Feedback(position=1, strength=3)),
+    (feedback(position=9, strength=1), feedback(position=1, strength=3)),
 )
 
 
@@ -57,9 +43,9 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
-    """The newest input report, read with the controller's own calibration."""
+    """The newest input report."""
     report = device.read(0.0)
-    return None if report is None else parse_input_report(report, device.identity.motion)
+    return None if report is None else parse_input_report(report)
 
 
 def test_it_is_found_and_says_what_it_is(plugged: Plugged) -> None:
@@ -73,16 +59,13 @@ def test_it_is_found_and_says_what_it_is(plugged: Plugged) -> None:
         assert found.name == f"{plugged.variant.model.title} on {transport.value} ({ADDRESS})"
     finally:
         found.device.close()
-    motion = MotionCalibration.of(CALIBRATION)
     with our_device(plugged) as device:
         said = device.identity
-        assert (said.transport, said.firmware, said.motion) == (transport, SIMULATED_FIRMWARE, motion)
+        assert (said.transport, said.firmware) == (transport, SIMULATED_FIRMWARE)
 
 
-def test_hands_and_motion_are_read_as_sent(plugged: Plugged) -> None:
-    turning_rad_s, acceleration_m_s2 = (1.0, -2.0, 0.5), (-3.0, 8.0, 5.0)
+def test_hands_are_read_as_sent(plugged: Plugged) -> None:
     with our_device(plugged) as device:
-        plugged.ask(lambda controller: controller.set_motion(turning_rad_s, acceleration_m_s2))
         plugged.ask(lambda controller: controller.set_sticks(left=(1.0, -1.0), right=(0.5, 0.25)))
         plugged.ask(lambda controller: controller.set_buttons(frozenset({Button.L1, Button.OPTIONS, Button.LEFT})))
         plugged.ask(lambda controller: controller.set_finger_force(NORMAL_FINGER_FORCE_N, 1.5))
@@ -99,13 +82,6 @@ def test_hands_and_motion_are_read_as_sent(plugged: Plugged) -> None:
         assert state.pressed == pressed
         assert 0.2 < state.r2 < 0.5
         assert expected_r2 >= 0.0
-        assert state.gyro_rad_s is not None
-        assert state.acceleration_m_s2 is not None
-        for read, sent, step in (
-            (state.gyro_rad_s, turning_rad_s, NOMINAL_GYRO_RAD_S),
-            (state.acceleration_m_s2, acceleration_m_s2, NOMINAL_ACCELERATION_M_S2),
-        ):
-            assert all(abs(a - b) <= step for a, b in zip(read, sent, strict=True))
         plugged.hands_off()
 
 
@@ -113,17 +89,16 @@ def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plu
     with our_device(plugged) as device:
         before = plugged.ask(lambda controller: controller.write_count)
         for l2, r2 in _EFFECTS:
-            device.write(build_output_report(OutputReport(l2=l2, r2=r2)), 0.0)
+            device.write(OutputReport(l2=l2, r2=r2), 0.0)
             wait_until(f"{l2}, {r2}", lambda l2=l2, r2=r2: plugged.ask(lambda c: c.effects) == (l2, r2))  # type: ignore[misc]
-        device.write(build_output_report(OutputReport(rumble=Rumble(left=1.0, right=0.2))), 0.0)
+        device.write(OutputReport(rumble=Rumble(left=1.0, right=0.2)), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
         assert plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers"
         # Forty more, so that Bluetooth's sequence numbers go round.
         for number in range(40):
-            device.write(build_output_report(OutputReport(l2=Feedback(number % 10, 1 + number % 8))), 0.0)
+            device.write(OutputReport(l2=feedback(number % 10, 1 + number % 8)), 0.0)
         wait_until("all arrive", lambda: plugged.ask(lambda c: c.write_count) == before + len(_EFFECTS) + 41)
         assert plugged.offered.counts.refused == 0
-        assert plugged.ask(lambda c: c.bad_checksums) == 0, "there were wrong checksums"
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
     assert plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on"
 
@@ -141,11 +116,11 @@ def test_without_permission_it_says_what_to_do(plugged: Plugged) -> None:
 def test_an_unplugged_one_is_gone_and_found_when_it_is_back(plugged: Plugged) -> None:
     for _ in range(2):
         with our_device(plugged) as device:
-            device.write(build_output_report(OutputReport(l2=Feedback(2, 2))), 0.0)
+            device.write(OutputReport(l2=feedback(2, 2)), 0.0)
             plugged.unplug()
             wait_until("reading says that it is gone", lambda device=device: _is_gone(device))  # type: ignore[misc]
             with pytest.raises(DeviceError, match="gone"):
-                device.write(build_output_report(OutputReport(l2=Off())), 0.0)
+                device.write(OutputReport(l2=Off()), 0.0)
         assert not device.released, "it claims to have released what is gone"
         wait_until("nothing is found", _finds_nothing)
         plugged.plug_in()

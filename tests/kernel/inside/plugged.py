@@ -8,7 +8,6 @@ from types import TracebackType
 from typing import Final, TypeVar
 
 from common.clock import MonotonicClock
-from operator_side.dualsense.reports.feature_report import CalibrationReport
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -20,16 +19,6 @@ Value = TypeVar("Value")
 
 
 ADDRESS: Final = "01:02:03:04:05:06"
-CALIBRATION: Final = CalibrationReport(
-    gyro_bias=(0, 0, 0),
-    gyro_plus=(8843, 8850, 8870),
-    gyro_minus=(-8837, -8860, -8866),
-    speed_plus=540,
-    speed_minus=540,
-    acceleration_plus=(8250, 8200, 8100),
-    acceleration_minus=(-8130, -8190, -8240),
-)
-"""Differs for each axis like real ones, but for the gyroscope's bias: Linux 6.1 subtracts it, later ones do not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +43,7 @@ class Plugged:
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
         self.identity = identity(variant.transport, variant.model, ADDRESS)
-        self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS, calibration=CALIBRATION)
+        self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS)
         self.offered = UhidController(self._simulated, self.identity)
         self._asked: deque[Callable[[], None]] = deque()
         self._ending = False
@@ -106,7 +95,6 @@ class Plugged:
             controller.set_sticks()
             controller.set_buttons(frozenset())
             controller.set_finger_force(0.0, 0.0)
-            controller.set_motion()
 
         self.ask(let_go)
 

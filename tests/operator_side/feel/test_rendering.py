@@ -99,8 +99,8 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     plain = RenderedTrigger(USUAL, calibration.l2).render(PARTED, 1.0, 0.0, moved, 0.0)
     assert swapped.l2 == plain
     assert isinstance(swapped.r2, MultiPositionFeedback)
-    assert swapped.r2.strengths[-1] == 1
-    assert swapped.r2.strengths[0] == 0  # it retreats only once it is pulled farther than what advances
+    assert swapped.r2.zone_strengths[-1] == 1
+    assert swapped.r2.zone_strengths[0] == 0  # it retreats only once it is pulled farther than what advances
 
 
 def test_another_reaction_time_is_another_free_travel() -> None:

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.feel.write_bound import MOST_WRITES_PER_S, WriteBound
-from tests.helpers.felt import felt
+from tests.helpers.felt import feedback, felt
 
 Fields = dict[str, Any]
 STRENGTH = st.sampled_from([0, 1, 3, 8])
@@ -111,7 +111,7 @@ def test_a_change_after_a_rest_goes_at_once() -> None:
 
 
 def test_what_is_left_waits_while_a_part_goes_off() -> None:
-    stiff, stiffer = Feedback(0, 3), Feedback(0, 5)
+    stiff, stiffer = feedback(0, 3), feedback(0, 5)
     bound, written = WriteBound(), RELEASED
     for number in range(100):
         wanted = OutputReport(l2=stiffer if number % 2 else stiff, r2=Off(), rumble=Rumble())
@@ -124,7 +124,7 @@ def test_what_is_left_waits_while_a_part_goes_off() -> None:
 
 
 def test_a_controller_that_nobody_knows_is_released_whatever_is_left() -> None:
-    bound, stiff = WriteBound(), OutputReport(l2=Feedback(0, 3), r2=Off(), rumble=Rumble())
+    bound, stiff = WriteBound(), OutputReport(l2=feedback(0, 3), r2=Off(), rumble=Rumble())
     assert [bound.next(None, stiff, 1.0) for _ in range(100)] == [RELEASED] * 100
     assert bound.next(RELEASED, stiff, 1.0) is None
     assert bound.next(RELEASED, stiff, 1.05) == stiff

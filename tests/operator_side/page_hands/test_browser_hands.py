@@ -6,10 +6,9 @@ from typing import Any
 import pytest
 
 from common.protocol.messages import Telemetry
-from operator_side.dualsense.effects.official import Feedback
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
@@ -17,6 +16,7 @@ from operator_side.page_hands.browser_hands import BrowserHands
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import BROWSER, PERSON, SharedHands
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
+from tests.helpers.felt import feedback
 from tests.helpers.simulated_desk import VIEW, armed
 from tests.operator_side.page_hands.talking_page import PERIOD_S, TalkingPage
 
@@ -86,7 +86,7 @@ def test_travel_and_sticks_arrive_as_given(calibration: TravelCalibration | None
 def test_what_the_trigger_was_told_takes_nothing_from_the_travel() -> None:
     desk = Desk()
     desk.arm()
-    desk.device.write(build_output_report(OutputReport(l2=Feedback(0, 8), r2=Feedback(0, 8))), desk.now_s)
+    desk.device.write(OutputReport(l2=feedback(0, 8), r2=feedback(0, 8)), desk.now_s)
     assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
 
 

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from common.protocol.messages import Telemetry, Vector3
-from operator_side.dualsense.effects.official import Feedback, Off
+from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport, Rumble
 from operator_side.dualsense.simulated.trigger_model import (
@@ -18,6 +18,7 @@ from operator_side.dualsense.simulated.trigger_model import (
 from operator_side.simulated_person.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.simulated_person.settings import PersonSettings
 from operator_side.simulated_person.whoever import whoever
+from tests.helpers.felt import feedback
 from tests.helpers.simulated_desk import (
     CALIBRATION,
     CLEAR_SIGHTED,
@@ -286,7 +287,7 @@ def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
 
 UNMOVED = dataclasses.replace(CLEAR_SIGHTED, trust=0.0)
 """Feels mechanics alone: believes no cue."""
-STIFF = Feedback(0, 8)
+STIFF = feedback(0, 8)
 TOWARDS = armed((0.0, 0.0, 0.06))
 MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
 
@@ -314,7 +315,7 @@ def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
     desk.arm()
     desk.watch(TOWARDS, 1.0)
     force_n, felt_s = desk.hands[-1].r2_n, desk.now_s
-    desk.resist(Feedback(0, strength) if strength else Off())
+    desk.resist(feedback(0, strength) if strength else Off())
     eased = [hands.now_s for hands in desk.watch(TOWARDS, 0.6) if hands.r2_n < force_n]
     assert bool(eased) is eases
     if eased:
@@ -333,7 +334,7 @@ def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands() -> 
     desk = Desk(PersonSettings(attempts=2, trust=0.0), seed=3)
     desk.arm()
     for number in range(60):
-        desk.resist(Feedback(0, number % 9), Feedback(0, number % 5))
+        desk.resist(feedback(0, number % 9), feedback(0, number % 5))
         place = (0.01 * math.sin(number), 0.01 * math.cos(1.3 * number), 0.4 * math.sin(0.7 * number))
         desk.watch(armed(place, holding=number % 11 > 8), 0.3)
     forces = [(hands.l2_n, hands.r2_n) for hands in desk.hands]

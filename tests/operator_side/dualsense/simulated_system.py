@@ -1,0 +1,188 @@
+"""A machine with simulated controllers on it, in virtual time: hidapi, the search, background writes, the watchdog."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from common.clock import VirtualClock
+from common.errors import DeviceError
+from operator_side.dualsense.hid.background_writes import STALL_S
+from operator_side.dualsense.hid.device import HidHandle
+from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.hid.release_watchdog import SILENCE_S
+from operator_side.dualsense.reports.models import SONY_VENDOR_ID
+from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+
+PERIOD_S = 0.004
+
+
+class SimulatedHandle:
+    """hidapi's handle on a simulated controller: errors as hidapi's, and waiting lets virtual time pass."""
+
+    def __init__(self, system: "SimulatedSystem") -> None:
+        self._system = system
+        self._device: SimulatedDualSense | None = None
+
+    def open_path(self, path: bytes) -> None:
+        self._device = self._system.devices.get(path)
+        if self._device is None:
+            raise OSError("open failed")
+
+    def set_nonblocking(self, flag: int) -> int:
+        return flag
+
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        if timeout_ms > 0:
+            self._system.clock.advance_to(self._system.clock.now() + PERIOD_S)
+        try:
+            return list((self._open().read(self._system.clock.now()) or b"")[:max_length])
+        except DeviceError as error:
+            raise OSError("read error") from error
+
+    def write(self, data: bytes) -> int:
+        return len(data) if self._system.transfer(self._open(), data) else -1
+
+    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
+        try:
+            return list(self._open().get_feature(report_num)[:max_length])
+        except DeviceError as error:
+            raise OSError("read error") from error
+
+    def close(self) -> None:
+        self._device = None
+
+    def error(self) -> str:
+        return "No such file or directory"
+
+    def _open(self) -> SimulatedDualSense:
+        assert self._device is not None
+        return self._device
+
+
+class SimulatedSystem:
+    """hidapi there: a controller is at its path while it is plugged in, and another object when it is back."""
+
+    def __init__(self) -> None:
+        self.clock = VirtualClock(1.0)
+        self.devices: dict[bytes, SimulatedDualSense] = {}
+        self.failing = 0
+        """Number of transfers, to any controller, that will fail."""
+
+    def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:
+        """Hand an output report over; False for a transfer that failed."""
+        if self.failing > 0:
+            self.failing -= 1
+            return False
+        try:
+            device.take_report(report, self.clock.now())
+        except DeviceError:
+            return False
+        return True
+
+    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
+        assert vendor_id == SONY_VENDOR_ID
+        return [{"path": path} for path, device in self.devices.items() if device.model.value == product_id]
+
+    def device(self) -> HidHandle:
+        return SimulatedHandle(self)
+
+
+class StallingWrites:
+    """BackgroundWrites without a thread: what is written while `stalled` goes out when the stall ends."""
+
+    def __init__(self, device: Device, stalled: Callable[[], bool]) -> None:
+        self._device = device
+        self._stalled = stalled
+        self._waiting: OutputReport | None = None
+        self._since_s = 0.0
+        self._stuck = False
+
+    @property
+    def released(self) -> bool:
+        return self._waiting is None and not self._stuck and self._device.released
+
+    def stalls(self, now_s: float) -> bool:
+        return self._waiting is not None and now_s - self._since_s > STALL_S
+
+    def waits_since(self, now_s: float) -> float:
+        """Seconds for which a write has waited; 0 for none."""
+        return 0.0 if self._waiting is None else max(now_s - self._since_s, 1e-9)
+
+    def read(self, now_s: float) -> bytes | None:
+        if not self._stalled() and (waiting := self._waiting) is not None:
+            self._waiting = None
+            self._device.write(waiting, now_s)
+        return self._device.read(now_s)
+
+    def write(self, output: OutputReport, now_s: float) -> None:
+        if not self._stalled():
+            self._device.write(output if self._waiting is None else output.following(self._waiting), now_s)
+            self._waiting = None
+            return
+        self._since_s = now_s if self._waiting is None else self._since_s
+        self._waiting = output if self._waiting is None else output.following(self._waiting)
+
+    def close(self) -> None:
+        self._waiting, self._stuck = None, self._stalled()
+        if not self._stuck:
+            self._device.close()
+
+
+class VirtualSearch:
+    """A look that needs no thread."""
+
+    def __init__(self, find: Callable[[str | None], OpenController], stalled: Callable[[], bool]) -> None:
+        self.looks = 0
+        self._find = find
+        self._stalled = stalled
+        self._result: OpenController | DeviceError | None = None
+
+    def begin(self, preferred: str | None) -> None:
+        self.looks += 1
+        try:
+            found = self._find(preferred)
+        except DeviceError as error:
+            self._result = error
+            return
+        writes = StallingWrites(found.device, self._stalled)
+        self._result = replace(found, device=writes, stalls=writes.stalls)
+
+    def take(self) -> OpenController | DeviceError | None:
+        result, self._result = self._result, None
+        return result
+
+    def close(self) -> None:
+        pass
+
+
+class VirtualWatchdog:
+    """The release watchdog's law, whose processes have tests of their own."""
+
+    def __init__(self, system: SimulatedSystem) -> None:
+        self._held: tuple[SimulatedDualSense, bytes] | None = None
+        self._system = system
+        self._deadline_s: float | None = None
+
+    def hold(self, path: bytes, release: bytes) -> None:
+        self._held, self._deadline_s = (self._system.devices[path], release), None
+
+    def let_go(self) -> None:
+        self._held = self._deadline_s = None
+
+    def beat(self) -> None:
+        self._deadline_s = self._system.clock.now() + SILENCE_S
+
+    def rest(self) -> None:
+        self._deadline_s = None
+
+    def look(self) -> None:
+        """Release after a silence."""
+        if self._deadline_s is not None and self._system.clock.now() >= self._deadline_s:
+            self.release()
+
+    def release(self) -> None:
+        """Write the report, at up to three attempts."""
+        self._deadline_s = None
+        if self._held is not None:
+            any(self._system.transfer(*self._held) for _ in range(3))

@@ -1,0 +1,295 @@
+"""Effects and output reports: exact bytes in each framing, only our flags, round trips, and no debug code anywhere."""
+
+from dataclasses import fields
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import RemoteProtocolError
+from operator_side.dualsense.effects.official import (
+    MultiPositionFeedback,
+    Off,
+    OtherEffect,
+    TriggerEffect,
+    decode_effect,
+)
+from operator_side.dualsense.reports.checksum import Seed, sealed
+from operator_side.dualsense.reports.output_report import (
+    RELEASED,
+    OutputReport,
+    Rumble,
+    build_output_report,
+    parse_output_report,
+    transport_of_output,
+)
+from operator_side.dualsense.reports.transport import Transport
+from tests.helpers.felt import feedback
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+TRANSPORTS = pytest.mark.parametrize("transport", Transport)
+STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
+BYTES = st.integers(0, 255)
+DRIVES = BYTES.map(lambda byte: byte / 255)
+EFFECTS = st.none() | st.just(Off()) | STRENGTHS.filter(any).map(MultiPositionFeedback)
+OUTPUTS = st.builds(
+    OutputReport,
+    EFFECTS,
+    EFFECTS,
+    st.none() | st.builds(Rumble, DRIVES, DRIVES),
+    st.none() | st.tuples(BYTES, BYTES, BYTES),
+)
+FULL = OutputReport(l2=feedback(3, 6), r2=Off(), rumble=Rumble(left=1.0, right=0.2), lightbar=(10, 20, 30))
+FULL_BLOCK = bytes.fromhex(
+    "0f 04 33 ff 00 00 00 00 00 00"  # flags, motors right and left, nothing of the sound and the mute light
+    "05 00 00 00 00 00 00 00 00 00 00"  # R2
+    "21 f8 03 00 da b6 2d 00 00 00 00"  # L2
+    "00 00 00 00 00 00 00 00 00 00 00 00 0a 14 1e"  # no power reduction, no player lights; colours at 44
+)
+CODES = [0xFC, 0xFD, 0xFE]
+
+
+def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
+    """The report by hand: on USB, on Bluetooth as hid-playstation writes it, and as SDL and most libraries do."""
+    return (
+        b"\x02" + block,
+        sealed(Seed.OUTPUT, (b"\x31\xb0\x10" + block).ljust(74, b"\0")),
+        sealed(Seed.OUTPUT, (b"\x31\x92" + block).ljust(74, b"\0")),
+    )
+
+
+# Effects
+
+
+@pytest.mark.parametrize(
+    ("effect", "expected"),
+    [
+        (Off(), "05 00 00 00 00 00 00 00 00 00 00"),
+        # The public test vector.
+        (feedback(3, 6), "21 f8 03 00 da b6 2d 00 00 00 00"),
+        # Worked by hand: three bits a zone, strength less one, from bit 3 * zone.
+        (feedback(9, 8), "21 00 02 00 00 00 38 00 00 00 00"),
+        (feedback(0, 8), "21 ff 03 ff ff ff 3f 00 00 00 00"),
+        (feedback(0, 1), "21 ff 03 00 00 00 00 00 00 00 00"),
+        (MultiPositionFeedback((1, 0, 0, 0, 0, 0, 0, 0, 0, 0)), "21 01 00 00 00 00 00 00 00 00 00"),
+        (MultiPositionFeedback((2, 8, 0, 0, 0, 0, 0, 0, 0, 5)), "21 03 02 39 00 00 20 00 00 00 00"),
+    ],
+)
+def test_exact_bytes_of_effects(effect: TriggerEffect, expected: str) -> None:
+    assert effect.encode() == bytes.fromhex(expected)
+    assert decode_effect(bytes.fromhex(expected)) == effect
+
+
+def test_nothing_to_feel_is_off() -> None:
+    assert feedback(0, 0).encode() == Off().encode()
+
+
+@pytest.mark.parametrize(
+    "encoded",
+    [
+        "05 00 00 00 00 00 00 00 00 00 01",  # off, and more
+        "21 00 00 00 00 00 00 00 00 00 00",  # feedback in no zone
+        "21 00 04 00 00 00 00 00 00 00 00",  # an eleventh zone
+        "21 01 00 08 00 00 00 00 00 00 00",  # a strength outside the mask
+        "25 24 00 07 00 00 00 00 00 00 00",  # a weapon
+        "26 f8 03 00 da b6 2d 00 00 ff 00",  # a vibration
+    ],
+)
+def test_what_another_program_says_is_kept_as_it_is_and_holds_nothing(encoded: str) -> None:
+    effect = decode_effect(bytes.fromhex(encoded))
+    assert effect == OtherEffect(bytes.fromhex(encoded))
+    assert effect.zone_strengths == (0,) * 10
+
+
+@given(st.binary(min_size=11, max_size=11) | st.binary(min_size=10, max_size=10).map(lambda rest: b"\x21" + rest))
+@REPEATABLE
+def test_any_bytes_decode_to_what_encodes_to_them(encoded: bytes) -> None:
+    effect = decode_effect(encoded)
+    assert (effect.encoded if isinstance(effect, OtherEffect) else effect.encode()) == encoded
+
+
+# Reports
+
+
+@pytest.mark.parametrize(("transport", "sequence"), [(Transport.USB, 0), (Transport.BLUETOOTH, 11)])
+def test_exact_bytes_of_reports(transport: Transport, sequence: int) -> None:
+    expected = framings(FULL_BLOCK)[transport is Transport.BLUETOOTH]
+    assert build_output_report(FULL, transport, sequence) == expected
+    assert len(expected) == (48 if transport is Transport.USB else 78)
+    assert {parse_output_report(report) for report in framings(FULL_BLOCK)} == {FULL}
+
+
+@TRANSPORTS
+@pytest.mark.parametrize(
+    ("output", "flags"),
+    [
+        (OutputReport(), (0x00, 0x00)),
+        (OutputReport(rumble=Rumble()), (0x03, 0x00)),
+        (OutputReport(r2=Off()), (0x04, 0x00)),
+        (OutputReport(l2=Off()), (0x08, 0x00)),
+        (OutputReport(lightbar=(0, 0, 0)), (0x00, 0x04)),
+        (RELEASED, (0x0F, 0x00)),
+    ],
+)
+def test_only_the_flags_of_what_is_set(transport: Transport, output: OutputReport, flags: tuple[int, int]) -> None:
+    report = build_output_report(output, transport)
+    start = 1 if transport is Transport.USB else 3
+    assert (report[start], report[start + 1]) == flags
+    assert report[start + 38] == 0
+
+
+@TRANSPORTS
+@given(output=OUTPUTS, sequence=st.integers(0, 100))
+@settings(derandomize=True, deadline=None, max_examples=1000)
+def test_round_trip(transport: Transport, output: OutputReport, sequence: int) -> None:
+    report = build_output_report(output, transport, sequence)
+    assert transport_of_output(report) is transport
+    assert parse_output_report(report) == output
+    if transport is Transport.USB:
+        assert parse_output_report(report + bytes(16)) == output
+    else:
+        assert report[1] == sequence % 16 << 4
+
+
+@given(st.binary(max_size=130) | st.binary(min_size=47, max_size=47).flatmap(lambda b: st.sampled_from(framings(b))))
+@settings(derandomize=True, deadline=None, max_examples=1000)
+def test_any_bytes_parse_without_a_debug_code_or_raise_the_documented_error(report: bytes) -> None:
+    try:
+        output = parse_output_report(report)
+    except RemoteProtocolError:
+        return
+    start = 1 if report[0] == 2 else 2 if report[1] & 0x0F else 3
+    assert not {report[start + 10], report[start + 21]} & set(CODES)
+    assert (output.l2 is not None, output.r2 is not None) == (bool(report[start] & 8), bool(report[start] & 4))
+
+
+@pytest.mark.parametrize("code", CODES)
+@pytest.mark.parametrize("place", [10, 21])
+@pytest.mark.parametrize("flags", [0x00, 0x0C])
+def test_a_debug_code_is_refused_wherever_it_stands(code: int, place: int, flags: int) -> None:
+    block = bytearray(FULL_BLOCK)
+    block[0], block[place] = flags, code
+    for report in framings(bytes(block)):
+        with pytest.raises(RemoteProtocolError, match=f"0x{code:02x}"):
+            parse_output_report(report)
+
+
+class Disguised(MultiPositionFeedback):  # type: ignore[misc]
+    """An effect in all but its bytes."""
+
+    encoded: ClassVar = b""
+
+    def encode(self) -> bytes:
+        return self.encoded
+
+
+@TRANSPORTS
+@pytest.mark.parametrize("code", [*CODES, 0x00, 0x01, 0x25, 0x26, 0x80, 0xFF])
+def test_nothing_of_any_type_brings_another_code_to_the_wire(transport: Transport, code: int) -> None:
+    bytes_of_code = bytes([code])
+    for encoded in (
+        bytes_of_code.ljust(11, b"\0"),
+        Off().encode() + bytes_of_code * 40,  # longer, so that it comes to lie elsewhere
+        b"",
+        bytes_of_code * 3,
+    ):
+        Disguised.encoded = encoded
+        effect = Disguised((1,) * 10)
+        for one in (OutputReport(l2=effect), OutputReport(r2=effect), OutputReport(effect, effect)):
+            with pytest.raises(ValueError, match="effect code"):
+                build_output_report(one, transport)
+        foreign: Any = SimpleNamespace(l2=effect, r2=None, rumble=None, lightbar=None)
+        with pytest.raises(ValueError, match="effect code"):
+            build_output_report(foreign, transport)
+    with pytest.raises(ValueError, match=r"OtherEffect.*valid: Off, MultiPositionFeedback"):
+        build_output_report(OutputReport(r2=OtherEffect(bytes_of_code.ljust(11, b"\0"))), transport)
+
+
+@pytest.mark.parametrize(
+    ("flags", "rumble"),
+    [
+        ({0: 0x03}, Rumble(1.0, 0.2)),
+        ({0: 0x02, 38: 0x04}, Rumble(1.0, 0.2)),  # as hid-playstation does with present firmware
+        ({0: 0x02}, None),
+    ],
+)
+def test_either_way_to_rumble_is_read(flags: dict[int, int], rumble: Rumble | None) -> None:
+    block = bytearray(47)
+    block[2], block[3] = 51, 255
+    for place, value in flags.items():
+        block[place] = value
+    assert parse_output_report(b"\x02" + block) == OutputReport(rumble=rumble)
+
+
+@pytest.mark.parametrize(
+    ("report", "message"),
+    [
+        (b"", "no bytes"),
+        (b"\x02" + bytes(46), "id 0x02, 47 bytes; valid: id 0x02, 48 to 64 bytes"),
+        (b"\x02" + bytes(64), "id 0x02, 65 bytes"),
+        (b"\x31" + bytes(76), "id 0x31, 77 bytes"),
+        (b"\x31" + bytes(77), "output report: checksum"),
+        *(
+            (sealed(Seed.OUTPUT, bytes.fromhex(start).ljust(74, b"\0")), "bytes 1 and 2")
+            for start in ("31 00 00", "31 00 11", "31 01 10", "31 04 10")
+        ),
+    ],
+)
+def test_refused_bytes_are_named(report: bytes, message: str) -> None:
+    with pytest.raises(RemoteProtocolError, match=message):
+        parse_output_report(report)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (
+            MultiPositionFeedback,
+            {"zone_strengths": (1,) * 9},
+            "zone_strengths = .*; valid: a tuple of 10 whole",
+        ),
+        (MultiPositionFeedback, {"zone_strengths": [1] * 10}, r"zone_strengths = \[1, .*; valid: a tuple of 10"),
+        (MultiPositionFeedback, {"zone_strengths": (1,) * 9 + (9,)}, "zone_strengths = .*9.*; valid"),
+        (MultiPositionFeedback, {"zone_strengths": (-1,) + (0,) * 9}, "zone_strengths = .*-1.*; valid"),
+        (MultiPositionFeedback, {"zone_strengths": (1.0,) + (0,) * 9}, "zone_strengths = .*1.0.*; valid"),
+        (MultiPositionFeedback, {"zone_strengths": 5}, "zone_strengths = 5"),
+        (OutputReport, {"l2": b"\xfc"}, "l2 = "),
+        (OutputReport, {"r2": SimpleNamespace(encode=lambda: b"\xfc" + bytes(10))}, "r2 = "),
+        (OutputReport, {"lightbar": (0, 0, 256)}, r"lightbar\[2\] = 256"),
+        (OutputReport, {"lightbar": (0, 0.5, 0)}, r"lightbar\[1\] = 0.5"),
+        (Rumble, {"left": 1.5}, "left = 1.5; valid: 0 to 1"),
+        (Rumble, {"right": float("nan")}, "right = nan"),
+    ],
+)
+def test_refused_values_are_named(kind: Any, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        kind(**arguments)
+
+
+@given(OUTPUTS, OUTPUTS)
+@REPEATABLE
+def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(
+    first: OutputReport, second: OutputReport
+) -> None:
+    both = second.following(first)
+    for part in fields(OutputReport):
+        newer, older = getattr(second, part.name), getattr(first, part.name)
+        assert getattr(both, part.name) == (older if newer is None else newer)
+    assert both.change_from(first).following(first) == both
+    assert both.change_from(both) == OutputReport()
+
+
+@pytest.mark.parametrize(
+    ("output", "releases"),
+    [
+        (OutputReport(), True),
+        (RELEASED, True),
+        (OutputReport(r2=Off(), lightbar=(1, 2, 3)), True),
+        (OutputReport(l2=Off(), r2=feedback(3, 6)), False),
+        (OutputReport(rumble=Rumble(right=0.1)), False),
+    ],
+)
+def test_what_holds_or_shakes_releases_nothing(output: OutputReport, releases: bool) -> None:
+    assert output.releases is releases

@@ -1,0 +1,207 @@
+"""Controllers that are plugged in and pulled out while things go wrong: no trigger is left stiff."""
+
+from hypothesis import Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from common.protocol.codec import decode, encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import LeaseNotice, MotionCommand
+from common.protocol.session import SessionState
+from operator_side.core import INTENT_EXPIRES_S, OperatorSide
+from operator_side.dualsense.hid.background_writes import STALL_S
+from operator_side.dualsense.hid.connection import (
+    BEAT_PERIOD_S,
+    LOOK_PERIOD_S,
+    Connection,
+    ConnectionState,
+)
+from operator_side.dualsense.hid.finding import Finder
+from operator_side.dualsense.hid.release_watchdog import SILENCE_S
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.reports.output_report import RELEASED
+from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from tests.helpers.felt import felt
+from tests.operator_side.dualsense.simulated_system import (
+    PERIOD_S,
+    SimulatedSystem,
+    StallingWrites,
+    VirtualSearch,
+    VirtualWatchdog,
+)
+
+
+class Plugs(RuleBasedStateMachine):
+    """Two controllers on USB and Bluetooth, faults of the wire and of our process, and the operator side's core.
+
+    The robot side's end grants the lease and sends fields; it arms when it is asked to by released triggers, and
+    disarms when commands stop for 100 ms.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.system = SimulatedSystem()
+        self.stalled = False
+        self.watchdog = VirtualWatchdog(self.system)
+        self.core = OperatorSide(2, "clock")
+        self.robot = LinkEnd("robot", 1, "clock")
+        self.search = VirtualSearch(Finder(self.system), lambda: self.stalled)
+        self.connection = Connection(self.search, self, self.watchdog)
+        self.armed = False
+        self.strength = 7
+        self.commanded_s = self.report_s = 0.0
+        self.must_stop = self.must_release = False
+        self.changes: list[str] = []
+        self.stiff_since_s: dict[bytes, float] = {}
+
+    @property
+    def now_s(self) -> float:
+        return self.system.clock.now()
+
+    # The listener: passed on to the core
+
+    def controller_found(self, now_s: float) -> None:
+        if self.connection.found > self.changes.count("found"):
+            self.changes.append("found")
+        self.must_release = True
+        self.core.controller_found(now_s)
+
+    def controller_lost(self, now_s: float) -> None:
+        self.changes.append("lost")
+        self.must_stop = True
+        self.core.controller_lost(now_s)
+
+    # One turn of the loop
+
+    def turn(self) -> None:
+        self.pass_time(PERIOD_S)
+        now_s = self.now_s
+        self.armed = self.armed and now_s - self.commanded_s < 0.1
+        session = SessionState.ARMED if self.armed else SessionState.DISARMED
+        notice = LeaseNotice(self.robot.stamp(now_s), session=session, why="", token=7, waiting=0)
+        told = felt(self.robot.stamp(now_s), r2=self.strength, state="armed" if self.armed else "disarmed")
+        for message in (notice, told):
+            self.core.receive(encode(message), now_s)
+        self.must_stop = self.must_stop and self.armed
+        self.connection.beat(now_s)
+        if (output := self.core.output_report(now_s)) is not None:
+            assert output == RELEASED or not self.must_release, "told before it was released"
+            self.must_release = False
+            self.connection.write(output, now_s)
+        self.connection.update(now_s)
+        now_s = self.now_s  # opening one lets time pass
+        if (report := self.connection.read(now_s)) is not None:
+            self.report_s = now_s
+            self.core.read_report(report, now_s)
+        for command in map(decode, self.core.motion(now_s)):
+            if isinstance(command, MotionCommand):
+                assert not self.must_stop, "commanded before the arm was known to stand"
+                assert self.connection.state is ConnectionState.CONNECTED
+                assert now_s - self.report_s <= INTENT_EXPIRES_S
+                self.commanded_s = now_s
+                self.armed |= command.arm and command.l2 == command.r2 == 0.0
+        self.look_at_triggers()
+
+    def pass_time(self, duration_s: float) -> None:
+        self.system.clock.advance_to(self.now_s + duration_s)
+        self.watchdog.look()
+
+    def look_at_triggers(self) -> None:
+        controller = self.connection.controller
+        connected = None if controller is None else controller.path
+        if connected is not None and connected in self.system.devices and not self.must_release:
+            device, told = self.system.devices[connected], self.core.haptics.written
+            writes = controller.device if controller is not None else None
+            assert isinstance(writes, StallingWrites)
+            if not writes.waits_since(self.now_s):
+                assert device.effects == (told.l2, told.r2), "it does not do what the core believes"
+            elif writes.waits_since(self.now_s) > STALL_S + SILENCE_S + 0.1 and self.system.failing == 0:
+                assert device.released, "stiff while a write hangs"
+        left_stiff = [path for path, one in self.system.devices.items() if not one.released and path != connected]
+        self.stiff_since_s = {path: self.stiff_since_s.get(path, self.now_s) for path in left_stiff}
+        for path, since_s in self.stiff_since_s.items():
+            assert self.now_s - since_s < LOOK_PERIOD_S + 0.3, f"{path!r} was left stiff"
+
+    # What happens
+
+    @initialize()
+    def begin(self) -> None:
+        self.core.receive(encode(self.robot.hello(self.now_s)), self.now_s)
+
+    @rule(path=st.sampled_from(["usb A", "bluetooth A", "usb B"]))
+    def plug_or_unplug(self, path: str) -> None:
+        if (device := self.system.devices.pop(path.encode(), None)) is not None:
+            device.unplug()
+            return
+        transport = Transport.USB if path.startswith("usb") else Transport.BLUETOOTH
+        device = SimulatedDualSense(transport, address=f"0{path[-1].lower()}:00:00:00:00:00")
+        device.read(self.now_s)
+        self.system.devices[path.encode()] = device
+
+    @rule(turns=st.sampled_from([1, 10, 60, 300]))
+    def go_on(self, turns: int) -> None:
+        for _ in range(turns):
+            self.turn()
+
+    @rule(pulled=st.booleans(), arm=st.booleans())
+    def hands(self, pulled: bool, arm: bool) -> None:
+        for device in self.system.devices.values():
+            device.set_finger_force(0.0, 3.0 if pulled else 0.0)
+            device.set_buttons(frozenset({Button.L1, Button.OPTIONS}) if arm else frozenset({Button.L1}))
+
+    @precondition(lambda self: self.system.devices)
+    @rule()
+    def arm(self) -> None:
+        """Have stiff triggers, if a controller is there to be armed by."""
+        self.stalled, self.system.failing, self.strength = False, 0, 7
+        for _ in range(2000):  # another one than before is taken after three looks
+            self.turn()
+            if self.connection.state is ConnectionState.CONNECTED:
+                break
+        for pulled, armed, turns in ((False, False, 30), (False, True, 20), (True, False, 100)):
+            self.hands(pulled, armed)
+            self.go_on(turns)
+        assert self.connection.state is ConnectionState.CONNECTED
+        assert self.armed
+        assert not self.connection.controller.device.released  # type: ignore[union-attr]
+
+    @rule(strength=st.integers(0, 8))
+    def ahead(self, strength: int) -> None:
+        self.strength = strength
+
+    @rule(count=st.integers(1, 2))  # the watchdog tries three times
+    def writes_fail(self, count: int) -> None:
+        self.system.failing = count
+
+    @rule(stalled=st.booleans(), strength=st.integers(1, 8))
+    def writes_hang(self, stalled: bool, strength: int) -> None:
+        self.stalled, self.strength = stalled, strength
+        self.go_on(150)
+
+    @rule(duration_s=st.sampled_from([0.05, 0.15, 0.5]))
+    def we_hang(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / 0.01)):
+            self.pass_time(0.01)
+        if duration_s > SILENCE_S + BEAT_PERIOD_S and not self.stalled and self.system.failing == 0:
+            assert all(device.released for device in self.system.devices.values()), "stiff while nobody looks after it"
+
+    @invariant()
+    def found_and_lost_alternate_and_looks_are_rare(self) -> None:
+        assert self.changes == (["found", "lost"] * len(self.changes))[: len(self.changes)]
+        assert self.search.looks <= (self.now_s - 1.0) / LOOK_PERIOD_S + 1
+
+    def teardown(self) -> None:
+        self.connection.close()
+        self.watchdog.release()  # as when its pipe closes
+        assert all(device.released for device in self.system.devices.values()), "left stiff at the end"
+
+
+TestPlugs = Plugs.TestCase
+TestPlugs.settings = settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=60,
+    stateful_step_count=20,
+    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
+)

@@ -1,0 +1,381 @@
+"""The simulated controller: its finger's mechanics, its reports in time, its modes, the cable, and commands."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import DeviceError
+from operator_side.dualsense.effects.official import MultiPositionFeedback, Off, OtherEffect, TriggerEffect
+from operator_side.dualsense.reports.battery import Battery, BatteryState
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState
+from operator_side.dualsense.reports.feature_report import Firmware, build_calibration, parse_address
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.output_report import (
+    USUAL_LIGHT,
+    WARNING_LIGHT,
+    OutputReport,
+    Rumble,
+    build_output_report,
+)
+from operator_side.dualsense.reports.transport import Transport, is_simple_report
+from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS, SIMULATED_FIRMWARE, SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import (
+    FINGER_TIME_CONSTANT_S,
+    NORMAL_FINGER_FORCE_N,
+    SPRING_PRELOAD_N,
+    SPRING_RISE_N,
+    STRENGTH_STEP_N,
+    SimulatedTrigger,
+    equilibrium_travel,
+)
+from tests.helpers.felt import feedback
+
+REPEATABLE = settings(derandomize=True, deadline=None)
+TRANSPORTS = pytest.mark.parametrize("transport", Transport)
+FORCES = st.floats(0.0, 10.0)
+STEPS = st.floats(0.0, 1.0)
+STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
+EFFECTS: st.SearchStrategy[TriggerEffect] = st.just(Off()) | STRENGTHS.map(MultiPositionFeedback)
+STIFF = OutputReport(l2=feedback(3, 6), r2=feedback(0, 8))
+NAN, INF = float("nan"), float("inf")
+
+
+# The finger
+
+
+def resistance_n(travel: float, strength: int) -> float:
+    return SPRING_PRELOAD_N + SPRING_RISE_N * travel + STRENGTH_STEP_N * strength
+
+
+@given(FORCES, STRENGTHS)
+@REPEATABLE
+def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int, ...]) -> None:
+    """Short of it everything yields to the finger; at it, or one zone on, the resistance holds."""
+    travel = equilibrium_travel(force_n, strengths)
+    assert 0.0 <= travel <= 1.0
+    for zone in range(10):
+        begin, end = zone / 10, min((zone + 1) / 10, travel)
+        if begin < travel:
+            assert resistance_n(end, strengths[zone]) <= force_n + 1e-9
+    if 0.0 < travel < 1.0:
+        # At a boundary, to rounding, either zone may be the one that holds.
+        beside = {min(max(int(travel * 10 + one), 0), 9) for one in (-1e-9, 1e-9)}
+        assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
+
+
+@given(FORCES, FORCES, STRENGTHS, STRENGTHS, STEPS, STEPS)
+@REPEATABLE
+def test_more_force_goes_farther_and_more_resistance_less_far(
+    one_n: float, other_n: float, some: tuple[int, ...], others: tuple[int, ...], one: float, other: float
+) -> None:
+    (weak_n, strong_n), (light, heavy) = sorted((one_n, other_n)), sorted((one, other))
+    less, more = tuple(map(min, some, others)), tuple(map(max, some, others))
+    assert equilibrium_travel(weak_n, more, heavy) <= equilibrium_travel(strong_n, less, light)
+    # Half the strengths are half the step.
+    halved = tuple(strength / 2 for strength in some)
+    expected = equilibrium_travel(one_n, halved, one)
+    assert equilibrium_travel(one_n, some, one / 2) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_normal_pull_is_full_when_free_overcomes_the_strongest_and_rests_at_an_edge() -> None:
+    assert equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10) >= SENSED_TRAVEL
+    assert 0.25 <= equilibrium_travel(NORMAL_FINGER_FORCE_N, (8,) * 10) <= 0.6 * SENSED_TRAVEL
+    strengths = (0,) * 5 + (8,) * 5
+    assert {equilibrium_travel(force_n, strengths) for force_n in (2.6, 3.0, 3.5, 4.4)} == {0.5}
+
+
+@given(st.lists(st.tuples(FORCES, EFFECTS, st.floats(0.0, 0.5), st.integers(1, 300)), min_size=1, max_size=6))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_the_step_size_does_not_matter(phases: list[tuple[float, TriggerEffect, float, int]]) -> None:
+    coarse, fine = SimulatedTrigger(), SimulatedTrigger()
+    for force_n, effect, duration_s, steps in phases:
+        for trigger in (coarse, fine):
+            trigger.set_finger_force(force_n)
+            trigger.set_effect(effect)
+        coarse.advance(duration_s)
+        for _ in range(steps):
+            fine.advance(duration_s / steps)
+        assert fine.travel == pytest.approx(coarse.travel, abs=1e-11)
+        assert 0.0 <= fine.travel <= 1.0
+
+
+def test_relaxation_has_the_stated_time_constant() -> None:
+    trigger = SimulatedTrigger()
+    trigger.set_finger_force(NORMAL_FINGER_FORCE_N)
+    trigger.advance(FINGER_TIME_CONSTANT_S)
+    goal = equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10)
+    assert trigger.travel == pytest.approx(goal * (1.0 - math.exp(-1.0)), abs=1e-12)
+    trigger.advance(1e6)
+    assert trigger.travel == pytest.approx(goal)
+
+
+@pytest.mark.parametrize("strongest_n", [0.0, 1.5, 8 * STRENGTH_STEP_N, 3.0])
+def test_the_strongest_effect_is_eight_steps(strongest_n: float) -> None:
+    trigger = SimulatedTrigger(strongest_n / 8)
+    trigger.set_effect(feedback(0, 8))
+    trigger.set_finger_force(4.0)
+    trigger.advance(2.0)
+    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N - strongest_n) / SPRING_RISE_N, abs=1e-9)
+    trigger.set_effect(OtherEffect(b"\x25" + bytes(10)))  # not simulated: it holds nothing
+    trigger.advance(2.0)
+    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N) / SPRING_RISE_N, abs=1e-9)
+
+
+# Reports in time
+
+
+def report_at(device: SimulatedDualSense, now_s: float) -> bytes:
+    report = device.read(now_s)
+    assert report is not None
+    return report
+
+
+def state_at(device: SimulatedDualSense, now_s: float) -> ControllerState:
+    return parse_input_report(report_at(device, now_s))
+
+
+def clock_of(report: bytes) -> float:
+    """The sensor timestamp in seconds, by the layout of a USB report."""
+    return int.from_bytes(report[28:32], "little") / 3e6
+
+
+def test_a_report_every_4_ms() -> None:
+    device = SimulatedDualSense()
+    start_s = 1234.567
+    reports = [device.read(start_s + tick * 0.001) for tick in range(1001)]
+    assert [tick for tick, report in enumerate(reports) if report is not None] == list(range(0, 1001, 4))
+    made = [report for report in reports if report is not None]
+    assert [parse_input_report(report).sequence for report in made] == [number % 256 for number in range(251)]
+    assert [clock_of(report) for report in made] == pytest.approx([n * 0.004 for n in range(251)], abs=1e-6)
+
+
+def test_a_late_reader_gets_the_newest_report_once_and_clocks_wrap() -> None:
+    device = SimulatedDualSense()
+    assert state_at(device, 0.0) == ControllerState()
+    assert state_at(device, 0.1015).sequence == 25
+    assert device.read(0.1025) is None
+    assert state_at(device, 0.104).sequence == 26
+    report = report_at(device, 2000.0)
+    assert parse_input_report(report).sequence == 500_000 % 256
+    assert clock_of(report) == pytest.approx(2000.0 - 2**32 / 3e6, abs=1e-6)
+
+
+def test_hands_come_through() -> None:
+    device = SimulatedDualSense(model=Model.EDGE)
+    device.set_sticks(left=(1.0, -1.0), right=(-0.5, 0.5))
+    pressed = frozenset({Button.L1, Button.CROSS, Button.UP, Button.LEFT_PADDLE, Button.RIGHT_FUNCTION})
+    device.set_buttons(pressed)
+    state = state_at(device, 0.0)
+    assert (state.left_stick, state.right_stick, state.pressed) == ((1.0, -1.0), (-0.5, 0.5), pressed)
+    device.set_travel(0.2, 1.0)
+    state = state_at(device, 1.0)
+    assert (state.l2, state.r2) == pytest.approx((0.2, 1.0))
+    assert state.pressed == pressed | {Button.L2, Button.R2}
+
+
+def test_a_pull_is_full_when_free_and_less_as_an_effect_gets_stronger_or_begins_sooner() -> None:
+    device = SimulatedDualSense()
+    device.set_finger_force(NORMAL_FINGER_FORCE_N, NORMAL_FINGER_FORCE_N)
+    now_s = 0.0
+    stronger: list[TriggerEffect] = [Off(), *(feedback(0, strength) for strength in range(1, 9))]
+    sooner: list[TriggerEffect] = [Off(), *(feedback(zone, 8) for zone in reversed(range(8)))]
+    for effects in (stronger, sooner):
+        travels = []
+        for effect in effects:
+            device.write(OutputReport(r2=effect), now_s)
+            now_s += 2.0
+            state = state_at(device, now_s)
+            assert state.l2 == 1.0
+            travels.append(state.r2)
+        assert travels == sorted(travels, reverse=True)
+        assert travels[1] < travels[0] == 1.0
+        assert len(set(travels)) > 5  # the strongest hold a normal finger in the fourth zone wherever they begin before
+        assert 0.25 <= travels[-1] <= 0.6
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))
+@settings(derandomize=True, deadline=None, max_examples=40)
+def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[int, ...], int, bool]]) -> None:
+    """Read once a phase or 20 times a report, travel and report are the same."""
+    coarse, fine = SimulatedDualSense(), SimulatedDualSense()
+    tick = 0
+    for device in (coarse, fine):
+        device.read(0.0)
+    for force_n, strengths, ticks, writes in phases:
+        for device in (coarse, fine):
+            device.set_finger_force(force_n, force_n / 2)
+            if writes:
+                device.write(OutputReport(MultiPositionFeedback(strengths), Off()), tick * 0.0025)
+        reports = [fine.read((tick + step / 12) * 0.0025) for step in range(1, ticks * 12)]
+        tick += ticks
+        reports.append(fine.read(tick * 0.0025))
+        last = next((report for report in reversed(reports) if report is not None), None)
+        assert coarse.read(tick * 0.0025) == last
+        assert coarse.travel == pytest.approx(fine.travel, abs=1e-11)
+
+
+# Commands
+
+
+@TRANSPORTS
+def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
+    """A value and a report on the wire do the same."""
+    by_value, by_wire = SimulatedDualSense(transport), SimulatedDualSense(transport)
+    third = MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0))
+    for number, (output, l2, r2) in enumerate(
+        (
+            (OutputReport(l2=feedback(3, 6), rumble=Rumble(1.0, 0.2)), feedback(3, 6), Off()),
+            (OutputReport(r2=third, lightbar=(1, 2, 3)), feedback(3, 6), third),
+            (OutputReport(l2=Off(), r2=Off()), Off(), Off()),
+        )
+    ):
+        by_value.write(output, 0.001 * number)
+        by_wire.take_report(build_output_report(output, transport, number), 0.001 * number)
+        for device in (by_value, by_wire):
+            assert device.effects == (l2, r2)
+            assert device.rumble == Rumble(1.0, 0.2)
+            assert device.released is (l2 == r2 == Off())
+            assert device.write_count == number + 1
+    assert by_wire.output == by_value.output == OutputReport(Off(), Off(), Rumble(1.0, 0.2), (1, 2, 3))
+
+
+@TRANSPORTS
+def test_a_report_that_cannot_be_read_changes_nothing(transport: Transport) -> None:
+    device = SimulatedDualSense(transport)
+    device.write(STIFF, 0.0)
+    good = build_output_report(OutputReport(Off(), Off()), transport)
+    other = Transport.BLUETOOTH if transport is Transport.USB else Transport.USB
+    debug = bytearray(good)
+    debug[11 if transport is Transport.USB else 13] = 0xFC
+    for report, message in (
+        (b"", "no bytes"),
+        (good[:-1], f"{len(good) - 1} bytes"),
+        (bytes(debug), "0xfc" if transport is Transport.USB else "checksum"),
+        (build_output_report(STIFF, other), f"not for a controller on {transport.value}"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            device.take_report(report, 0.1)
+    assert device.effects == (STIFF.l2, STIFF.r2)
+    assert device.write_count == 1
+
+
+def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
+    device = SimulatedDualSense()
+    device.write(OutputReport(feedback(0, 8), feedback(0, 8), Rumble(1.0, 1.0), WARNING_LIGHT), 0.0)
+    device.close()
+    device.close()
+    assert device.output == OutputReport(Off(), Off(), Rumble(), USUAL_LIGHT)
+    assert device.released
+    with pytest.raises(DeviceError, match="closed"):
+        device.read(0.1)
+    with pytest.raises(DeviceError, match="closed"):
+        device.write(OutputReport(), 0.1)
+
+
+# Its modes, and the cable
+
+
+def test_bluetooth_starts_with_simple_reports_until_more_is_asked_for() -> None:
+    ways: tuple[Callable[[SimulatedDualSense], object], ...] = (
+        lambda device: device.get_feature(0x09),
+        lambda device: device.get_feature(0x20),
+        lambda device: device.write(OutputReport(), 0.1),
+    )
+    for ask in ways:
+        device = SimulatedDualSense(Transport.BLUETOOTH)
+        device.set_buttons(frozenset({Button.CROSS}))
+        for number in range(3):
+            report = report_at(device, number * 0.004)
+            state = parse_input_report(report)
+            assert is_simple_report(report)
+            assert (state.sequence, set(state.pressed)) == (number, {Button.CROSS})
+        device.get_feature(0x05)
+        assert device.simple_mode
+        ask(device)
+        assert not device.simple_mode
+        state = state_at(device, 0.2)
+        assert (state.sequence, state.battery) == (1, Battery(0.95, BatteryState.DISCHARGING))
+    device.unplug()
+    device.plug_in()
+    assert is_simple_report(report_at(device, 0.3))
+
+
+@TRANSPORTS
+def test_features(transport: Transport) -> None:
+    device = SimulatedDualSense(transport)
+    assert parse_address(device.get_feature(0x09), transport) == SIMULATED_ADDRESS == device.address
+    assert Firmware.parse(device.get_feature(0x20), transport) == SIMULATED_FIRMWARE
+    assert device.get_feature(0x05) == build_calibration(transport)
+    with pytest.raises(DeviceError, match="no feature report 0x22; valid: 0x05, 0x09, 0x20"):
+        device.get_feature(0x22)
+
+
+@TRANSPORTS
+def test_unplugged_it_is_gone_and_plugged_in_it_starts_anew(transport: Transport) -> None:
+    device = SimulatedDualSense(transport)
+    device.set_finger_force(0.0, 3.7)
+    device.write(STIFF, 0.0)
+    device.read(1.0)
+    device.unplug()
+    assert device.released
+    uses: tuple[Callable[[], object], ...] = (
+        lambda: device.read(1.1),
+        lambda: device.write(STIFF, 1.1),
+        lambda: device.take_report(build_output_report(STIFF, transport), 1.1),
+        lambda: device.get_feature(0x09),
+    )
+    for use in uses:
+        with pytest.raises(DeviceError, match=r"gone \(unplugged\)"):
+            use()
+    device.close()
+    device.plug_in()
+    assert state_at(device, 5.0).sequence == 0
+    assert device.released
+    assert state_at(device, 6.0).r2 == 1.0  # the finger is still there
+
+
+def used(what: str, *arguments: Any, **named: Any) -> Any:
+    """A method of a controller that has been read at 1 s, or of a trigger."""
+    device = SimulatedDualSense()
+    device.read(1.0)
+    owner: Any = SimulatedTrigger() if hasattr(SimulatedTrigger, what) and what != "set_finger_force" else device
+    return getattr(owner, what)(*arguments, **named)
+
+
+@pytest.mark.parametrize(
+    ("what", "arguments", "message"),
+    [
+        *(("read", (now_s,), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
+        *(("write", (OutputReport(), now_s), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
+        *(("set_finger_force", (1.0, force_n), "finger_force_n = ") for force_n in (-1.0, NAN, INF)),
+        *(("advance", (step_s,), "step_s = ") for step_s in (-0.1, NAN, INF)),
+        *(("hold_at", (travel,), "travel = ") for travel in (-0.1, 1.1, NAN)),
+        ("set_sticks", ((1.5, 0.0),), "left_stick"),
+        ("set_buttons", (frozenset({Button.L2}),), "pressed has L2 or R2"),
+        ("set_buttons", (frozenset({Button.UP, Button.DOWN}),), "down and up"),
+        ("set_buttons", (frozenset({Button.LEFT_PADDLE}),), "valid: only on a DualSense Edge"),
+    ],
+)
+def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        used(what, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((1.0, (1,) * 9), "zone_strengths"),
+        ((1.0, (9,) * 10), "zone_strengths"),
+        *(((1.0, (1,) * 10, step_n), "strength_step_n = ") for step_n in (-0.1, NAN, INF)),
+    ],
+)
+def test_refused_forces(arguments: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        equilibrium_travel(*arguments)
+    with pytest.raises(ValueError, match="address = 'nobody'"):
+        SimulatedDualSense(address="nobody")
