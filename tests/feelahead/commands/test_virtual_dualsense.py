@@ -17,7 +17,7 @@ from feelahead.commands.virtual_dualsense import (
     live,
 )
 from feelahead.main import command
-from operator_side.dualsense.effects.official import Off, OtherEffect
+from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.feature_report import parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
