@@ -29,7 +29,11 @@ REST: dict[str, Any] = {
 STOPPING = REST | {"run": False, "emergency_stop": True, "next_target": False, "hand_over": False}
 PAUSES_S = (0.05, 0.0995, 0.1, 0.1005, 0.15, 0.1995, 0.2, 0.2005, 0.3, 0.4995, 0.5005, 1.0)
 GOES_ON = ("lease hands field", "lease hands", "lease hands", "lease field", "hands field", "lease", "")
-BUTTONS = (Button.L1, Button.OPTIONS, Button.CIRCLE, Button.TRIANGLE, Button.CREATE, Button.CROSS, Button.SQUARE)
+L1, ARMS, CLOSES = Button.L1, Button.OPTIONS, Button.CROSS
+HELD: tuple[frozenset[Button], ...] = (
+    *(frozenset({L1}), frozenset({L1, ARMS, CLOSES}), frozenset({L1, ARMS, Button.SQUARE}), frozenset({ARMS})),
+    *(frozenset({L1, Button.TRIANGLE, Button.CREATE}), frozenset({L1, ARMS, CLOSES, Button.CIRCLE}), frozenset()),
+)
 STATES: tuple[MotionState, ...] = ("armed", "armed", "disarmed", "stopped")
 
 
@@ -112,7 +116,7 @@ class Core(RuleBasedStateMachine):
     @rule(
         pulls=st.sampled_from([(0.0, 0.0), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0)]),
         deflected=st.booleans(),
-        held=st.frozensets(st.sampled_from(BUTTONS)),
+        held=st.sampled_from(HELD),
     )
     def move_hands(self, pulls: tuple[float, float], deflected: bool, held: frozenset[Button]) -> None:
         sticks = {"left_stick": (1.0, 0.0), "right_stick": (0.0, 1.0)} if deflected else {}
