@@ -1,7 +1,7 @@
 """The process that draws: `python -m operator_side.terminal_view.main FD`, started by TerminalStatus alone.
 
-It waits for the terminal as long as that takes, which is why it is a process of its own; facts that came meanwhile are
-passed over. It ends, and puts the terminal back, when the other end of the channel does, however that ended.
+A process apart may wait for the terminal as long as that takes; facts that came meanwhile are passed over. It ends,
+and puts the terminal back, when the other end of the channel does, however that ended.
 """
 
 import io

@@ -121,6 +121,19 @@ def test_without_news_first_the_hands_run_out_then_the_field_then_the_lease(
     assert (bench.device.released, bench.side.lease is not None) == (not stiff, owns)
 
 
+def test_a_controller_that_is_back_may_only_stop_before_the_arm_has_stopped(bench: Bench) -> None:
+    bench.feel(2)
+    bench.side.controller_lost(bench.now_s)
+    for state, commands in (("armed", 0), ("armed", 0), ("disarmed", 1), ("armed", 1)):
+        bench.now_s += 0.01
+        bench.side.controller_found(bench.now_s)
+        bench.feel(2, state)  # type: ignore[arg-type]
+        bench.hands(Button.CIRCLE)
+        assert [command.emergency_stop for command in bench.commands()] == [True]
+        bench.hands(Button.L1)
+        assert len(bench.commands()) == commands, state
+
+
 def test_who_hears_while_blind_that_another_drives_is_told_no_more_and_rests_before_driving_again(
     bench: Bench,
 ) -> None:
