@@ -1,4 +1,4 @@
-"""What a person is shown of a run: figures that each may be unknown, and in words what is going on.
+"""A run as people see it: figures that each may be unknown, and the state in words.
 
 A side's status values are the keys of its JSON lines. They become one frozen record here, which `live_line` writes
 for a terminal and `live_story` for a file. All distances are perceived ones, never the simulation's truth.
@@ -11,13 +11,13 @@ Value = float | int | str | bool | None
 
 LINK_UP = "up"
 LINK_LOST = "lost: "
-"""How the link's word begins when there was one; the reason follows."""
+"""Begins the link's word when there was one; the reason follows."""
 LINK_REFUSED = "refused: "
 _LARGEST = 1e300
 SLOW = 0.9
 """A simulation below this share of real time is said to be slow."""
 _BEFORE_ARMED = ("resting", "arming")
-"""What the simulated person does before they have seen that it is armed."""
+"""The simulated person's phases before they have seen that it is armed."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class TriggerView:
     pulled: float | None = None
     """Calibrated travel, 0 to 1."""
     resists: float | None = None
-    """Its stiffness, 0 to 1; 0 while the arm is not armed, as the trigger is free then."""
+    """Stiffness, 0 to 1; 0 while the arm is not armed, as the trigger is free then."""
 
 
 @dataclass(frozen=True)
 class LiveView:
-    """What is shown; None is not known."""
+    """Everything that is shown; None is not known."""
 
     phase: str = "starting"
-    """What is going on, in a word or two."""
+    """The state, in a word or two."""
     reason: str | None = None
     """Why, after a stop or a lost link."""
     alarm: bool = False
@@ -61,7 +61,7 @@ class LiveView:
     target_centre_mm: float | None = None
     """From the point between the fingertips to the target's centre, as perceived."""
     holding: str | None = None
-    """What is between the fingers."""
+    """The object between the fingers."""
 
 
 def live_view(values: Mapping[str, Value]) -> LiveView:
@@ -96,7 +96,7 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
 
 
 def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
-    """What is going on, why, and whether it is an alarm: what keeps the arm from moving comes first."""
+    """The state, its reason, and whether it is an alarm: first comes a state that keeps the arm from moving."""
     link, state, person = _text(values, "link"), values.get("state"), _text(values, "person")
     because, controller = _text(values, "stopped_because"), values.get("controller")
     for beginning, word in ((LINK_LOST, "LINK LOST"), (LINK_REFUSED, "REFUSED")):

@@ -1,1 +1,1 @@
-"""What the console shows, drawn in a terminal, for machines without a browser."""
+"""The console's facts, drawn in a terminal, for machines without a browser."""

@@ -1,9 +1,10 @@
 """The process that draws: `python -m operator_side.terminal_view.main FD`, started by TerminalStatus alone.
 
-It waits for the terminal as long as that takes, which is why it is a process of its own; facts that came meanwhile are
-passed over. It ends, and puts the terminal back, when the other end of the channel does, however that ended.
+A process apart may wait for the terminal as long as that takes; facts that came meanwhile are passed over. It ends,
+and puts the terminal back, when the other end of the channel does, however that ended.
 """
 
+import io
 import select
 import sys
 import termios
@@ -30,7 +31,9 @@ def main() -> None:
     before = termios.tcgetattr(terminal)
     try:
         take_over(terminal)
-        with Live(console=Console(), screen=True, auto_refresh=False) as live:
+        with Live(
+            console=Console(file=io.TextIOWrapper(sys.stdout.buffer, "utf-8")), screen=True, auto_refresh=False
+        ) as live:
             _draw_on(channel, live)
     except OSError:
         pass  # the terminal is gone, and the program that started us gets its own signal

@@ -68,7 +68,7 @@ def _line(*pieces: str | tuple[str, str]) -> Text:
 
 
 def _banner(view: LiveView, alarm: str | None, width: int) -> Text:
-    """What is going on, in words and signs that need no colour; only an alarm fills the whole line with its sign."""
+    """The state in words and signs that need no colour; only an alarm fills the whole line."""
     text, fill, style = view.phase if view.reason is None else f"{view.phase}: {view.reason}", ".", _QUIET
     if alarm is not None or view.alarm:
         text, fill, style = alarm or text, "!", _ALARM
@@ -103,7 +103,7 @@ def _standing(facts: OperatorFacts) -> list[Text]:
 
 
 def _trigger(name: str, trigger: TriggerFacts, advances: bool, width: int, rows: int) -> list[Text]:
-    """Where the finger is, what lies along its way, and from how far it is felt."""
+    """The finger's place, the zones along its way, and the distances at which they stiffen."""
     cells = min(_LABEL, max(1, (width - _LABEL) // _ZONES))
     raw = number(trigger.raw)
     reached = 0 if raw is None else math.ceil(min(1.0, max(0.0, raw * SENSED_TRAVEL)) * cells * _ZONES)
@@ -136,7 +136,7 @@ def _trigger(name: str, trigger: TriggerFacts, advances: bool, width: int, rows:
 
 
 def _ahead(facts: OperatorFacts, view: LiveView) -> list[Text]:
-    """What is near, what is wanted, and what is in the hand."""
+    """The nearest object, the target, and the thing in the hand."""
     target = UNKNOWN if view.has_target is None else "none"
     if view.has_target:
         by_centre = view.target_mm is None and view.target_centre_mm is not None

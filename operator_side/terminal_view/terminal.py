@@ -11,7 +11,7 @@ _INPUT, _LOCAL, _LETTERS = 0, 3, 6
 
 
 def take_over(terminal: int) -> None:
-    """Do not show what is typed, and let only Ctrl-C do what it did.
+    """Show nothing that is typed, and turn off two keys.
 
     Ctrl-Z would leave an arm to itself, and Ctrl-S an old screen that looks like a new one.
     """

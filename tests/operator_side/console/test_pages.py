@@ -95,16 +95,19 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
             await desk.until(lambda: len(desk.heard) == 1)
             await second.send('{"tune": {"probability": 0.9}, "hands": {"keys": []}}')
             await desk.until(lambda: len(desk.heard) == 3)
-        await desk.until(lambda: len(desk.heard) == 5)
+            await second.send('{"play": {"paused": true}}')
+            await desk.until(lambda: len(desk.heard) == 4)
+        await desk.until(lambda: len(desk.heard) == 6)
 
     heard = run(story).heard
-    assert heard[:3] == [
+    assert heard[:4] == [
         ("h", {"page": 1, "hands": {"keys": ["w"]}}),
         ("h", {"page": 2, "hands": {"keys": []}}),
         ("t", {"page": 2, "tune": {"probability": 0.9}}),
+        ("p", {"page": 2, "play": {"paused": True}}),
     ]
     # Whose page is gone holds nothing any more.
-    assert sorted(said["page"] for _, said in heard[3:] if said["hands"] is None) == [1, 2]
+    assert sorted(said["page"] for _, said in heard[4:] if said["hands"] is None) == [1, 2]
 
 
 def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
@@ -190,12 +193,3 @@ def test_a_hidden_page_counts_for_nothing_and_is_shown_nothing_but_what_lasts() 
             assert await a_round(hidden) == ["2"]
 
     assert run(story).counts == [1, 2, 1, 2, 1, 0]
-
-
-def test_wishes_for_a_recording_are_passed_on() -> None:
-    async def story(desk: Desk, opens: Opens) -> None:
-        async with opens() as page:
-            await page.send('{"play":{"paused":true}}')
-            await desk.until(lambda: bool(desk.heard))
-
-    assert run(story).heard[0] == ("p", {"page": 1, "play": {"paused": True}})

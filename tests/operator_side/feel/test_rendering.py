@@ -1,6 +1,5 @@
 """From fields and time to what both triggers and the motors do."""
 
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

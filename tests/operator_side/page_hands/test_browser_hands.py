@@ -6,13 +6,12 @@ from typing import Any
 import pytest
 
 from common.protocol.messages import Telemetry
-from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
-from operator_side.page_hands.browser_hands import BrowserHands
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import BROWSER, PERSON, SharedHands
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
@@ -148,32 +147,23 @@ def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() 
     assert (first[0].r2, first[0].run) == (0.0, False)
 
 
-def test_a_stop_takes_the_controller_from_the_person_for_good() -> None:
+def test_a_stop_takes_the_controller_from_the_person_for_good_and_nobody_goes_on_where_there_is_nobody() -> None:
     desk = Desk(person=True)
     desk.let_pass(1.3, says=False)
     desk.page.say(desk.now_s, driving=False, stop=True)
     assert not any(one.arm for one in desk.let_pass(10.0, says=False)[1:])
     assert desk.hands.hands == BROWSER
-
-
-def test_nobody_goes_on_where_there_is_nobody() -> None:
-    desk = Desk()
-    desk.page.say(0.0, driving=False, give_back=True)
-    assert not any(one.run for one in desk.let_pass(3.0, says=False))
-    assert (desk.hands.hands, desk.hands.has_person) == (BROWSER, False)
+    alone = Desk()
+    alone.page.say(0.0, driving=False, give_back=True)
+    assert not any(one.run for one in alone.let_pass(3.0, says=False))
+    assert (alone.hands.hands, alone.hands.has_person) == (BROWSER, False)
 
 
 def test_the_hands_press_no_button_that_was_not_asked_for() -> None:
-    device, pages = SimulatedDualSense(), DrivingPage()
-    hands = BrowserHands(device, pages)
-    hands.tick(0.0, armed(), 0.0)
-    report = device.read(0.0)
-    assert report is not None
-    assert parse_input_report(report).pressed == frozenset()
-    page = TalkingPage(pages)
-    now_s = page.go_on(0.0, 1.1)
-    page.say(now_s, run=True, next_target=True, hand_over=True)
-    hands.tick(now_s, armed(), 0.0)
-    report = device.read(now_s)
-    assert report is not None
-    assert parse_input_report(report).pressed == {Button.L1, Button.TRIANGLE, Button.CREATE}
+    desk = Desk()
+    desk.screen = armed()
+    [first, *_] = desk.let_pass(0.02, says=False)
+    assert first == operator_intent(ControllerState())
+    desk.let_pass(1.1)
+    held = desk.let_pass(0.02, run=True, next_target=True, hand_over=True)[-1]
+    assert held == operator_intent(ControllerState(pressed=frozenset({Button.L1, Button.TRIANGLE, Button.CREATE})))

@@ -66,15 +66,6 @@ def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(p
     assert pages.rest_s(now_s + 0.06) == REST_S
 
 
-def test_a_key_that_is_pressed_too_early_makes_the_second_begin_anew(pages: DrivingPage) -> None:
-    page = TalkingPage(pages)
-    now_s = page.go_on(0.0, 0.9)
-    page.say(now_s, gripper=1)
-    now_s = page.go_on(now_s + 0.02, 0.9)
-    page.say(now_s, run=True)
-    assert pages.hands(now_s) is None
-
-
 def running(pages: DrivingPage, page: TalkingPage, start_s: float = 0.0) -> float:
     now_s = page.go_on(start_s, 1.1)
     page.say(now_s, run=True)
