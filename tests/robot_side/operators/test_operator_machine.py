@@ -1,6 +1,5 @@
 """Lease, safety and session under whatever operators do, step by step beside a reference of their own."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
