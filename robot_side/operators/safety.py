@@ -81,7 +81,7 @@ class Safety:
 
     @property
     def state(self) -> MotionState:
-        """The robot's, whoever owns it."""
+        """The robot's state under any owner."""
         if self._session is not None and self._session.state is SessionState.ARMED:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
@@ -177,7 +177,7 @@ class Safety:
         return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
-        """Follow the table; whatever is no step towards arming starts the healthy second anew."""
+        """Follow the table; every event but HEALTHY restarts the healthy second."""
         if event is not SessionEvent.HEALTHY:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:

@@ -9,7 +9,7 @@ import pytest
 from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
 from feelahead.experiments.faults.session_bench import QUICK, TICK_S, Bench, Operator
-from robot_side.ahead.law import Law, LawName, Sensed, Situation
+from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.assembly import build_robot_side
 from robot_side.gripper.held_object import grip
 from robot_side.objects.perceived import Role
@@ -134,11 +134,6 @@ def test_the_target_is_switched_once_for_each_press(bench: Bench) -> None:
     assert bench.views[-1].target not in {second, None}
 
 
-def test_without_a_measured_delay_the_worst_case_holds(bench: Bench) -> None:
-    bench.tick()
-    assert bench.robot.status(bench.now_s)["loop_age_ms"] == pytest.approx(1000.0)
-
-
 def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(bench: Bench) -> None:
     status = bench.robot.status(bench.now_s)
     assert (status["link"], status["L2_pulled"], "nearest_mm" in status) == ("waiting for an operator", None, False)
@@ -163,15 +158,6 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
     bench.silence(1.0)
     assert bench.robot.status(bench.now_s)["link"] == "lost: nothing heard from the operator"
     assert bench.robot.summary()["loop_age_ms"]["mean"] > 0.0
-
-
-@pytest.mark.parametrize("law", ["swept", "paper"])
-def test_every_law_ticks(law: LawName) -> None:
-    bench = Bench(RobotSettings(law=law))
-    bench.tick(3)
-    summary = bench.robot.summary()
-    assert summary["enlargement_mm"]["min"] > 0.0
-    assert summary["skipped"]["fields"] > 0
 
 
 class Listening:
