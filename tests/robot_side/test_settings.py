@@ -183,7 +183,7 @@ def test_cameras_are_switched_off_by_a_flag_or_in_the_file(tmp_path: Path) -> No
         ('[roles]\npost = "enemy"', "enemy"),
         ("kinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
         ("[camera]\nmean_m = [0.0, 0.001]", "mean_m"),
-        ("[camera]\nsd_m = nan", "sd_m = nan"),
+        ("[camera]\nsd_m = nan", "sd_m = NaN"),
         ("[encoder]\nsigma_rad = 2.0", "sigma_rad = 2.0"),
         ("model = 3", "model"),
         ("cover_m = 0", "cover_m = 0"),

@@ -165,12 +165,6 @@ def test_a_support_counts_only_where_it_is_asked_for() -> None:
 # Once
 
 
-def test_without_a_step_nothing_is_found_anew() -> None:
-    script = Script.load("wall").go(0.319)
-    assert script.until_contact(0.1 * AHEAD) is not None
-    assert [script.truth.update(None) for _ in range(3)] == [None] * 3
-
-
 def test_a_contact_that_goes_on_is_reported_at_its_onset_alone() -> None:
     script = Script.load("wall").go(0.319)
     assert script.until_contact(0.1 * AHEAD) is not None
