@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from common.command.run_options import RunOptions
+from common.limits import check_limits, check_value
 from robot_side.ahead.law import LawName
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.cameras.settings import CamerasSettings
@@ -20,23 +22,21 @@ from robot_side.simulation.built_in_scenes import SceneName
 Assist = Literal["none", "speed"]
 
 
-def _require(name: str, value: float, low: float, high: float) -> None:
-    if not (math.isfinite(value) and low <= value <= high):
-        raise ValueError(f"{name} = {value}; valid: {low} to {high}")
+_Offset = Annotated[float, Meta(ge=-1.0, le=1.0)]
+_Spread = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 @dataclass(frozen=True)
 class EncoderSettings:
     """The joint encoders' error (eq. 3): assumptions of a usual class, not one arm's specification."""
 
-    sigma_rad: float = 2e-4
+    sigma_rad: _Spread = 2e-4
     """Standard deviation of a reading's noise."""
-    resolution_rad: float = 2.0 * math.pi / 2**15
+    resolution_rad: _Spread = 2.0 * math.pi / 2**15
     """Quantisation step: 15 bits a turn."""
 
     def __post_init__(self) -> None:
-        _require("sigma_rad", self.sigma_rad, 0.0, 1.0)
-        _require("resolution_rad", self.resolution_rad, 0.0, 1.0)
+        check_limits(self)
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,15 @@ class CameraSettings:
 
     mean_m: float | Vector3 = 0.0
     """μ_c, true minus perceived, of every axis of the world or of each."""
-    sd_m: float = 0.003
+    sd_m: _Spread = 0.003
     """Drawn once for each object: 3 mm is a depth camera at half a metre (assumed)."""
-    frame_sd_m: float = 0.0
+    frame_sd_m: _Spread = 0.0
     """Drawn anew in each frame, on top."""
 
     def __post_init__(self) -> None:
+        check_limits(self)
         for mean_m in self.mean_vector_m:
-            _require("mean_m", mean_m, -1.0, 1.0)
-        _require("sd_m", self.sd_m, 0.0, 1.0)
-        _require("frame_sd_m", self.frame_sd_m, 0.0, 1.0)
+            check_value("mean_m", mean_m, _Offset)
 
     @property
     def mean_vector_m(self) -> Vector3:
@@ -97,7 +96,7 @@ class RobotSettings(RunOptions):
     assist: Assist = "none"
     """What the robot side adds to stiffness, which is advice. speed: it caps the speed along the triggers, so that the
     arm stops where full strength is due, however hard the finger pulls."""
-    cover_m: float = 0.003
+    cover_m: Annotated[float, Meta(ge=0.0005, le=0.05)] = 0.003
     """How far the spheres that cover the gripper may stand out of it: fewer of them for more."""
     prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """What the prediction of the commands under way misses on this arm, from: feelahead bench error --table FILE.toml.
@@ -106,7 +105,7 @@ class RobotSettings(RunOptions):
     """How often a warning must come before the contact, between 0 and 1 (eq. 10)."""
     permit_tuning: bool = False
     """Let the operator that owns the robot change the probability and this side's emulated link while it runs."""
-    assumed_delay_s: float = 1.0
+    assumed_delay_s: Annotated[float, Meta(ge=0.001, le=60.0)] = 1.0
     """The loop age that is reckoned with while none has been measured."""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
     """μ_ee, the mean error of the forward kinematics in the world frame, true minus estimated."""
@@ -120,12 +119,11 @@ class RobotSettings(RunOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_limits(self)
         if self.scene is not None and self.model is not None:
             raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
-        _require("cover_m", self.cover_m, 0.0005, 0.05)
         if self.keys is not None and self.insecure:
             raise ValueError("--insecure with --keys: valid: one of them, as keys already say who may come in")
-        _require("assumed_delay_s", self.assumed_delay_s, 0.001, 60.0)
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:

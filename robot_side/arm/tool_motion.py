@@ -6,29 +6,30 @@ along +z and L2 retreats; the left stick moves across, the right stick turns the
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from common.arrays import FloatArray
+from common.limits import check_limits
 from common.protocol.messages import MotionCommand, Vector2
 
 Vector3 = tuple[float, float, float]
+_Speed = Annotated[float, Meta(gt=0.0, le=5.0)]
 
 
 @dataclass(frozen=True)
 class ToolMotionSettings:
     """What full travel and full deflection mean."""
 
-    trigger_speed_m_s: float = 0.25
+    trigger_speed_m_s: _Speed = 0.25
     """ISO 10218's reduced speed for an arm near people."""
-    stick_speed_m_s: float = 0.1
-    turn_speed_rad_s: float = 0.5
+    stick_speed_m_s: _Speed = 0.1
+    turn_speed_rad_s: _Speed = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("trigger_speed_m_s", "stick_speed_m_s", "turn_speed_rad_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and 0.0 < value <= 5.0):
-                raise ValueError(f"{name} = {value}; valid: above 0 up to 5")
+        check_limits(self)
 
 
 def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[Vector3, Vector3]:

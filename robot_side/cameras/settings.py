@@ -4,6 +4,11 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import tyro
+from msgspec import Meta
+
+from common.limits import check_limits
+
+_Pixels = Annotated[int, Meta(ge=16, le=4096)]
 
 
 @dataclass(frozen=True)
@@ -12,20 +17,13 @@ class CamerasSettings:
 
     on: Annotated[bool, tyro.conf.arg(name="cameras", prefix_name=False)] = True
     """Render what somebody looks at; without it nobody sees pictures, and the arm is felt and driven all the same."""
-    width: int = 640
+    width: _Pixels = 640
     """Pixels of each picture."""
-    height: int = 480
-    rate_hz: float = 30.0
+    height: _Pixels = 480
+    rate_hz: Annotated[float, Meta(ge=0.1, le=120.0)] = 30.0
     """Pictures of each view in a second."""
-    quality: int = 75
+    quality: Annotated[int, Meta(ge=1, le=100)] = 75
     """Of JPEG, 1 to 100: 75 is 20 kB for each picture, more than 90 three times that."""
 
     def __post_init__(self) -> None:
-        for name, value, least, most in (
-            ("width", self.width, 16, 4096),
-            ("height", self.height, 16, 4096),
-            ("rate_hz", self.rate_hz, 0.1, 120.0),
-            ("quality", self.quality, 1, 100),
-        ):
-            if not least <= value <= most:
-                raise ValueError(f"cameras.{name} = {value}; valid: {least} to {most}")
+        check_limits(self)

@@ -1,4 +1,4 @@
-"""How encoder error becomes position error of points on the gripper (eq. 3-7)."""
+"""Position error of points on the gripper from encoder error (eq. 3-7)."""
 
 import math
 

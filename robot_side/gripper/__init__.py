@@ -1,1 +1,1 @@
-"""The gripper's shape, and what it holds."""
+"""Shape of the gripper and of a held object."""

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 _MOST_SHAPES = 32
-"""So many meshes and things of tetrahedra are covered closely; each takes up to seconds the first time."""
+"""Most meshes and objects of tetrahedra to cover closely; each takes up to seconds the first time."""
 _MOST_TETRAHEDRA = 64
 _WIDEST_M = 0.2
-"""What is wider than this in every direction no gripper closes around."""
+"""An object wider than this in every direction fits no gripper."""
 _SAME_VOLUME = 1e-6
 _SLIVER = 1e-3
 _DIGITS = 9
@@ -44,9 +44,9 @@ class HeldCovers:
         fixed: Collection[str] = (),
         searching: Callable[[], None] | None = None,
     ) -> None:
-        """From any frame of the objects. fixed: names of what nobody lifts, which is not searched for.
+        """Search covers for any frame of the objects. fixed: names of objects that nobody lifts, left out.
 
-        searching: called before each search, but not for what was found in an earlier run.
+        searching: called before each search, but not for a cover of an earlier run.
         """
         self._stand_out_m = stand_out_m
         self._meshes: dict[int, _Spheres] = {}
@@ -70,7 +70,7 @@ class HeldCovers:
                     stand_outs.append(found[2])
             vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
             if 0 < len(vertices) <= _MOST_TETRAHEDRA and self._may_search(vertices):
-                # Wherever it stands: rounded, so that it is found again.
+                # Relative and rounded, so that the same shape elsewhere is found again.
                 vertices = (vertices - vertices[0, 0]).round(_DIGITS)
                 solids = _tetrahedra_solids(vertices)
                 if solids:

@@ -19,7 +19,7 @@ class HeldObject:
     """The spheres that cover it, as they stood in the tool frame when it was gripped."""
 
     index: int
-    """Its place among the perceived objects' names."""
+    """Index among the perceived objects' names."""
     name: str
     centers_in_tool_m: FloatArray
     """(k, 3)"""

@@ -22,10 +22,10 @@ def kept_cover(
     folder: Path | None = None,
     searching: Callable[[], None] | None = None,
 ) -> _Cover:
-    """What `make` gives for a `shape`, or what it gave for the same one before, by the same code.
+    """Return the cover that `make` gives for a `shape`, from disk if the same code made it before.
 
-    A file that cannot be read is made anew, and a folder that cannot be written to keeps nothing. `searching` is called
-    before `make`, so that a person learns what they wait for.
+    An unreadable file is replaced. A folder without write permission keeps nothing. `searching` is called before
+    `make`, so that a person learns the reason for waiting.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
     path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"

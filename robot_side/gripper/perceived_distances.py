@@ -1,4 +1,4 @@
-"""How far the gripper is from what the camera reports, for people to read: never the simulation's truth."""
+"""Distances from the gripper to perceived objects, for people to read; never the simulation's truth."""
 
 from dataclasses import dataclass
 

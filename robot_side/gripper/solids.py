@@ -25,10 +25,10 @@ class Solid:
     depth_m: Callable[[FloatArray], FloatArray]
     """Points (n, 3) to (n,): how far each is below this surface, or less, never more; negative outside"""
     excess_m: float = 0.0
-    """So much farther out than the true solid, at most"""
+    """Largest distance outside the true solid"""
 
     def placed(self, rotation: FloatArray, position_m: FloatArray) -> "Solid":
-        """The same where `rotation` (3, 3) and `position_m` (3,) put its frame."""
+        """Place the solid by `rotation` (3, 3) and `position_m` (3,) of the frame."""
         return Solid(
             self.corners_m @ rotation.T + position_m,
             lambda points: self.depth_m((points - position_m) @ rotation),
@@ -127,7 +127,7 @@ def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         (points / 1e-7).round().astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
     place = place.ravel()
-    # Faces that a sharp edge divides count alike, however finely each is cut.
+    # Each face at a sharp edge counts once, however finely it is cut.
     faces = np.column_stack([place, np.repeat((units * 1e3).round().astype(np.int64), 3, axis=0)])
     different = np.unique(faces, axis=0, return_index=True)[1]
     normals = np.zeros((len(first), 3))

@@ -23,9 +23,9 @@ _CHOSEN_ANEW = 5
 _CELL = 0.03
 """The smallest cells' longest edge, as a share of the stand-out."""
 _CHOSEN_WITH = 0.97
-"""Of the stand-out, while spheres are chosen for some points: the rest contains most of what lies between these."""
+"""Share of the stand-out while spheres are chosen for points; the rest contains most of the surface between."""
 _DEPTHS = np.array([0.15, 0.35, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 30.0])
-"""Of the stand-out."""
+"""Depths as multiples of the stand-out."""
 _COARSER = 1.2
 _ROUNDING_M = 1e-9
 
@@ -175,7 +175,7 @@ def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) 
 
 
 def _alike(union: _Union, centers_m: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
-    """Those centres (c, 3) that are inside, with depths (c,): of the shallowest image, so that none stands out more."""
+    """Keep centres (c, 3) that are inside, with depths (c,) of the shallowest image, so that none stands out more."""
     depths = np.min([union.room_m((centers_m - origin_m) @ image.T + origin_m) for image in images], axis=0)
     inside = np.isfinite(depths)
     return centers_m[inside], depths[inside]

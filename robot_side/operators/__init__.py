@@ -1,1 +1,1 @@
-"""Who may command the arm, who observes, and what stops it."""
+"""Lease of the arm, observers, and the stops."""

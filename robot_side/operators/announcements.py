@@ -1,4 +1,4 @@
-"""What the robot side says to operators besides stiffness: Hello, and where each stands with the lease."""
+"""Messages to operators besides stiffness: Hello, and the place of each with the lease."""
 
 import itertools
 import math
@@ -40,13 +40,11 @@ class Announcements:
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
-        """The next header of our epoch, which has one sequence whoever it goes to; `link` None: to nobody named."""
+        """The next header of our epoch, in one sequence for all receivers; `link` None: to nobody named."""
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
-        """The next header of what is made between the ticks, in a sequence of its own: what the core sends is the same
-        whoever looks.
-        """
+        """The next header of a message made between ticks, in a separate sequence: viewers change no core message."""
         return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:
@@ -70,7 +68,7 @@ class Announcements:
         self._answers.append(Answer(peer, encode(notice)))
 
     def take(self, now_s: float) -> list[Answer]:
-        """What to send now: answers, and a notice for everyone when anything changed or the last ones are old."""
+        """Answers to send now, and a notice for everyone when anything changed or the last ones are old."""
         standing = [(one.epoch, one.session.state) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:

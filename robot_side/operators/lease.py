@@ -1,4 +1,4 @@
-"""Who may command the arm: one owner with a fencing token that only grows, and a bounded number of observers."""
+"""The lease of the arm: one owner with a fencing token that only grows, and a bounded number of observers."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ class Lease:
 
     def __init__(self, safety: Safety) -> None:
         self.token = 0
-        """Of the present owner's lease, or of the last one; 0 before the first."""
+        """Current or latest lease token; 0 before the first."""
         self.stale = 0
         """Late messages of operators that are forgotten by now."""
         self._safety = safety
@@ -49,7 +49,7 @@ class Lease:
         return (one for one in self._participants.values() if one.state is not SessionState.AWAY)
 
     def known(self) -> Iterator[Participant]:
-        """Everyone who is remembered."""
+        """All remembered operators."""
         return iter(self._participants.values())
 
     def ask(self, participant: Participant, now_s: float) -> bool:
@@ -67,7 +67,7 @@ class Lease:
         return True
 
     def hand_over(self, now_s: float) -> bool:
-        """Pass the lease on to whoever has waited longest; False when nobody waits, and nothing changes."""
+        """Pass the lease on to the observer that has waited longest; False and no change when nobody waits."""
         if self._owner is None or not self._alive(self.observers(), now_s):
             return False
         self._owner.waiting_since_s = now_s
@@ -80,7 +80,7 @@ class Lease:
             self._forget(one, SessionEvent.NEW_EPOCH, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Let go of whoever has been silent for too long."""
+        """Drop participants that were silent for `lease_s` or longer."""
         limit_s = self._safety.settings.lease_s
         for one in self._participants.values():
             if now_s - one.heard_s >= limit_s and one.state is not SessionState.AWAY:
@@ -95,7 +95,7 @@ class Lease:
                 self._forget(one, SessionEvent.FORGOTTEN, now_s)
 
     def _own(self, participant: Participant, now_s: float) -> None:
-        # Milliseconds of the monotonic clock keep it growing even when this process starts anew.
+        # Milliseconds of the monotonic clock keep it growing even when this process restarts.
         self.token = max(self.token + 1, int(1e3 * now_s))
         self._owner = participant
         self._safety.begin(participant.session)
@@ -104,7 +104,7 @@ class Lease:
         waiting = self.observers()
         self._safety.end(event, now_s)
         self._owner = None
-        # Whoever has just fallen silent, too, would only hold it up.
+        # An observer that has just fallen silent, too, would only hold it up.
         alive = self._alive(waiting, now_s)
         if alive:
             alive[0].session.handle(SessionEvent.LEASE_PASSED)

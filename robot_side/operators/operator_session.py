@@ -44,7 +44,7 @@ class OperatorSession:
         self.not_owners = 0
         """Commands that were not the owner's, or not under its present lease; never applied."""
         self.motion_received = 0
-        """All motion commands, whoever sent them."""
+        """All motion commands, of owners and others."""
         self.driving_delay = RunningStatistics(seed)
         """One-way delay in seconds of what arrives from the owner while the arm is armed."""
         self.applied_age = RunningStatistics(seed)
@@ -127,7 +127,7 @@ class OperatorSession:
                 participant.link.expect_other_delay()
 
     def update(self, now_s: float) -> None:
-        """Let go of whoever has been silent for too long; to be called in every tick."""
+        """Drop participants that were silent for too long; to be called in every tick."""
         if now_s == self._updated_s:
             return  # a flood that arrives at once costs this once
         self._updated_s = now_s
@@ -149,7 +149,7 @@ class OperatorSession:
         return self._announcements.stamp_shown(now_s)
 
     def view_header(self, now_s: float) -> Header:
-        """The header of what goes to whoever looks."""
+        """The header of messages to viewers."""
         return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
@@ -191,7 +191,7 @@ class OperatorSession:
         }
 
     def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune | Watch, now_s: float) -> Participant | None:
-        """Make room for a new epoch, which only a Hello can begin; None for whoever is turned away."""
+        """Make room for a new epoch, which only a Hello can begin; None for an epoch that is turned away."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):
             self.refused += isinstance(message, Hello)
@@ -215,7 +215,7 @@ class OperatorSession:
             self.not_owners += 1
             participant.session.handle(SessionEvent.WRONG_TOKEN)
             if command.emergency_stop and participant is self.lease.owner:
-                # It counts however late it comes, under whichever of its leases.
+                # It counts however late it comes, under any lease of this owner.
                 self.safety.emergency_stop(now_s)
             return
         if not self.safety.receive(command, arrival, now_s):
@@ -240,7 +240,7 @@ class OperatorSession:
             return
         self._token = self.lease.token
         self._owner_link = owner.link
-        # A button that it held while it waited is not pressed anew.
+        # A button held while waiting is no press.
         owner.hand_over_was_down = owner.next_target_was_down = True
         self.leases_granted += 1
         self._began = True

@@ -8,8 +8,11 @@ while a steady delay, however long, ages nothing.
 
 from collections import deque
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from msgspec import Meta
+
+from common.limits import check_limits
 from common.protocol.link_end import Arrival
 from common.protocol.messages import MotionCommand, MotionState
 from common.protocol.session import Session, SessionEvent, SessionState
@@ -18,32 +21,30 @@ RELEASED_TRAVEL = 0.02
 """Travel below this counts as released: a calibrated trigger at rest reads 0, give or take a count."""
 _REMEMBERED_STOPS = 1000
 
+_Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]
+_Allowance = Annotated[float, Meta(ge=0.0, lt=60.0)]
+
 
 @dataclass(frozen=True)
 class SafetySettings:
     """The limits; all in seconds. None of them can be switched off: 0 is refused, or means no allowance at all."""
 
-    gap_s: float = 0.1
+    gap_s: _Limit = 0.1
     """Without an accepted command for this long the arm stops."""
-    age_s: float = 0.1
+    age_s: _Limit = 0.1
     """A command that queued for longer than this plus `jitter_s` is discarded."""
-    jitter_s: float = 0.08
+    jitter_s: _Allowance = 0.08
     """The link's own spread that is not a queue: eight times the 10 ms of the reference link."""
-    max_delay_s: float = 2.0
+    max_delay_s: _Limit = 2.0
     """A loop age above this disarms."""
-    healthy_s: float = 1.0
+    healthy_s: _Allowance = 1.0
     """How long commands must have come, with released triggers, before arming."""
-    lease_s: float = 0.9
+    lease_s: _Limit = 0.9
     """An operator that was silent for this long loses the lease: within a second, a tick included."""
 
     def __post_init__(self) -> None:
-        for name in ("gap_s", "age_s", "max_delay_s"):
-            if not 0.0 < getattr(self, name) < 60.0:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: above 0 to below 60")
-        for name in ("jitter_s", "healthy_s"):
-            if not 0.0 <= getattr(self, name) < 60.0:
-                raise ValueError(f"{name} = {getattr(self, name)}; valid: 0 to below 60")
-        if not self.gap_s < self.lease_s < 60.0:
+        check_limits(self)
+        if not self.gap_s < self.lease_s:
             raise ValueError(f"lease_s = {self.lease_s}; valid: above gap_s = {self.gap_s} to below 60")
 
 
@@ -80,7 +81,7 @@ class Safety:
 
     @property
     def state(self) -> MotionState:
-        """The robot's, whoever owns it."""
+        """The robot's state under any owner."""
         if self._session is not None and self._session.state is SessionState.ARMED:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
@@ -176,7 +177,7 @@ class Safety:
         return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
-        """Follow the table; whatever is no step towards arming starts the healthy second anew."""
+        """Follow the table; every event but HEALTHY restarts the healthy second."""
         if event is not SessionEvent.HEALTHY:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:

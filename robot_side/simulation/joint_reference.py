@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
+from msgspec import Meta
 
 from common.arrays import FloatArray
+from common.limits import check_limits
 from robot_side.arm.ability import JointLimits
 from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, record_array
 
@@ -29,26 +31,25 @@ REFERENCE: Final = np.dtype(
 """One joint's reference, in rad and s. lower, upper: where it ends. to_lower, to_upper: the velocities from which it
 can still stop there. change: what its velocity is short of."""
 
+_Limit = Annotated[float, Meta(gt=0.0)]
+
 
 @dataclass(frozen=True)
 class MotionLimits:
     """What the arm's own controller allows each joint, whatever it is told; metres for a prismatic joint."""
 
-    velocity_rad_s: float = 2.0
+    velocity_rad_s: _Limit = 2.0
     """Under the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints (their data sheets)."""
-    acceleration_rad_s2: float = 8.0
-    deceleration_rad_s2: float = 12.0
+    acceleration_rad_s2: _Limit = 8.0
+    deceleration_rad_s2: _Limit = 12.0
     """How fast the reference stops when a command has run out."""
-    windup_rad: float = 0.005
+    windup_rad: _Limit = 0.005
     """How far the reference may run ahead of a joint that something holds back, unless the caller says more for weak
     drives. The built-in arm's large joints press with 20 N m then, some 30 N at the tool, and hardly spring when that
     gives way."""
 
     def __post_init__(self) -> None:
-        for name in ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "windup_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} = {value}; valid: finite and above 0")
+        check_limits(self)
 
     def of_joints(
         self, count: int, lower_rad: FloatArray | None = None, upper_rad: FloatArray | None = None

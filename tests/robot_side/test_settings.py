@@ -7,7 +7,9 @@ import pytest
 
 from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.assembly import build_robot_side
+from robot_side.cameras.settings import CamerasSettings
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.objects.perceived import Role
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
@@ -24,6 +26,13 @@ NAN, INFINITY = math.nan, math.inf
         (CameraSettings, "mean_m", (-1.1, 1.1, NAN, INFINITY)),
         (CameraSettings, "sd_m", (-1e-6, 1.1, NAN, INFINITY)),
         (CameraSettings, "frame_sd_m", (-1e-6, 1.1, NAN, INFINITY)),
+        *[
+            (ToolMotionSettings, name, (0.0, -0.1, 5.1, NAN, INFINITY))
+            for name in ("trigger_speed_m_s", "stick_speed_m_s", "turn_speed_rad_s")
+        ],
+        (CamerasSettings, "width", (15, 4097)),
+        (CamerasSettings, "quality", (0, 101)),
+        (CamerasSettings, "rate_hz", (0.0, 121.0, NAN)),
         (RobotSettings, "assumed_delay_s", (0.0, -1.0, 60.1, NAN, INFINITY)),
         (RobotSettings, "cover_m", (0.0, 4e-4, 0.051, NAN, INFINITY)),
         (RobotSettings, "probability", (0.0, 1.0, -0.1, 1.5, NAN)),
@@ -109,11 +118,6 @@ def test_the_enlargement_knows_both_parts_of_the_cameras_error() -> None:
     assert known.prediction is prediction
 
 
-def test_the_law_is_the_swept_one_unless_the_papers_is_asked_for() -> None:
-    assert RobotSettings().law == "swept"
-    assert parse_settings(RobotSettings, "robot", ["--law", "paper"]).law == "paper"
-
-
 ROBOT_TOML = """
 probability = 0.95
 cover_m = 0.005
@@ -179,7 +183,7 @@ def test_cameras_are_switched_off_by_a_flag_or_in_the_file(tmp_path: Path) -> No
         ('[roles]\npost = "enemy"', "enemy"),
         ("kinematic_mean_m = [0.0, 0.001]", "kinematic_mean_m"),
         ("[camera]\nmean_m = [0.0, 0.001]", "mean_m"),
-        ("[camera]\nsd_m = nan", "sd_m = nan"),
+        ("[camera]\nsd_m = nan", "sd_m = NaN"),
         ("[encoder]\nsigma_rad = 2.0", "sigma_rad = 2.0"),
         ("model = 3", "model"),
         ("cover_m = 0", "cover_m = 0"),
@@ -201,22 +205,3 @@ def test_bad_keys_of_a_file_are_named_in_one_line(tmp_path: Path, content: str, 
     assert named in text
     assert "robot.toml" in text
     assert "\n" not in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--encoder.sigma-rad", "-1"], "sigma_rad = -1"),
-        (["--camera.frame-sd-m", "2"], "frame_sd_m = 2"),
-        (["--assumed-delay-s", "0"], "assumed_delay_s = 0"),
-        (["--law", "alignment"], "alignment"),
-        (["--cover-m", "1"], "cover_m = 1"),
-        (["--motion.turn-speed-rad-s", "nan"], "turn_speed_rad_s = nan"),
-        (["--safety.max-delay-s", "0"], "max_delay_s = 0"),
-    ],
-)
-def test_bad_flags_are_named_in_one_line(arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        parse_settings(RobotSettings, "robot", arguments)
-    assert named in str(caught.value)
-    assert "\n" not in str(caught.value)

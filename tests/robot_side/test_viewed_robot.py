@@ -93,25 +93,6 @@ def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_com
     assert summary["looked_at"]["overview"]["nobody_looks"] > 0
 
 
-def test_without_cameras_the_scene_is_seen_all_the_same() -> None:
-    with viewed("--no-cameras") as (robot, viewer):
-        seen = look_until(viewer, lambda seen: bool(seen.views), overview=True, scene=True)
-        assert frames(seen) == []
-        assert companion_of(robot.process_id) is None
-
-
-def test_a_slow_video_link_delays_video_and_not_stiffness() -> None:
-    with viewed("--link=video: rate 2mbit") as (robot, viewer):
-        works_here(robot, viewer)
-        seen = look_until(viewer, lambda seen: len(frames(seen)) > 5, overview=True, first_person=True)
-        ages_s = sorted(
-            arrived_s - frame.captured_s for arrived_s, frame in seen.views if isinstance(frame, VideoFrame)
-        )
-        # 10 kB and more at 2 Mbit/s.
-        assert ages_s[0] > 0.04
-        assert sorted(seen.stiffness_ages_s)[len(seen.stiffness_ages_s) // 2] < ages_s[0]
-
-
 def test_a_machine_that_cannot_render_is_told_what_helps(monkeypatch: pytest.MonkeyPatch) -> None:
     # PyOpenGL takes no other way than this one, which nobody has.
     monkeypatch.setenv("EGL_PLATFORM", "none")

@@ -24,39 +24,6 @@ def pose_with(jacobian: np.ndarray) -> GripperPose:
     return dataclasses.replace(free_pose([[0.0, 0.0, 0.0]], [0.01]), tool_jacobian=jacobian)
 
 
-def test_a_tool_that_flies_freely_has_its_joints_own_limits() -> None:
-    able = ability(free_pose([[0.0, 0.0, 0.0]], [0.01]), FREE, AHEAD, 0.25)
-    assert able.full_speed_m_s == pytest.approx(0.25)
-    assert able.acceleration_m_s2 == pytest.approx(3.0)
-    assert able.within_reach
-    # Along a diagonal three joints share the way, none at more than its limit.
-    diagonal = ability(free_pose([[0.0, 0.0, 0.0]], [0.01]), FREE, np.full(3, 1.0 / np.sqrt(3.0)), 0.25)
-    assert diagonal.acceleration_m_s2 == pytest.approx(3.0 * np.sqrt(3.0))
-
-
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(seed=seeds)
-def test_away_from_singularities_it_is_what_the_joint_that_moves_most_gives(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    left, right = np.linalg.qr(rng.normal(size=(6, 6)))[0], np.linalg.qr(rng.normal(size=(6, 6)))[0]
-    jacobian = (left * rng.uniform(0.2, 2.0, 6)) @ right
-    direction = random_rotation(rng)[0]
-    limits = JointLimits(np.full(6, 100.0), rng.uniform(1.0, 10.0, 6))
-    able = ability(pose_with(jacobian), limits, direction, 0.25)
-    assert able.full_speed_m_s == pytest.approx(0.25, rel=1e-9)
-    assert able.within_reach
-    rates = np.linalg.solve(jacobian, np.concatenate([direction, np.zeros(3)]))
-    assert able.acceleration_m_s2 == pytest.approx(float((limits.acceleration_rad_s2 / np.abs(rates)).min()), rel=1e-6)
-
-
-def test_a_joint_at_its_speed_limit_slows_the_tool_and_says_so() -> None:
-    slow = JointLimits(np.array([10.0, 10.0, 0.1, 10.0, 10.0, 10.0]), np.full(6, 3.0))
-    able = ability(free_pose([[0.0, 0.0, 0.0]], [0.01]), slow, AHEAD, 0.25)
-    assert able.full_speed_m_s == pytest.approx(0.1)
-    assert able.acceleration_m_s2 == pytest.approx(3.0)
-    assert not able.within_reach
-
-
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds, joints=st.integers(1, 9), least=st.sampled_from([0.0, 0.02, 0.2]))
 def test_it_is_what_the_resolved_rates_come_to(seed: int, joints: int, least: float) -> None:

@@ -61,35 +61,6 @@ def test_it_is_the_twist_resolved_and_what_joints_at_their_ends_let_through(
     assert told == pytest.approx(told_m_s, abs=1e-12)
 
 
-def test_the_command_is_meant_in_the_tool_frame() -> None:
-    # A tool that points along the world's x, its camera upright: down is -z, right is -y.
-    upright = np.stack([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], axis=1)
-    pose = pose_with(np.eye(6), np.ascontiguousarray(upright))
-    for hands, expected, told_m_s in (
-        ({"r2": 1.0}, [0.25, 0.0, 0.0, 0.0, 0.0, 0.0], 0.25),
-        ({"l2": 1.0}, [-0.25, 0.0, 0.0, 0.0, 0.0, 0.0], -0.25),
-        ({"lateral": (0.0, 1.0)}, [0.0, 0.0, 0.1, 0.0, 0.0, 0.0], 0.0),
-        ({"lateral": (1.0, 0.0)}, [0.0, -0.1, 0.0, 0.0, 0.0, 0.0], 0.0),
-        ({"turning": (1.0, 0.0)}, [0.0, 0.0, 0.0, 0.0, 0.0, -0.5], 0.0),
-    ):
-        velocity, told = commanded(command(**hands), pose, MIDDLE, UNLIMITED, SETTINGS)
-        np.testing.assert_allclose(velocity, expected, atol=1e-15)
-        assert told == pytest.approx(told_m_s, abs=1e-15)
-
-
-def test_a_joint_at_its_end_gives_nothing_and_may_go_back() -> None:
-    ends = JointLimits(np.full(6, 10.0), np.full(6, 3.0), np.full(6, -1.0), np.full(6, 1.0))
-    pose = pose_with(np.eye(6), np.eye(3))
-    for at, told_m_s in ((1.0, 0.0), (0.9981, 0.0), (0.9979, 0.25), (-1.0, 0.25)):
-        positions = np.array([0.0, 0.0, at, 0.0, 0.0, 0.0])
-        velocity, told = commanded(command(r2=1.0), pose, positions, ends, SETTINGS)
-        # It is told to go nevertheless, by an estimate that may be off.
-        assert velocity[2] == pytest.approx(0.25)
-        assert told == pytest.approx(told_m_s)
-        backwards = commanded(command(l2=1.0), pose, -positions, ends, SETTINGS)[1]
-        assert backwards == pytest.approx(-told_m_s)
-
-
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_pose_that_is_not_finite_moves_nothing(bad: float) -> None:
     for row in range(3):

@@ -38,17 +38,6 @@ def test_noise_becomes_a_fraction_and_a_steady_motion_has_no_lag(speed: float) -
     assert abs(finger.mean()) < SIGMA / 20.0
 
 
-def test_a_change_of_speed_leaves_no_error_behind() -> None:
-    """The drive's velocity says it at once."""
-    estimate, joint = JointEstimate(), 0.0
-    for tick in range(1000):
-        velocity = 1.0 if tick > 500 else 0.0
-        joint += 1e-3 * velocity
-        seen = estimate.update(state(1e-3 * tick, np.array([joint]), np.array([velocity]), np.empty(0)))
-        assert abs(seen.joint_positions_rad[0] - joint) < 0.6e-3
-    assert seen.joint_positions_rad[0] == pytest.approx(joint, abs=1e-9)
-
-
 def test_it_is_a_complementary_filter_and_an_alpha_beta_filter() -> None:
     """The same in plain NumPy, over uneven steps."""
     random, estimate, time_s = np.random.default_rng(6), JointEstimate(), 0.0

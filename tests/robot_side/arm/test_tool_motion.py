@@ -62,12 +62,6 @@ def test_the_right_stick_turns_the_view_the_way_it_is_pushed(
     assert np.linalg.norm(angular) == pytest.approx(0.5 * math.hypot(*turning))
 
 
-def test_gripper_and_buttons_move_nothing() -> None:
-    linear, angular = motion(gripper=1.0, run=True, arm=True, emergency_stop=True, next_target=True)
-    assert not linear.any()
-    assert not angular.any()
-
-
 def test_the_speed_is_that_of_the_tools_point() -> None:
     random = np.random.default_rng(3)
     jacobian, rates = random.normal(size=(6, 7)), random.normal(size=7)
@@ -85,20 +79,3 @@ def test_the_stick_leads_where_it_moves_the_gripper(right: float, up: float, see
     if math.hypot(right, up) > 1e-6:
         np.testing.assert_allclose(direction, linear / np.linalg.norm(linear), atol=1e-9)
     assert deflection == min(1.0, math.hypot(right, up))
-
-
-def test_a_stick_at_rest_leads_nowhere() -> None:
-    direction, deflection = deflected((0.0, 0.0), random_rotation(np.random.default_rng(2)))
-    assert deflection == 0.0
-    assert np.linalg.norm(direction) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("name", ["trigger_speed_m_s", "stick_speed_m_s", "turn_speed_rad_s"])
-@pytest.mark.parametrize("bad", [0.0, -0.1, 5.1, math.nan, math.inf])
-def test_bad_speeds_are_named(name: str, bad: float) -> None:
-    with pytest.raises(ValueError, match=f"{name} = {bad}; valid"):
-        ToolMotionSettings(**{name: bad})
-
-
-def test_the_default_speed_is_that_of_an_arm_near_people() -> None:
-    assert ToolMotionSettings().trigger_speed_m_s == 0.25

@@ -7,7 +7,6 @@ import pytest
 from common.protocol.view_messages import ViewName
 from robot_side.cameras.exchange import Order, Refusal, Setup
 from robot_side.cameras.pictures import IDLE_S, RETRY_S
-from robot_side.cameras.settings import CamerasSettings
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.fake_companion import Desk
 
@@ -135,11 +134,3 @@ def test_who_cannot_start_a_process_is_told_so(desk: Desk) -> None:
     desk.fails_to_start = "no process can be started: Cannot allocate memory"
     desk.cameras.update(0.0, 0.0, BOTH)
     assert "Cannot allocate memory" in desk.notes[0]
-
-
-@pytest.mark.parametrize(
-    ("field", "value"), [("width", 0), ("height", 5000), ("rate_hz", 0.0), ("quality", 101), ("rate_hz", float("nan"))]
-)
-def test_settings_out_of_range_are_named(field: str, value: float) -> None:
-    with pytest.raises(ValueError, match=rf"cameras\.{field} = .*; valid: "):
-        CamerasSettings(**{field: value})  # type: ignore[arg-type]

@@ -95,13 +95,6 @@ def test_the_object_nearest_to_the_tool_point_is_the_gripped_one() -> None:
     assert gripped_object(objects, np.array([0.03, 0.0, 0.0]), REACH_M) == 0
 
 
-def test_only_what_is_within_reach_is_gripped() -> None:
-    objects = Scene().add(Role.TARGET).sphere([0.0, 0.0, 0.08], 0.03).objects()
-    assert gripped_object(objects, ORIGIN, 0.05) == 0
-    assert gripped_object(objects, ORIGIN, 0.0499) is None
-    assert gripped_object(Scene().objects(), ORIGIN, 10.0) is None
-
-
 def test_supports_and_what_is_ignored_are_never_gripped() -> None:
     scene = Scene().add(Role.SUPPORT).box([0.0, 0.0, 0.0], [1.0, 1.0, 0.01])
     objects = scene.add(Role.IGNORED).add().sphere([0.0, 0.0, 0.06], 0.03).objects()
@@ -140,13 +133,6 @@ def test_the_spheres_cover_the_object_and_nothing_of_another(seed: int) -> None:
     assert radii.max() <= max(largest_m) * (1.0 + 1e-9)
 
 
-def test_a_ball_is_held_as_itself() -> None:
-    pose = free_pose([[0.0, 0.0, 0.0]], [0.01], tool_position_m=[0.1, 0.2, 0.3])
-    held = grip(Scene().add().sphere([0.1, 0.2, 0.35], 0.02).objects(), 0, pose)
-    np.testing.assert_allclose(held.centers_in_tool_m, [[0.0, 0.0, 0.05]], atol=1e-15)
-    np.testing.assert_array_equal(held.radii_m, [0.02])
-
-
 def test_boxes_are_covered_as_closely_as_the_gripper_is() -> None:
     """A carried object is felt no earlier than it has to be: its spheres stand out by 3 mm at most."""
     half = np.array([0.01, 0.01, 0.08])
@@ -158,22 +144,6 @@ def test_boxes_are_covered_as_closely_as_the_gripper_is() -> None:
         radii = held.radii_m[np.abs(held.centers_in_tool_m[:, 0] - center[0]) < 0.05]
         assert len(radii) == 95
         assert (radii - depths).max() <= 0.003 * (1.0 + 1e-9)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_it_moves_with_the_tool(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    arm, before, after = SerialArm(seed), random.uniform(-1.0, 1.0, 6), random.uniform(-1.0, 1.0, 6)
-    gripped_at, moved = arm.pose(before), arm.pose(after)
-    objects = thing(gripped_at.tool_position_m, seed)
-    held = grip(objects, 1, gripped_at)
-    random = np.random.default_rng(seed)
-    points = surface_of(objects, 1, random)
-    in_tool = (points - gripped_at.tool_position_m) @ gripped_at.tool_rotation
-    carried = moved.tool_position_m + in_tool @ moved.tool_rotation.T
-    whole = with_held(moved, held)
-    apart = np.linalg.norm(carried[:, None] - whole.sphere_centers_m[None, 3:], axis=2)
-    assert (apart <= whole.sphere_radii_m[3:] * (1.0 + 1e-9)).any(axis=1).all()
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -35,14 +35,6 @@ def test_owner_and_observers_may_look_and_each_watch_lasts_a_second(bench: Bench
     assert looked_at(bench) == frozenset()
 
 
-def test_the_newest_watch_of_each_holds(bench: Bench) -> None:
-    owner = bench.join(2)
-    watch(bench, owner, overview=True)
-    bench.tick()
-    watch(bench, owner, first_person=True)
-    assert looked_at(bench) == {"first_person"}
-
-
 def test_a_watch_of_nobody_known_is_rejected(bench: Bench) -> None:
     stranger = bench.operator(9, b"stranger")
     watch(bench, stranger, overview=True)
@@ -57,15 +49,6 @@ def test_an_old_watch_again_counts_for_nothing(bench: Bench) -> None:
     bench.tick(1500)
     bench.robot.receive(owner.peer, payload, bench.now_s)
     assert looked_at(bench) == frozenset()
-
-
-def test_a_watch_moves_no_arm_and_arms_none(bench: Bench) -> None:
-    owner = bench.join(2)
-    for _ in range(50):
-        watch(bench, owner, scene=True)
-        bench.tick(10)
-    assert bench.state == "disarmed"
-    assert bench.robot.session.motion_received == 0
 
 
 def test_beginning_to_look_is_counted_once_for_each_who_begins() -> None:

@@ -44,15 +44,6 @@ def test_the_lasting_part_lasts_and_the_other_is_drawn_anew() -> None:
     assert error.variance_m2 == pytest.approx(0.003**2 + 0.001**2)
 
 
-def test_the_seed_changes_every_error() -> None:
-    first, second = (CameraError(("a", "b"), standard_deviation_m=0.01, seed=seed).next_frame() for seed in (1, 2))
-    assert (first != second).all()
-
-
-def test_no_objects_have_no_errors() -> None:
-    assert CameraError(()).next_frame().shape == (0, 3)
-
-
 def test_bad_specifications_are_named() -> None:
     with pytest.raises(ValueError, match="mean_m"):
         CameraError((), mean_m=math.nan)

@@ -16,21 +16,10 @@ def test_the_standard_deviation_is_what_the_readings_show() -> None:
         assert abs(errors.mean()) < 4.0 * encoder.standard_deviation_rad() / math.sqrt(errors.size)
 
 
-def test_noise_and_steps_combine_as_variances() -> None:
-    assert Encoder(3e-4, 0.0).standard_deviation_rad() == pytest.approx(3e-4)
-    assert Encoder(0.0, 6e-4).standard_deviation_rad() == pytest.approx(6e-4 / math.sqrt(12.0))
-    assert Encoder(3e-4, 4e-4 * math.sqrt(12.0)).standard_deviation_rad() == pytest.approx(5e-4)
-
-
 def test_readings_are_whole_steps() -> None:
     step = 2.0 * math.pi / 2**12
     steps = Encoder(1e-3, step, seed=1).read(np.linspace(-2.0, 2.0, 100)) / step
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-
-
-def test_a_perfect_encoder_reads_the_truth() -> None:
-    true = np.array([0.1, -2.0, 3.0])
-    np.testing.assert_array_equal(Encoder(0.0, 0.0).read(true), true)
 
 
 def test_the_seed_alone_decides_the_readings() -> None:

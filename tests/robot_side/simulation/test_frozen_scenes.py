@@ -3,7 +3,6 @@
 import copy
 import re
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -123,26 +122,6 @@ def first_hit(scene: Scene) -> Hit | None:
     return Hit(1e3 * met_m, part_name(scene, mine), part_name(scene, other))
 
 
-def go_on(scene: Scene, data: Any, position_m: FloatArray) -> float:
-    """Move the arm of `data` until the tool, turned as at home, is at `position_m`; how far it is from singular."""
-    robot, site = scene.robot, scene.robot.site
-    turned = scene.data.site_xmat[site].reshape(3, 3)
-    jacobian = np.zeros((6, scene.model.nv))
-    for _ in range(20):
-        mujoco.mj_kinematics(scene.model, data)
-        mujoco.mj_comPos(scene.model, data)
-        mujoco.mj_jacSite(scene.model, data, jacobian[:3], jacobian[3:], site)
-        of_arm = jacobian[:, robot.arm_velocities]
-        axes = data.site_xmat[site].reshape(3, 3)
-        error = np.concatenate([position_m - data.site_xpos[site], 0.5 * np.cross(axes.T, turned.T).sum(axis=0)])
-        if np.abs(error).max() < 1e-6:
-            mujoco.mj_forward(scene.model, data)
-            return float(np.linalg.svd(of_arm, compute_uv=False)[-1])
-        damped = of_arm @ of_arm.T + 1e-6 * np.eye(6)
-        data.qpos[robot.arm_positions] += of_arm.T @ np.linalg.solve(damped, error)
-    raise AssertionError(f"the arm does not reach {position_m}")
-
-
 def test_each_file_is_looked_at() -> None:
     assert {path.stem for path in DATA.glob("*.xml")} == {"arm", *SCENES}
 
@@ -178,51 +157,6 @@ def test_the_free_way_is_what_its_comment_says(name: str) -> None:
     assert found.after_mm == pytest.approx(expected.after_mm, abs=0.1)
     assert found.part.endswith(expected.part)
     assert found.thing == expected.thing
-
-
-@every_scene
-def test_the_arm_can_go_there_and_touches_nothing_on_its_way(name: str) -> None:
-    scene, hit = load(name), SCENES[name].hit
-    robot, data = scene.robot, copy.copy(scene.data)
-    home = data.site_xpos[robot.site].copy()
-    end_m = min(0.35, hit.after_mm * 1e-3 - 0.002) if hit else 0.35
-    for gone_m in np.linspace(0.0, end_m, 30):
-        assert go_on(scene, data, home + gone_m * approach(scene)) > 0.15
-        joints = data.qpos[robot.arm_positions]
-        assert min((joints - robot.lower_rad).min(), (robot.upper_rad - joints).min()) > 0.5
-        # The target of `place_held` stays behind here, as there is no physics that brings it along.
-        touching = {part_name(scene, geom) for pair in data.contact.geom for geom in pair.tolist()}
-        assert touching == set() or "target" in touching
-
-
-@pytest.mark.parametrize("name", ["slot", "wall_beside", "u_mesh", "table_1_box", "mug"])
-def test_what_is_beside_the_way_is_as_near_as_said(name: str) -> None:
-    nearest_m = {"slot": 0.02, "wall_beside": 0.025, "u_mesh": 0.03, "table_1_box": 0.02, "mug": 0.0087}[name]
-    assert nearest_beside(load(name), 0.315).min() == pytest.approx(1e3 * nearest_m, abs=0.1)
-
-
-def nearest_beside(scene: Scene, way_m: float) -> FloatArray:
-    """How near the gripper comes to each object on its way, in mm, not counting what is ahead of it."""
-    data = copy.copy(scene.data)
-    moving, _ = split_geoms(scene)
-    start, axis = data.geom_xpos[moving].copy(), approach(scene)
-    ends, nearest_mm = np.zeros(6), np.full(len(scene.objects), np.inf)
-    for gone_m in np.linspace(0.0, way_m, 60):
-        data.geom_xpos[moving] = start + gone_m * axis
-        for index, thing in enumerate(scene.objects):
-            for geom in thing.geoms:
-                for mine in moving:
-                    distance_m = mujoco.mj_geomDistance(scene.model, data, mine, geom, 1.0, ends)
-                    if abs((ends[3:] - ends[:3]) @ axis) < 0.5 * distance_m:
-                        nearest_mm[index] = min(nearest_mm[index], 1e3 * distance_m)
-    return nearest_mm
-
-
-def test_the_clutter_lines_the_way() -> None:
-    scene = load("cluttered")
-    nearest = dict(zip(scene.roles, nearest_beside(scene, 0.35), strict=True))
-    del nearest["box_behind"]
-    assert {name for name, mm in nearest.items() if not 30.0 <= mm <= 60.0} == set()
 
 
 # The table, described in four ways

@@ -80,20 +80,6 @@ class Rig:
         return (self._next() - self.length) / STEP_S
 
 
-def test_it_closes_at_its_speed_and_stops_when_the_command_runs_out() -> None:
-    rig = Rig()
-    rig.drive.command(1.0, 0.25)
-    np.testing.assert_allclose(rig.drive.control, [255.0])
-    rig.run(1000)
-    # 0.25 s of a stroke of 0.5 s.
-    np.testing.assert_allclose(rig.drive.control, [127.5], rtol=1e-2)
-    assert rig.drive.opening_m == pytest.approx(0.04, rel=1e-2)
-    assert not rig.drive.holding
-    rig.drive.command(-0.5, 1.5)
-    rig.run(1000)
-    np.testing.assert_allclose(rig.drive.control, [255.0], rtol=1e-2)
-
-
 def test_it_feels_what_it_holds_and_what_it_does_not() -> None:
     holding, empty = Rig(thickness_m=0.03), Rig()
     for rig in (holding, empty):
@@ -107,39 +93,6 @@ def test_it_feels_what_it_holds_and_what_it_does_not() -> None:
     assert empty.drive.opening_m == 0.0
     holding.drive.command(0.0, 10.0)
     assert holding.run(100).drive.holding
-
-
-def test_a_hand_that_stops_half_way_in_the_air_holds_nothing() -> None:
-    rig = Rig()
-    rig.drive.command(1.0, 0.2)
-    assert not rig.run(1000).drive.holding
-
-
-def test_the_reference_leads_a_blocked_drive_by_the_force_limit_and_lets_go_at_once() -> None:
-    rig = Rig(thickness_m=0.04)
-    rig.drive.command(1.0, 10.0)
-    rig.run(2000)
-    # Blocked half way at 127.5, a tenth of the stroke of 255 ahead.
-    np.testing.assert_allclose(rig.drive.control, [102.0], atol=1e-6)
-    rig.drive.command(-1.0, 10.0)
-    rig.run(1)
-    assert rig.drive.control[0] >= 127.5 - 1e-6
-    assert not rig.drive.holding
-
-
-def test_the_lag_of_a_moving_drive_is_no_force() -> None:
-    lagging = GripperTravel(**{**travel(force_lead=0.01).__dict__, "lag_s": 0.1})
-    drive = GripperDrive(lagging, stroke_time_s=0.5)
-    drive.command(1.0, 10.0)
-    closure = 0.0
-    for step in range(300):
-        # First-order: the servo's damping over its stiffness is 0.1 s.
-        reference = 1.0 - float(drive.control[0]) / 255.0
-        speed = (reference - closure) / 0.1
-        advance(drive, step * STEP_S, STEP_S, 0.04 * (1.0 - closure), -0.04 * speed)
-        closure += speed * STEP_S
-        assert not drive.holding
-    assert closure > 0.1
 
 
 @pytest.mark.parametrize("bad", [1.1, -1.1, math.nan, math.inf])

@@ -79,58 +79,6 @@ def test_no_sequence_of_commands_makes_it_jump(seed: int) -> None:
         assert np.abs(reference.velocity_rad_s - before).max() <= 12.0 * STEP_S + 1e-12
 
 
-def test_it_accelerates_within_the_limit_and_keeps_the_direction() -> None:
-    reference = standing()
-    reference.command(np.array([1.0, -0.5]), 10.0)
-    velocities = follow(reference, 0.0, 200)
-    assert np.abs(np.diff(velocities, axis=0)).max() == pytest.approx(8.0 * STEP_S)
-    np.testing.assert_allclose(velocities[:, 1], -0.5 * velocities[:, 0], atol=1e-12)
-    np.testing.assert_allclose(velocities[-1], [1.0, -0.5])
-    assert np.count_nonzero(velocities[:, 0] < 1.0 - 1e-9) == pytest.approx(1.0 / 8.0 / STEP_S, abs=1.0)
-
-
-def test_the_command_holds_until_it_runs_out_and_not_a_step_longer() -> None:
-    reference = standing()
-    reference.command(np.array([1.0, 0.0]), 0.2)
-    velocities = follow(reference, 0.0, 400)[:, 0]
-    assert (velocities[130:200] == 1.0).all()
-    assert velocities[200] == pytest.approx(1.0 - 12.0 * STEP_S)
-    assert (velocities[200 + math.ceil(1.0 / 12.0 / STEP_S) :] == 0.0).all()
-
-
-def test_it_stops_from_what_is_measured() -> None:
-    reference = standing()
-    reference.command(np.array([1.0, 0.0]), 0.2)
-    follow(reference, 0.0, 200)
-    position = reference.position_rad - 0.01
-    advance(reference, 0.2, STEP_S, position, np.array([0.3, 0.1]))
-    # One step of the deceleration away from the measured velocity, along a straight line to zero.
-    np.testing.assert_allclose(reference.velocity_rad_s, np.array([0.3, 0.1]) * (1.0 - 12.0 * STEP_S / 0.3))
-    np.testing.assert_allclose(reference.position_rad, position + reference.velocity_rad_s * STEP_S)
-
-
-def test_a_blocked_joint_winds_nothing_up() -> None:
-    reference = standing()
-    reference.command(np.array([1.0, 0.0]), 10.0)
-    for step in range(1000):
-        advance(reference, step * STEP_S, STEP_S, np.zeros(2), np.zeros(2))
-    # And one step's way, without which it could not move at all.
-    np.testing.assert_allclose(reference.position_rad, [LIMITS.windup_rad + 1.0 * STEP_S, 0.0])
-
-
-def test_a_load_does_not_draw_the_reference_along() -> None:
-    reference = standing()
-    for command in (np.zeros(2), np.array([-0.1, 0.0])):
-        reference.command(command, 10.0)
-        before = reference.position_rad.copy()
-        for step in range(100):
-            advance(reference, step * STEP_S, STEP_S, before - [0.05, 0.0], np.zeros(2))
-        # It stays where it is under a load that it was not told of, and goes with it where it is told to.
-        assert reference.position_rad[0] == (
-            before[0] if command[0] == 0.0 else pytest.approx(before[0] - 0.01, abs=2e-3)
-        )
-
-
 def test_weak_servos_and_other_drives_may_lead_farther() -> None:
     nothing = np.zeros(4)
     drives = JointDrives(
@@ -144,21 +92,6 @@ def test_weak_servos_and_other_drives_may_lead_farther() -> None:
     # An eighth of 5 N m at 2² 12.5 N m/rad is 12.5 mrad.
     np.testing.assert_allclose(drives.windup_rad(0.005), [0.005, 0.0125, 0.02, 0.02])
     np.testing.assert_allclose(load_scene().robot.drives.windup_rad(0.005), 0.005)
-
-
-def test_velocity_into_a_position_limit_ends_at_it() -> None:
-    reference = JointReference(np.array([0.0, 0.0]), np.array([-1.0, -1.0]), np.array([0.1, 1.0]), LIMITS)
-    reference.command(np.array([1.0, 0.1]), 10.0)
-    velocities = follow(reference, 0.0, 600)
-    assert reference.position_rad[0] == pytest.approx(0.1, abs=1e-4)
-    assert velocities[-1, 0] == pytest.approx(0.0, abs=1e-2)
-    assert velocities[-1, 1] == pytest.approx(0.1)
-
-
-def test_a_fast_command_is_scaled_as_a_whole() -> None:
-    reference = standing()
-    reference.command(np.array([8.0, -4.0]), 10.0)
-    np.testing.assert_allclose(follow(reference, 0.0, 600)[-1], [2.0, -1.0])
 
 
 @pytest.mark.parametrize("bad", [np.array([np.nan, 0.0]), np.array([np.inf, 0.0]), np.zeros(3), np.zeros((2, 1))])

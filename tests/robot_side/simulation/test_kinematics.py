@@ -7,25 +7,11 @@ import pytest
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.arm.port import ArmState
-from robot_side.simulation import kinematics
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.tool_driver import PERIOD_S, ToolDriver
-
-
-def test_kinematics_with_perfect_encoders_is_the_truth() -> None:
-    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
-    driver.move(np.array([0.1, 0.1, -0.05, 0.2, 0.1, 0.3]), 0.4)
-    state = driver.grip(1.0, 0.3)
-    pose = driver.pose(state)
-    data, site = driver.scene.data, driver.scene.robot.site
-    # The encoders are read after the last step, the simulation's own kinematics stand before it.
-    mujoco.mj_forward(driver.scene.model, data)
-    np.testing.assert_allclose(pose.tool_position_m, data.site_xpos[site], atol=1e-12)
-    np.testing.assert_allclose(pose.tool_rotation, data.site_xmat[site].reshape(3, 3), atol=1e-12)
-
 
 # Joints that share a link, slide, stand off its origin and begin elsewhere than at 0; links turned, by hand (a mocap
 # body) or by a joint that no motor moves.
@@ -148,23 +134,6 @@ def test_the_arms_own_reading_is_within_the_predicted_error_of_the_truth() -> No
     assert np.mean(ratios) == pytest.approx(3.0, abs=4.0 * np.sqrt(6.0 / 200))
 
 
-def test_jacobians_are_the_derivatives_of_the_spheres() -> None:
-    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
-    state = driver.wait(PERIOD_S)
-    pose = driver.pose(state)
-    step = 1e-6
-    for joint in range(6):
-        poses = []
-        for sign in (-1.0, 1.0):
-            moved = state.joint_positions_rad.copy()
-            moved[joint] += sign * step
-            poses.append(driver.pose(type(state)(**{**state.__dict__, "joint_positions_rad": moved})))
-        numeric = (poses[1].sphere_centers_m - poses[0].sphere_centers_m) / (2.0 * step)
-        np.testing.assert_allclose(pose.sphere_jacobians[:, :, joint], numeric, atol=1e-8)
-        tool = (poses[1].tool_position_m - poses[0].tool_position_m) / (2.0 * step)
-        np.testing.assert_allclose(pose.tool_jacobian[:3, joint], tool, atol=1e-8)
-
-
 def points_of(scene: Scene, geom: int, random: np.random.Generator) -> FloatArray:
     """Points (n, 3) of the box around a geom in the world: its corners, and others on its surface."""
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
@@ -217,33 +186,6 @@ def test_the_gap_between_the_fingers_is_kept_free_but_for_3_mm_on_either_side(cl
     free_m = 2.0 * (np.abs(aside) - pose.sphere_radii_m[fingers]).min()
     assert free_m == pytest.approx(state.gripper_opening_m - 2 * 0.003, abs=5e-4)
     assert free_m > 0.03
-
-
-def test_a_coarser_cover_has_fewer_spheres() -> None:
-    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
-    state = driver.wait(PERIOD_S)
-    counts = [
-        len(MujocoKinematics(driver.scene, stand_out_m).pose(state).sphere_radii_m)
-        for stand_out_m in (0.002, 0.003, 0.005, 0.01)
-    ]
-    assert counts == sorted(counts, reverse=True)
-    assert counts[1] == 246
-    assert counts[3] < 50
-
-
-def test_the_order_by_nearness_only_permutes(monkeypatch: pytest.MonkeyPatch) -> None:
-    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
-    state = driver.wait(PERIOD_S)
-    ordered = MujocoKinematics(driver.scene).pose(state)
-    monkeypatch.setattr(kinematics, "near_order", lambda centers_m, _: np.arange(len(centers_m)))
-    as_covered = MujocoKinematics(driver.scene).pose(state)
-    rows = [
-        np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m, pose.sphere_on_finger])
-        for pose in (ordered, as_covered)
-    ]
-    assert (rows[0] != rows[1]).any()
-    here, there = (values[np.lexsort(values.T)] for values in rows)
-    np.testing.assert_array_equal(here, there)
 
 
 def test_nothing_at_the_tool_is_told(tmp_path: Path) -> None:

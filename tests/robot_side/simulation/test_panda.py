@@ -71,12 +71,6 @@ def test_the_tool_moves_as_asked_and_stops_when_nobody_asks(
     turn_back(alone, path)
 
 
-def test_an_uncommanded_arm_holds_against_gravity(alone: ToolDriver) -> None:
-    before = alone.tool_m()
-    alone.wait(2.0)
-    assert np.linalg.norm(alone.tool_m() - before) < 1e-3
-
-
 def test_the_gripper_closes_and_opens(alone: ToolDriver) -> None:
     travel = measure_gripper(alone.scene)
     assert travel is not None

@@ -141,12 +141,6 @@ def test_the_true_distance_is_the_smallest_over_all_pairs(built_in: Scene) -> No
     assert 0 < seen_inside < 40
 
 
-def test_nothing_near_is_none(built_in: Scene) -> None:
-    observed = GroundTruth(built_in, farthest_m=0.05).observe()
-    assert observed.min_distance_m is None
-    assert observed.min_obstacle_distance_m is None
-
-
 def test_contacts_name_the_gripper_geom_and_the_object_supports_included(built_in: Scene) -> None:
     model, data = built_in.model, built_in.data
     target = int(model.body("table_scene/target").jntadr[0])
@@ -183,18 +177,6 @@ def test_a_bare_robot_gets_the_table_where_its_tool_is(tmp_path: Path, yaw_deg: 
 
 def test_a_model_with_objects_of_its_own_keeps_them(shapes: Scene) -> None:
     assert "carton" not in shapes.roles
-
-
-def test_the_start_is_the_keyframe_home_or_the_first_or_the_middle(tmp_path: Path) -> None:
-    keys = '<keyframe><key name="a" qpos="0.1 -0.5 0 0"/>{}</keyframe>'
-    home = '<key name="home" qpos="0.3 -0.7 0 0"/>'
-    for bottom, expected in (
-        (keys.format(home), [0.3, -0.7]),
-        (keys.format(""), [0.1, -0.5]),
-        ("", np.radians([0.0, -85.0])),
-    ):
-        scene = load_scene(planar_arm(tmp_path, extra_bottom=bottom), "tcp")
-        np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], expected, atol=1e-9)
 
 
 def one_line(error: pytest.ExceptionInfo[ConfigurationError]) -> str:
@@ -295,14 +277,6 @@ def test_a_keyframe_that_is_no_number_is_named(tmp_path: Path) -> None:
     path = planar_arm(tmp_path, extra_bottom='<keyframe><key name="home" qpos="nan 0 0 0"/></keyframe>')
     with pytest.raises(ConfigurationError, match="'home'"):
         load_scene(path, "tcp")
-
-
-def test_a_keyframe_may_have_the_name_that_the_table_would_take(tmp_path: Path) -> None:
-    keys = '<key name="home" qpos="0.1 -0.2 0.01 0.01"/><key name="feelahead_start" qpos="0 0 0 0"/>'
-    floor = '<geom type="plane" size="1 1 0.1"/>'
-    scene = load_scene(planar_arm(tmp_path, world=floor, extra_bottom=f"<keyframe>{keys}</keyframe>"), "tcp")
-    assert scene.roles["target"] is Role.TARGET
-    assert scene.data.qpos[0] == pytest.approx(0.1)
 
 
 KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{second}" qpos="0 0 0 0"/></keyframe>'

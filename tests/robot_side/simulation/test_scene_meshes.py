@@ -18,13 +18,12 @@ from robot_side.ahead.tables import Tables
 from robot_side.ahead.total_overlap import total_overlap_m3
 from robot_side.assembly import build_robot_side
 from robot_side.compiled.kernel import Compiled
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import sphere_sphere, warm_up
 from robot_side.settings import RobotSettings
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import Scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.repository import ROOT
 from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
 
@@ -69,18 +68,6 @@ def axis_points(*heights_m: float) -> FloatArray:
 
 
 # Round shapes
-
-
-@pytest.mark.parametrize("shape", ROUND)
-def test_a_sphere_around_a_round_shape_overlaps_by_its_volume_within_the_stated_error(
-    shape: str, tmp_path: Path
-) -> None:
-    scene = scene_with(tmp_path, ROUND[shape])
-    error = scene.volume_errors["round"]
-    assert 0.0 < error <= LARGEST_ERROR
-    assert scene.approximated == ("round",)
-    volume = overlap_of(MujocoCamera(scene).perceive(0.0), "round", placed(scene, np.zeros((1, 3))), 0.2)[0]
-    assert VOLUMES_M3[shape] < volume <= VOLUMES_M3[shape] * (1.0 + error) * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -167,22 +154,6 @@ def test_a_cup_is_seen_with_its_mouth(tmp_path: Path) -> None:
     assert distance_to_object(objects, objects.names.index("cup"), in_mouth) == pytest.approx(0.5 * CELL_M, rel=1e-6)
 
 
-def test_a_box_as_a_mesh_is_the_box(tmp_path: Path) -> None:
-    half_sizes = np.array([0.05, 0.1, 0.15])
-    scene = scene_with(
-        tmp_path,
-        f'<body name="mesh" {TURNED}><geom type="mesh" mesh="box"/></body>'
-        f'<body name="box" {TURNED}><geom type="box" size="0.05 0.1 0.15"/></body>',
-        mesh_asset("box", CUBE_CORNERS * half_sizes, CUBE_TRIANGLES),
-    )
-    assert scene.approximated == ()
-    objects = MujocoCamera(scene).perceive(0.0)
-    centers = placed(scene, np.random.default_rng(1).uniform(-0.2, 0.2, (200, 3)), "box")
-    of_mesh, of_box = (overlap_of(objects, name, centers, 0.05) for name in ("mesh", "box"))
-    assert (of_box > 0.0).sum() > 50
-    np.testing.assert_allclose(of_mesh, of_box, atol=1e-6 * 4.0 / 3.0 * math.pi * 0.05**3)
-
-
 @pytest.mark.parametrize("change", ["open", "one triangle turned", "each triangle twice", "inward"])
 def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_path: Path) -> None:
     vertices, triangles = cup()
@@ -210,20 +181,6 @@ def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_pa
         assert mouth == pytest.approx(4.0 / 3.0 * math.pi * 0.01**3)
         around = overlap_of(objects, "cup", placed(scene, np.zeros((1, 3)), "cup"), 0.2)[0]
         assert around == pytest.approx((3.0 * CELL_M) ** 3, rel=1e-6)
-
-
-def test_an_open_mesh_of_four_vertices_is_no_tetrahedron(tmp_path: Path) -> None:
-    corners = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    scene = scene_with(
-        tmp_path, '<geom name="shard" type="mesh" mesh="m" pos="1 0 0"/>', mesh_asset("m", corners, faces)
-    )
-    assert scene.volume_errors == {"shard": math.inf}
-
-
-def test_a_capsule_too_thin_for_a_mesh_stands_for_its_bounding_box(tmp_path: Path) -> None:
-    scene = scene_with(tmp_path, '<geom name="thread" type="capsule" size="1e-12 1" pos="1 0 0"/>')
-    assert scene.volume_errors == {"thread": math.inf}
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "capsule", "ellipsoid"])
@@ -281,30 +238,6 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
     assert hit > 100
 
 
-def test_a_ball_in_a_valley_overlaps_the_slopes_alone(tmp_path: Path) -> None:
-    field = '<asset><hfield name="v" nrow="2" ncol="3" size="0.2 0.2 0.2 0.05" elevation="1 0 1 1 0 1"/></asset>'
-    scene = scene_with(tmp_path, '<geom name="valley" type="hfield" hfield="v" pos="1 0 0"/>', field)
-    objects, radius = MujocoCamera(scene).perceive(0.0), 0.02
-    # Two planes at 45° that meet at the origin.
-    for height_m, overlapped in ((0.03, 0.0), (0.02, 2.0 * cap(radius, radius - 0.02 / math.sqrt(2.0)))):
-        found = overlap_of(objects, "valley", np.array([[1.0, 0.0, height_m]]), radius)[0]
-        assert found == pytest.approx(overlapped, rel=1e-6)
-
-
-def test_a_frame_moves_and_leaves_out_meshes_as_other_primitives(tmp_path: Path) -> None:
-    scene = scene_with(tmp_path, ROUND["capsule"] + '<geom name="post" type="cylinder" size="0.1 0.1" pos="1 1 0"/>')
-    camera = MujocoCamera(scene)
-    before = camera.perceive(0.0)
-    camera.set_role("round", Role.IGNORED)
-    scene.data.geom("post").xpos[:] += 0.1
-    after = camera.perceive(1.0)
-    assert after.mesh_library is before.mesh_library
-    assert [before.names[index] for index in before.mesh_object] == ["post", "round"]
-    assert [after.names[index] for index in after.mesh_object] == ["post"]
-    np.testing.assert_allclose(after.mesh_positions_m, before.mesh_positions_m[:1] + 0.1)
-    np.testing.assert_array_equal(after.mesh_rotations, before.mesh_rotations[:1])
-
-
 # What is said and skipped
 
 
@@ -353,10 +286,3 @@ def test_what_is_perceived_larger_than_it_is_is_said_in_one_line(tmp_path: Path)
     [note] = notes_on_shapes(model)
     assert "\n" not in note
     assert "bowl as its convex hull or bounding box, post by 0.48 mm (0.3 % of its volume)" in note
-
-
-def test_a_note_about_many_things_names_the_worst(tmp_path: Path) -> None:
-    world = "".join(f'<geom name="g{k}" type="cylinder" size="0.1 0.1" pos="{k} 1 0"/>' for k in range(12))
-    model = planar_arm(tmp_path, world=world)
-    [note] = notes_on_shapes(model)
-    assert note.endswith("g7 by 0.48 mm (0.3 % of its volume), and 4 more by no more than that")
