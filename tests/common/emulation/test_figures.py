@@ -11,8 +11,8 @@ from common.emulation.expectation import expected
 from common.emulation.figures import report_lines
 from common.emulation.profile import LinkProfile
 from common.errors import ConfigurationError
-from feelahead.lab.link.samples import play
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.link.samples import play
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from common.errors import RemoteProtocolError
 from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, decode, encode
 from common.protocol.messages import AnyMessage, Header, Hello, MotionCommand
-from feelahead.experiments.hostile.hostile_inputs import payload
+from feelahead.lab.hostile.inputs import payload
 from tests.helpers.felt import felt
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0, echo_sent_s=2.5, echo_held_s=0.25)

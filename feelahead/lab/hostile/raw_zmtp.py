@@ -93,7 +93,7 @@ class RawConnection:
             received += content
 
     def _read_away(self) -> None:
-        """What comes back is of no interest, but must not fill the buffers. An end of the stream closes."""
+        """Discard answers, which must not fill the buffers. An end of the stream closes."""
         self._socket.settimeout(0.0)
         try:
             while content := self._socket.recv(65536):
