@@ -130,7 +130,7 @@ bench = Menu(
 try_out = Menu(
     "try",
     "experiment",
-    ("demo", "hostile", "soak"),
+    ("demo", "faults", "hostile", "soak"),
     {
         "approach": Entry(
             "feelahead.experiments.approach.command",
@@ -161,12 +161,6 @@ try_out = Menu(
             "try_scenes",
             "draw the built-in scenes from above and from the side",
             "pip install 'feelahead[robot,bench]'",
-        ),
-        "faults": Entry(
-            "feelahead.experiments.faults.table",
-            "try_faults",
-            "every fault of the table: what the robot does when a side, the link or a clock fails",
-            _BOTH_SIDES,
         ),
     },
 )

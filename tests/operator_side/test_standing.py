@@ -5,8 +5,8 @@ import pytest
 from common.protocol.codec import decode, encode
 from common.protocol.messages import Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
-from feelahead.experiments.faults import session_bench
-from feelahead.experiments.faults.session_bench import COMMAND_PERIOD_TICKS, QUICK, Operator
+from feelahead.lab.faults import session_bench
+from feelahead.lab.faults.session_bench import COMMAND_PERIOD_TICKS, QUICK, Operator
 from operator_side.core import OperatorSide
 from robot_side.operators.lease import MOST_AWAY
 from tests.operator_side.operator_bench import Bench

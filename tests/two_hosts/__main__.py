@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FrameType
 
 from common.errors import FeelaheadError
-from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
+from feelahead.lab.faults.two_machines import NotPermittedError, two_machines
 from tests.kernel.waiting import CheckError
 from tests.two_hosts import network_rows, people_rows
 from tests.two_hosts.guide import GuideError

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from feelahead.both_sides.processes import SideProcess
-from feelahead.experiments.faults.two_machines import Machine
+from feelahead.lab.faults.two_machines import Machine
 from robot_side.compiled.machine_code import machine_code_folder
 from tests.helpers.repository import ROOT
 from tests.kernel.waiting import CheckError, require, wait_until

@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.experiments.faults.first_side import free_ports
+from feelahead.lab.faults.rig import free_ports
 
 pytestmark = pytest.mark.processes
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from feelahead.experiments.faults.two_machines import NotPermittedError, two_machines
+from feelahead.lab.faults.two_machines import NotPermittedError, two_machines
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.processes

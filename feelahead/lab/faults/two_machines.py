@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import FeelaheadError
-from feelahead.experiments.faults.rig import RigError
+from feelahead.lab.faults.rig import RigError
 
 _PREFIX_BITS = 24
 _FOLDERS = (Path("/run/netns"), Path("/etc/netns"))

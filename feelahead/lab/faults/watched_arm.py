@@ -1,4 +1,4 @@
-"""An arm that remembers what it was told and when it slowed down, by its own measurements."""
+"""An arm that remembers its commands and when it slowed down, by its own measurements."""
 
 import math
 from collections import deque
@@ -45,7 +45,8 @@ class WatchedArm:
         self._arm = arm
         self._gap_s = gap_s
         self._recent: deque[tuple[float, float]] = deque()
-        self._valid_until_s = 0.0
+        self.accepted_s = 0.0
+        """When the newest command that was not to stand still was accepted"""
         self._asked_s = self._measured_s = -math.inf
 
     @property
@@ -57,7 +58,7 @@ class WatchedArm:
         """As the arm's."""
         if np.any(joint_velocity_rad_s):
             self.told_to_move += 1
-            self._valid_until_s = valid_until_s
+            self.accepted_s = valid_until_s - self._gap_s
         self.not_finite += not np.isfinite(joint_velocity_rad_s).all()
         self._arm.command(joint_velocity_rad_s, valid_until_s)
 
@@ -95,5 +96,5 @@ class WatchedArm:
         if cruising and speed < (1.0 - SLOWED) * fastest:
             # It has slowed down for a while by now, at a rate that is known.
             onset_s = state.time_s - (fastest - speed) / _DECELERATION_RAD_S2
-            self.decelerations.append(Deceleration(onset_s, onset_s - (self._valid_until_s - self._gap_s)))
+            self.decelerations.append(Deceleration(onset_s, onset_s - self.accepted_s))
             recent.clear()

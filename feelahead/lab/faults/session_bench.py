@@ -10,7 +10,7 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry, Tune, Watch
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.watched_arm import WatchedArm
+from feelahead.lab.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
