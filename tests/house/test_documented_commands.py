@@ -74,7 +74,7 @@ RUN = {
     r"make test-kernel": (".ci/run", "test-kernel "),
     r"make test-containers": (".ci/run", "make test-containers"),
     r"make latency-experiment": ("tests/containers/checks.py", '"--compose"'),
-    r"make soak": ("tests/feelahead/experiments/test_soak.py", '"--observers", "8"'),
+    r"make soak": ("tests/feelahead/lab/test_soak.py", '"--observers", "8"'),
     r"make test-two-hosts": TWO_MACHINES,
     r"make demo( --duration \S+)?$": ("tests/feelahead/both_sides/test_processes.py", "test_the_demo_runs_both_sides"),
     r"make demo --link .*--summary": (
@@ -245,7 +245,7 @@ def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
     } >= feelahead.main._COMMANDS.keys()
     for menu in (bench, try_out):
         [listed] = re.findall(rf"`{menu.name} NAME`\s+\(([^)]*)\)", section)
-        assert set(listed.replace("\n", " ").split(", ")) == menu.entries.keys()
+        assert set(listed.replace("\n", " ").split(", ")) == {*menu.questions, *menu.entries}
 
 
 def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:

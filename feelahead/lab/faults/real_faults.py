@@ -29,9 +29,9 @@ class Onsets:
 
     def __init__(self) -> None:
         self.slowed_s: list[float] = []
-        """By the arm's own measurement."""
+        """Times by the arm's own measurement."""
         self.disarmed_s: list[float] = []
-        """By the robot side's clock, which needs the processor to notice."""
+        """Times by the robot side's clock, which needs the processor to notice."""
         self.missed = 0
 
     def take(self, rig: Rig, *, evenly: bool) -> dict[str, Any]:

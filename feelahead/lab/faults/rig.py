@@ -1,4 +1,4 @@
-"""A watched robot side and drivers, each a process of its own on this machine."""
+"""A watched robot side and drivers, each in a separate process on this machine."""
 
 import contextlib
 import json

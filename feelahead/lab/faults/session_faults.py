@@ -108,7 +108,7 @@ def hand_over() -> Outcome:
     bench.tick(5)
     still = bench.moved_by == {2} and bench.state == "disarmed"
     bench.cruise(other)
-    # Back to the first by way of the third; what it had sent under its first lease comes only now.
+    # Back to the first by way of the third; a command of its first lease comes only now.
     bench.send(other, hand_over=True)
     bench.tick(2)
     bench.send(third)
@@ -122,7 +122,7 @@ def hand_over() -> Outcome:
 
 
 def _renumbered(payload: bytes, operator: Operator, now_s: float) -> bytes:
-    """The same command with a newer sequence number, so that nothing but its token tells that it is old."""
+    """Give the command a newer sequence number, so that nothing but its token tells that it is old."""
     return encode(msgspec.structs.replace(decode(payload), header=operator.link.stamp(now_s)))
 
 
@@ -198,7 +198,7 @@ def wall_clock_jumps() -> Outcome:
     alike = traces[0] == traces[1] == traces[2]
     trips = sum(len(stops) for _, stops, _ in traces)
     return Outcome(
-        alike and trips == 0 and traces[0][2] == "armed", f"{trips} trips, motion alike to the last bit: {alike}"
+        alike and trips == 0 and traces[0][2] == "armed", f"{trips} trips, the same motion to the last bit: {alike}"
     )
 
 
@@ -253,7 +253,7 @@ def _spoil(payload: bytes, place: tuple[int, ...], value: Any) -> bytes:
     return bytes(msgpack.packb([version, content]))
 
 
-@virtual("emergency stop", "stopped until armed anew, by whomever", "0 commands applied")
+@virtual("emergency stop", "stopped until armed again, by anybody", "0 commands applied")
 def emergency_stop() -> Outcome:
     """Pressed once in full motion; the operator goes on pulling, leaves, and another one comes."""
     bench = Bench()
@@ -269,12 +269,12 @@ def emergency_stop() -> Outcome:
     bench.drive(0.3, other, r2=CRUISE)
     latched &= bench.state == "stopped" and bench.arm.told_to_move == told
     bench.cruise(other)
-    return Outcome(stopped and latched, "stopped at once; latched until the next operator armed anew")
+    return Outcome(stopped and latched, "stopped at once; latched until the next operator armed")
 
 
 @virtual("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded")
 def reconnect_storm() -> Outcome:
-    """50 strangers a second for four seconds, each with an epoch of its own, while the owner drives."""
+    """50 strangers a second for four seconds, each with another epoch, while the owner drives."""
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)

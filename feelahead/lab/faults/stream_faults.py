@@ -37,7 +37,7 @@ def stream_stops() -> Outcome:
     again = bench.speed_rad_s > _RESTING_RAD_S
     return Outcome(
         at_limit > 0.995 * before and _begins_at_limit(onsets_s) and stood and stayed and again,
-        f"deceleration at {_milliseconds(onsets_s)}; it stood, and stood until armed anew",
+        f"deceleration at {_milliseconds(onsets_s)}; it stood, and stood until armed again",
     )
 
 
@@ -146,7 +146,7 @@ def replay() -> Outcome:
     back = sum(later < earlier for earlier, later in pairwise(order))
     bench.silence(0.2)
     told = bench.arm.told_to_move
-    # The owner is gone; what it once said keeps coming over another connection.
+    # The owner is gone; all its messages keep coming over another connection.
     for step in range(1500):
         bench.tick()
         bench.robot.receive(b"elsewhere", recorded[step % len(recorded)], bench.now_s)
@@ -181,7 +181,7 @@ def old_loop() -> Outcome:
 
 
 def _mean_speed(delay_s: float) -> float:
-    """Of the fastest joint while R2 is held evenly, over a link with that delay each way."""
+    """Return the speed of the fastest joint while R2 is held evenly, over a link with that delay each way."""
     bench = Bench()
     bench.answer_delay_s = delay_s
     operator = bench.operator(2)
@@ -206,7 +206,7 @@ def _mean_speed(delay_s: float) -> float:
 
 
 def _drive_late(bench: Bench, operator: Operator, duration_s: float, lateness_s: Callable[[int], float]) -> None:
-    """R2 held evenly, each command under way for as long as the millisecond of its sending says."""
+    """Hold R2 evenly, each command under way for a time that depends on the millisecond of sending."""
     under_way: deque[tuple[float, bytes]] = deque()
     for step in range(round(duration_s / TICK_S)):
         bench.tick()

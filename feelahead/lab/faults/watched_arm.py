@@ -28,7 +28,7 @@ class Deceleration:
     time_s: float
     """By the arm's measurement, to half a millisecond."""
     after_s: float
-    """Since the newest command that it was told to follow was accepted; the gap limit is what it should be."""
+    """Time since the newest command was accepted; the gap limit is due."""
 
 
 class WatchedArm:
@@ -51,11 +51,11 @@ class WatchedArm:
 
     @property
     def joint_count(self) -> int:
-        """As the arm's."""
+        """Do as the arm does."""
         return self._arm.joint_count
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """As the arm's."""
+        """Do as the arm does."""
         if np.any(joint_velocity_rad_s):
             self.told_to_move += 1
             self.accepted_s = valid_until_s - self._gap_s
@@ -63,11 +63,11 @@ class WatchedArm:
         self._arm.command(joint_velocity_rad_s, valid_until_s)
 
     def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        """As the arm's."""
+        """Do as the arm does."""
         self._arm.command_gripper(closing, valid_until_s)
 
     def state(self, now_s: float) -> ArmState:
-        """As the arm's."""
+        """Do as the arm does."""
         moving = bool(self.speeds_rad_s) and self.speeds_rad_s[-1][1] > _CRUISE_RAD_S
         if moving and 0.0 < now_s - self._asked_s < _LONGEST_WATCHED_S:
             # Tick by tick, however late the caller is: the arm goes on by itself, and we are to see when it slows down.

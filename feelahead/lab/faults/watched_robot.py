@@ -42,7 +42,7 @@ class _LoggedArm(WatchedArm):
         self._ticked_s = self._next_s = 0.0
 
     def state(self, now_s: float) -> ArmState:
-        """As the arm's."""
+        """Do as the arm does."""
         state = super().state(now_s)
         if self.core is not None:
             self._ticked(self.core, now_s)

@@ -59,7 +59,7 @@ def cells(settings: FaultSweep) -> Iterator[FaultCell]:
 
 
 def run(cell: FaultCell, _: int) -> Iterator[Row]:
-    """Try one row; each has processes of its own, so that none leaves anything behind."""
+    """Try one row; each starts other processes, so that none leaves anything behind."""
     fault = VIRTUAL[cell.fault] if cell.part == "virtual" else REAL[cell.fault]
     try:
         outcome = fault.run() if cell.part == "virtual" else fault.run(cell.repeats)
