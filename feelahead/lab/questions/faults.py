@@ -18,14 +18,14 @@ from rich.console import RenderableType
 from rich.table import Table as Shown
 from rich.text import Text
 
-from feelahead.lab.faults import crowd_faults, real_faults, session_faults, stream_faults
+from feelahead.lab.faults import real_faults, session_faults, strangers, stream_faults
 from feelahead.lab.faults.fault import REAL, VIRTUAL, Outcome
 from feelahead.lab.faults.rig import RigError
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from robot_side.compiled.warm_up import warm_up
 
-ROWS: Final = (stream_faults, session_faults, real_faults, crowd_faults)
+ROWS: Final = (stream_faults, session_faults, real_faults, strangers)
 """Modules whose rows are registered by being imported."""
 
 
