@@ -128,7 +128,7 @@ bench = Menu(
 try_out = Menu(
     "try",
     "experiment",
-    ("demo", "haptics", "latency"),
+    ("demo", "haptics", "latency", "faults", "hostile", "soak"),
     {
         "approach": Entry(
             "feelahead.experiments.approach.command",
@@ -141,24 +141,6 @@ try_out = Menu(
             "try_field",
             "how far from things each strength begins, and what a look ahead costs",
             "pip install 'feelahead[robot,bench]'",
-        ),
-        "faults": Entry(
-            "feelahead.experiments.faults.table",
-            "try_faults",
-            "every fault of the table: what the robot does when a side, the link or a clock fails",
-            _BOTH_SIDES,
-        ),
-        "hostile": Entry(
-            "feelahead.experiments.hostile.run",
-            "try_hostile_input",
-            "hostile input at a real robot side's port, and what it costs the tick",
-            _BOTH_SIDES,
-        ),
-        "soak": Entry(
-            "feelahead.experiments.soak.command",
-            "try_soak",
-            "long runs: whether memory, descriptors and delays stay flat",
-            _BOTH_SIDES,
         ),
     },
 )

@@ -8,7 +8,7 @@ import pytest
 
 from common.protocol.messages import Header, Hello
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.session_bench import QUICK, TICK_S, Bench, Operator
+from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
 from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.assembly import build_robot_side
 from robot_side.gripper.held_object import grip

@@ -155,7 +155,10 @@ FIGURES: dict[str, Callable[[LinkSample], float]] = {
 
 
 def independent_delays(profile: LinkProfile) -> bool:
-    """Say whether each delay is drawn by itself: a run then has the model's distribution up to sampling error."""
+    """Say whether each delay is drawn by itself: a run then has the model's distribution up to sampling error.
+
+    netem's correlation of delays does not count: it leaves them independent.
+    """
     return (
         profile.model == "datagram"
         and profile.jitter_s > 0.0

@@ -58,7 +58,7 @@ _PAIRS: Final = 10
 
 @dataclass(frozen=True)
 class LinkSweep(Sweep):
-    """What the emulated link does to messages, in two processes over loopback; then both ends beside bare sockets.
+    """Two processes over loopback with the emulated link between them; then both ends beside bare sockets.
 
     With --virtual, nothing waits: the model alone, beside the words, and beside a recording of the kernel's netem.
     With --estimates, how well each side knows the other's clock and the delays, beside the truth, in virtual time.
@@ -75,7 +75,7 @@ class LinkSweep(Sweep):
     bytes: Annotated[int, Meta(ge=HEADER.size, le=60_000), tyro.conf.arg(metavar="N")] = 142
     """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
     spin: Annotated[float, Meta(ge=0.0, le=1e5), tyro.conf.arg(metavar="US")] = 1e6 * SPIN_S
-    """How long the processor is kept busy before a message is due: 0 costs least, more is more exact."""
+    """Time that the processor is kept busy before a message is due: 0 costs least, more is more exact."""
     realtime: bool = False
     """Run both ends under SCHED_FIFO, where that is permitted."""
     virtual: bool = False

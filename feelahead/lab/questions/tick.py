@@ -51,8 +51,8 @@ class TickSweep(Sweep):
     """Length of each case."""
     objects: tuple[Annotated[int, Meta(ge=1, le=1_000_000)], ...] = (10, 1_000, 10_000, 100_000)
     """Numbers of objects around the table, perceived besides the demo's. --quick: 1 000 at most."""
-    allocations: Annotated[Annotated[int, Meta(ge=100, le=100_000_000)] | None, tyro.conf.arg(metavar="TICKS")] = None
-    """Instead: whether memory stays flat over so many ticks in virtual time; on Linux."""
+    allocations: Annotated[Annotated[int, Meta(ge=100, le=100_000_000)] | None, tyro.conf.arg(metavar="N")] = None
+    """Instead: whether memory stays flat over N ticks in virtual time; on Linux."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def rows(ticks: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]
     share = float((thread_s[-1] - thread_s[0]) / (now_s[-1] - now_s[0]))
     for name, values in found.items():
         p10, p50, p99 = (float(value) for value in np.quantile(values, (0.1, 0.5, 0.99)))
-        row: dict[str, Any] = {
+        row: Row = {
             "part": name,
             "p10_us": p10,
             "p50_us": p50,

@@ -1,4 +1,4 @@
-"""A robot side that writes down the cost of each of its ticks: `python -m ... --log=FILE.npy` and its own flags.
+"""A robot side that writes down the cost of each tick: `python -m ... --log=FILE.npy` and its own flags.
 
 --objects=N puts N more perceived objects around, which physics knows nothing of; --moving of them move; --only takes
 the scene's own objects away.
@@ -41,7 +41,7 @@ class TimedSettings:
     """Flags besides the robot side's."""
 
     log: Path = Path("ticks.npy")
-    """Where the figures go, as .npy: a row a tick, see COLUMNS."""
+    """The file for the figures: a row a tick, see COLUMNS."""
     objects: int = 0
     """Number of further objects."""
     moving: int = 0

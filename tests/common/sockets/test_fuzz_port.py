@@ -17,8 +17,8 @@ from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES
-from feelahead.experiments.hostile.hostile_inputs import Attacker
-from feelahead.experiments.hostile.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
+from feelahead.lab.hostile.inputs import Attacker
+from feelahead.lab.hostile.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS
 
 

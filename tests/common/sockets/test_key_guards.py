@@ -103,7 +103,7 @@ PORT: dict[str, tuple[object, str, object, Callable[[RobotSockets, OperatorSocke
 def test_without_its_guard_at_the_port_a_test_fails(guard: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, name, instead, test = PORT[guard]
     monkeypatch.setattr(owner, name, instead)
-    monkeypatch.setattr("feelahead.experiments.hostile.raw_zmtp._TIMEOUT_S", 1.0)
+    monkeypatch.setattr("feelahead.lab.hostile.raw_zmtp._TIMEOUT_S", 1.0)
     monkeypatch.setattr(port, "ROUNDS", 100)
     with (
         # Heartbeats would end a connection too, only later.

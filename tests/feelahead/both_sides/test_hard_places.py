@@ -19,8 +19,8 @@ from common.protocol.session import OWNING
 from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideProcess
-from feelahead.experiments.faults.first_side import free_ports
-from feelahead.experiments.hostile.raw_zmtp import RawConnection, port_of
+from feelahead.lab.faults.rig import free_ports
+from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
 
 LIMIT_S = 600.0
 NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")

@@ -6,7 +6,7 @@ import pytest
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.messages import Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.session_bench import CRUISE, Bench, Operator
+from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
 from robot_side.core import OBSERVER_PERIOD_S
 from robot_side.operators.lease import MOST_OBSERVERS
 

@@ -6,7 +6,7 @@ import pytest
 
 from common.protocol.codec import encode
 from common.protocol.messages import Header, Tune
-from feelahead.experiments.faults.session_bench import QUICK, Bench, Operator
+from feelahead.lab.faults.session_bench import QUICK, Bench, Operator
 from robot_side.ahead.law import LawName
 from robot_side.enlargement.distance import standard_quantile
 from robot_side.operators.tuning import Tuning

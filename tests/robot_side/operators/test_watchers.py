@@ -2,7 +2,7 @@ import pytest
 
 from common.protocol.codec import encode
 from common.protocol.messages import Watch
-from feelahead.experiments.faults.session_bench import Bench, Operator
+from feelahead.lab.faults.session_bench import Bench, Operator
 from robot_side.operators.watchers import WATCH_S, Watchers
 
 

@@ -1,11 +1,14 @@
-"""A watched robot side and drivers, each a process of its own on this machine."""
+"""A watched robot side and drivers, each in a separate process on this machine."""
 
+import contextlib
 import json
 import os
+import secrets
 import signal
+import socket
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,11 +17,13 @@ from common.clock import MonotonicClock
 from common.errors import FeelaheadError
 from common.protocol.session import OWNING
 from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.summary import read_summary
+from robot_side.operators.safety import SafetySettings
 
 HEALTHY_S = 0.2
 _START_S = 300.0
 _PATIENCE_S = 300.0
-"""What takes longer does not come, however busy the machine is."""
+"""Longer than anything takes, however busy the machine is."""
 _CRUISE_S = 0.15
 _ATTEMPTS = 20
 _POLL_S = 0.005
@@ -28,7 +33,7 @@ _REVERSAL_S = 0.05
 
 
 class RigError(FeelaheadError):
-    """What was waited for did not come; the text says what."""
+    """Something awaited did not come; the text says what."""
 
 
 class Rig:
@@ -50,8 +55,10 @@ class Rig:
         self._pause = threading.Event()
         self.stops: list[str] = []
         """Why the robot side disarmed, each time that the log was read past it."""
-        arguments = [f"--bind={bind}", f"--log={self._log}", f"--safety.healthy-s={HEALTHY_S}", *flags]
-        self.robot = SideProcess("feelahead.experiments.faults.watched_robot", "robot", arguments, before)
+        self._summary = Path(self._folder.name) / "summary.json"
+        own = [f"--log={self._log}", f"--summary={self._summary}"]
+        arguments = [f"--bind={bind}", *own, f"--safety.healthy-s={HEALTHY_S}", *flags]
+        self.robot = SideProcess("feelahead.lab.faults.watched_robot", "robot", arguments, before)
         try:
             self.listening = self.robot.wait_for("listening", _START_S)
         except BaseException:
@@ -69,23 +76,29 @@ class Rig:
 
     def close(self) -> None:
         """End everything, also what a signal has stopped."""
-        self.end_drivers()
-        _end(self.robot)
+        for process in (*self._drivers, self.robot):
+            _end(process)
         self._reader.close()
         self._folder.cleanup()
 
-    def end_drivers(self) -> None:
-        """End all of them, also what a signal has stopped."""
-        for process in self._drivers:
-            _end(process)
-        self._drivers.clear()
+    def end(self, driver: SideProcess) -> None:
+        """End a driver and wait until its lease has ended, too."""
+        driver.stop()
+        deadline_s = self.clock.now() + 3.0
+        while self.figures()["state"] == "armed" and self.clock.now() < deadline_s:
+            self.wait(0.05)
+        self.wait(SafetySettings().lease_s)
 
-    def rounds(self, count: int, advance: Callable[[], None], limit_s: float) -> Iterator[None]:
-        """So many rounds, or as many as begin within `limit_s`; `advance` is called after each."""
+    def summary(self) -> dict[str, Any]:
+        """End the robot side; return its summary."""
+        self.robot.stop()
+        return read_summary(self._summary)
+
+    def rounds(self, count: int, limit_s: float) -> Iterator[None]:
+        """Yield `count` times, or for as many rounds as begin within `limit_s`."""
         deadline_s = self.clock.now() + limit_s
         for _ in range(count):
             yield
-            advance()
             if self.clock.now() > deadline_s:
                 return
 
@@ -94,7 +107,7 @@ class Rig:
         self._pause.wait(duration_s)
 
     def driver(self, control: str | None = None, view: str | None = None, before: Sequence[str] = ()) -> SideProcess:
-        """One more driver, connected to the robot side or to these addresses."""
+        """Start one more driver, connected to the robot side or to these addresses."""
         arguments = [
             f"--connect={control or self.listening['control']}",
             f"--view-connect={view or self.listening['view']}",
@@ -104,12 +117,12 @@ class Rig:
         self._started += 1
         if self._started % 2 == 0:
             arguments.append("--backward")
-        process = SideProcess("feelahead.experiments.faults.driver", "driver", arguments, before)
+        process = SideProcess("feelahead.lab.faults.driver", "driver", arguments, before)
         self._drivers.append(process)
         return process
 
     def phase(self, driver: SideProcess) -> dict[str, Any]:
-        """What the driver said last of its hands and its session."""
+        """Return the newest words of the driver about its hands and its session."""
         for event in driver.events():
             if event["event"] == "driver":
                 before = self._phases.get(driver.process_id, {}).get("session")
@@ -129,7 +142,7 @@ class Rig:
         return said
 
     def drive(self, driver: SideProcess) -> bool:
-        """Have it own, arm and drive; anew when a busy machine breaks the stream. Whether the arm moves evenly now."""
+        """Have it own, arm and drive, again when a busy machine breaks the stream; say whether the arm moves evenly."""
         self.until(driver, "session", *OWNING)
         for _ in range(_ATTEMPTS):
             self.signal(driver, signal.SIGUSR1)
@@ -144,14 +157,14 @@ class Rig:
         os.kill(process.process_id, number)
 
     def lines(self) -> list[dict[str, Any]]:
-        """What the robot side's log has got since the last call."""
+        """Read the lines that the robot side's log has got since the last call."""
         *whole, self._rest = (self._rest + self._reader.read()).split("\n")
         lines = [json.loads(line) for line in whole]
         self.stops += [line["why"] for line in lines if "stop" in line]
         return lines
 
     def until_line(self, key: str, patience_s: float = _PATIENCE_S) -> dict[str, Any]:
-        """The next line of the log with this key; RigError when none comes."""
+        """Wait for the next line of the log with this key; RigError when none comes."""
         deadline_s = self.clock.now() + patience_s
         while True:
             for line in self.lines():
@@ -163,7 +176,7 @@ class Rig:
             self.wait(_POLL_S)
 
     def figures(self) -> dict[str, Any]:
-        """The robot side's counters from now on."""
+        """Wait for the robot side's counters of a moment from now on."""
         asked_s = self.clock.now()
         while (line := self.until_line("figures"))["time"] < asked_s:
             pass
@@ -171,14 +184,14 @@ class Rig:
         return figures
 
     def rest(self) -> dict[str, Any]:
-        """The counters once the arm stands, disarmed; the last ones when it does not, however long it may take."""
+        """Wait until the arm stands, disarmed; return the counters, the last ones when it never does."""
         deadline_s = self.clock.now() + _PATIENCE_S
         while not stands(figures := self.figures()) and self.clock.now() < deadline_s:
             pass
         return figures
 
     def stop_of(self, patience_s: float = 10.0) -> tuple[float | None, float | None]:
-        """When the arm slowed down and when the robot side disarmed, after the newest accepted command, in seconds."""
+        """Return when the arm slowed down and the robot side disarmed, in seconds after the newest accepted command."""
         slowed_s = disarmed_s = None
         deadline_s = self.clock.now() + patience_s
         while (slowed_s is None or disarmed_s is None) and self.clock.now() < deadline_s:
@@ -192,8 +205,19 @@ class Rig:
 
 
 def stands(figures: dict[str, Any]) -> bool:
-    """Whether the robot is disarmed and at rest."""
+    """Say whether the robot is disarmed and at rest."""
     return bool(figures["state"] == "disarmed" and figures["speed_rad_s"] < RESTING_RAD_S)
+
+
+def free_ports(count: int) -> list[int]:
+    """Find ports for later: below those that Linux hands out by itself (32768 and up), lest another one gets them."""
+    ports: list[int] = []
+    for port in secrets.SystemRandom().sample(range(20_000, 30_000), 1000):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            ports.append(port)
+        if len(ports) == count:
+            break
+    return ports
 
 
 def _end(process: SideProcess) -> None:

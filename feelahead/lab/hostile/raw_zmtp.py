@@ -40,16 +40,21 @@ def port_of(endpoint: str) -> int:
 class RawConnection:
     """A TCP connection to a port of this machine that never blocks for long, and that the other side may end."""
 
-    def __init__(self, port: int, sends: bytes = b"") -> None:
+    def __init__(self, port: int, sends: bytes = b"", buffer_bytes: int | None = None) -> None:
+        """`buffer_bytes` limits what the kernel takes for a peer that does not read."""
         self.open = True
         """False once the other side has ended it."""
-        self._socket = socket.create_connection(("127.0.0.1", port), timeout=_TIMEOUT_S)
+        self._socket = socket.socket()
+        if buffer_bytes is not None:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+        self._socket.settimeout(_TIMEOUT_S)
+        self._socket.connect(("127.0.0.1", port))
         self._socket.sendall(sends)
 
     @classmethod
-    def introduced(cls, port: int, socket_type: bytes = b"DEALER") -> "RawConnection":
+    def introduced(cls, port: int, socket_type: bytes = b"DEALER", buffer_bytes: int | None = None) -> "RawConnection":
         """One that has gone through the handshake as a well-behaved peer would; OSError when it is refused."""
-        connection = cls(port, GREETING + ready(socket_type))
+        connection = cls(port, GREETING + ready(socket_type), buffer_bytes)
         connection._await(b"\x05READY")
         return connection
 
@@ -93,7 +98,7 @@ class RawConnection:
             received += content
 
     def _read_away(self) -> None:
-        """What comes back is of no interest, but must not fill the buffers. An end of the stream closes."""
+        """Discard answers, which must not fill the buffers. An end of the stream closes."""
         self._socket.settimeout(0.0)
         try:
             while content := self._socket.recv(65536):

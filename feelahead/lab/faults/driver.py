@@ -1,11 +1,10 @@
-"""An operator side whose hands do as they are told by signals: the process that faults are tried on.
+"""An operator side whose hands obey signals: the process that faults are tried on.
 
     SIGUSR1    rest, arm, then hold R2 and L2 evenly, for a second each in turn
-    SIGUSR2    press the button that hands the lease over
     SIGTERM    end
 
-The core, its bytes and the sockets are those of feelahead-operator; only the controller is missing. It tells by
-lines of JSON what it is about.
+The core, its bytes and the sockets are those of feelahead-operator; only the controller is missing. Lines of JSON
+say the phase of the hands and the state of the session.
 """
 
 import secrets
@@ -28,7 +27,7 @@ from operator_side.dualsense.reports.controller_state import Button, ControllerS
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.main import MOTION_PERIOD_S
 
-PROGRAM = "python -m feelahead.experiments.faults.driver"
+PROGRAM = "feelahead.lab.faults.driver"
 _TRAVEL = 0.42
 """Raw travel: 0.1 m/s of the built-in arm."""
 _PRESS_S = 0.05
@@ -52,26 +51,21 @@ class DriverSettings:
 
 
 class Hands:
-    """Rest, arm, drive: what the controller reports in turn."""
+    """Rest, arm, drive, in turn."""
 
     def __init__(self, healthy_s: float, *, backward: bool) -> None:
         self.phase = "rest"
         self._healthy_s = healthy_s
         self._since_s = 0.0
         self._forward = backward
-        self._hand_over_until_s = -1.0
 
     def drive(self, now_s: float) -> None:
-        """Rest once more, arm and drive, the other way than last time."""
+        """Rest once more, arm and drive, the other way round."""
         self._forward = not self._forward
         self._to("wait", now_s)
 
-    def hand_over(self, now_s: float) -> None:
-        """Press the create button for a moment."""
-        self._hand_over_until_s = now_s + _PRESS_S
-
     def tick(self, now_s: float, *, owns: bool, armed: bool) -> ControllerState:
-        """What the hands do now."""
+        """Move the hands on; give the controller's state."""
         elapsed_s = now_s - self._since_s
         if self.phase == "wait" and not owns:
             self._to("wait", now_s)
@@ -86,8 +80,6 @@ class Hands:
         pressed = {Button.L1}
         if self.phase == "press" and now_s - self._since_s < _PRESS_S:
             pressed.add(Button.OPTIONS)
-        if now_s < self._hand_over_until_s:
-            pressed.add(Button.CREATE)
         travel = _TRAVEL if self.phase == "drive" else 0.0
         forward = self._forward == (int((now_s - self._since_s) / _REVERSES_S) % 2 == 0)
         return ControllerState(l2=0.0 if forward else travel, r2=travel if forward else 0.0, pressed=frozenset(pressed))
@@ -102,48 +94,36 @@ def command(arguments: Sequence[str]) -> int:
     clock = MonotonicClock()
     hands = Hands(1e-3 * settings.healthy_ms, backward=settings.backward)
     signal.signal(signal.SIGUSR1, lambda *_: hands.drive(clock.now()))
-    signal.signal(signal.SIGUSR2, lambda *_: hands.hand_over(clock.now()))
     core = OperatorSide(secrets.randbits(53), clock_domain(), haptics=False)
+    said: tuple[str, str] | None = None
+    next_motion_s = clock.now()
     with (
         OperatorSockets(settings.connect, settings.view_connect) as sockets,
         StopSignal() as stop,
         Status(settings.status, "driver") as status,
     ):
         raise_priority()
-        _loop(core, hands, clock, sockets, stop, status)
+        while not stop.is_set:
+            now_s = clock.now()
+            for payload in sockets.receive():
+                core.receive(payload, now_s)
+            for _, payload in sockets.receive_view():
+                core.receive_view(payload, now_s)
+            core.output_report(now_s)
+            if now_s >= next_motion_s:
+                next_motion_s = max(next_motion_s + MOTION_PERIOD_S, now_s)
+                owns = core.lease is not None and core.lease.session in OWNING
+                armed = core.stiffness is not None and core.stiffness.state == "armed" and owns
+                core.read_report(build_input_report(hands.tick(now_s, owns=owns, armed=armed)), now_s)
+                for payload in core.motion(now_s):
+                    sockets.send(payload)
+                says = (hands.phase, "none" if core.lease is None else str(core.lease.session))
+                if says != said:
+                    said = says
+                    status.event("driver", phase=says[0], session=says[1], time_s=now_s)
+                status.show(now_s, core.status(now_s))
+            sockets.wait(max(0.0, next_motion_s - clock.now()))
     return 0
-
-
-def _loop(
-    core: OperatorSide,
-    hands: Hands,
-    clock: MonotonicClock,
-    sockets: OperatorSockets,
-    stop: StopSignal,
-    status: Status,
-) -> None:
-    told: tuple[str, str] | None = None
-    next_motion_s = clock.now()
-    while not stop.is_set:
-        now_s = clock.now()
-        for payload in sockets.receive():
-            core.receive(payload, now_s)
-        for _, payload in sockets.receive_view():
-            core.receive_view(payload, now_s)
-        core.output_report(now_s)
-        if now_s >= next_motion_s:
-            next_motion_s = max(next_motion_s + MOTION_PERIOD_S, now_s)
-            owns = core.lease is not None and core.lease.session in OWNING
-            armed = core.stiffness is not None and core.stiffness.state == "armed" and owns
-            core.read_report(build_input_report(hands.tick(now_s, owns=owns, armed=armed)), now_s)
-            for payload in core.motion(now_s):
-                sockets.send(payload)
-            tells = (hands.phase, "none" if core.lease is None else str(core.lease.session))
-            if tells != told:
-                told = tells
-                status.event("driver", phase=tells[0], session=tells[1], time_s=now_s)
-            status.show(now_s, core.status(now_s))
-        sockets.wait(max(0.0, next_motion_s - clock.now()))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a hostile or broken peer may send: a seeded, endless mixture."""
+"""Inputs of a hostile or broken peer: a seeded, endless mixture."""
 
 import random
 from collections import Counter
@@ -8,7 +8,7 @@ import msgpack
 
 from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, encode
 from common.protocol.messages import Header, Hello, MotionCommand
-from feelahead.experiments.hostile.raw_zmtp import GREETING, RawConnection, frame, message, ready
+from feelahead.lab.hostile.raw_zmtp import GREETING, RawConnection, frame, message, ready
 
 _STRANGERS = 8
 _HANGING = 128
@@ -48,7 +48,7 @@ class Attacker:
         self.sent: Counter[str] = Counter()
         """Inputs by kind."""
         self.refused = 0
-        """Those among them that the robot side, or the system, cut short."""
+        """Inputs that the robot side, or the system, cut short."""
         self._control_port = control_port
         self._view_port = view_port
         self._generator = random.Random(seed)  # noqa: S311  # repeatable, not secret

@@ -1,4 +1,4 @@
-"""An arm that remembers what it was told and when it slowed down, by its own measurements."""
+"""An arm that remembers its commands and when it slowed down, by its own measurements."""
 
 import math
 from collections import deque
@@ -28,7 +28,7 @@ class Deceleration:
     time_s: float
     """By the arm's measurement, to half a millisecond."""
     after_s: float
-    """Since the newest command that it was told to follow was accepted; the gap limit is what it should be."""
+    """Time since the newest command was accepted; the gap limit is due."""
 
 
 class WatchedArm:
@@ -45,28 +45,29 @@ class WatchedArm:
         self._arm = arm
         self._gap_s = gap_s
         self._recent: deque[tuple[float, float]] = deque()
-        self._valid_until_s = 0.0
+        self.accepted_s = 0.0
+        """When the newest command that was not to stand still was accepted"""
         self._asked_s = self._measured_s = -math.inf
 
     @property
     def joint_count(self) -> int:
-        """As the arm's."""
+        """Do as the arm does."""
         return self._arm.joint_count
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """As the arm's."""
+        """Do as the arm does."""
         if np.any(joint_velocity_rad_s):
             self.told_to_move += 1
-            self._valid_until_s = valid_until_s
+            self.accepted_s = valid_until_s - self._gap_s
         self.not_finite += not np.isfinite(joint_velocity_rad_s).all()
         self._arm.command(joint_velocity_rad_s, valid_until_s)
 
     def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        """As the arm's."""
+        """Do as the arm does."""
         self._arm.command_gripper(closing, valid_until_s)
 
     def state(self, now_s: float) -> ArmState:
-        """As the arm's."""
+        """Do as the arm does."""
         moving = bool(self.speeds_rad_s) and self.speeds_rad_s[-1][1] > _CRUISE_RAD_S
         if moving and 0.0 < now_s - self._asked_s < _LONGEST_WATCHED_S:
             # Tick by tick, however late the caller is: the arm goes on by itself, and we are to see when it slows down.
@@ -95,5 +96,5 @@ class WatchedArm:
         if cruising and speed < (1.0 - SLOWED) * fastest:
             # It has slowed down for a while by now, at a rate that is known.
             onset_s = state.time_s - (fastest - speed) / _DECELERATION_RAD_S2
-            self.decelerations.append(Deceleration(onset_s, onset_s - (self._valid_until_s - self._gap_s)))
+            self.decelerations.append(Deceleration(onset_s, onset_s - self.accepted_s))
             recent.clear()

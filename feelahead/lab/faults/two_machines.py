@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import FeelaheadError
-from feelahead.experiments.faults.rig import RigError
+from feelahead.lab.faults.rig import RigError
 
 _PREFIX_BITS = 24
 _FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
-"""Of the namespaces, and of the files that `ip` puts into their places in each."""
+"""Folders of the namespaces, and of the files that `ip` puts into their places in each."""
 
 
 class NotPermittedError(FeelaheadError):
@@ -29,7 +29,7 @@ class Machine:
 
     namespace: str
     device: str
-    """Its end of the cable."""
+    """The machine's end of the cable."""
     address: str
 
     @property
@@ -39,7 +39,7 @@ class Machine:
 
     @property
     def own_files(self) -> Path:
-        """What lies in this folder is /etc's of the same name to programs that are started there afterwards."""
+        """The folder whose files replace those of /etc for programs that start there afterwards."""
         return Path("/etc/netns") / self.namespace
 
     def unplug(self) -> None:
@@ -47,11 +47,11 @@ class Machine:
         self.set_link("down")
 
     def plug_in(self) -> None:
-        """And in again."""
+        """Plug it in again."""
         self.set_link("up")
 
     def set_link(self, *words: str) -> None:
-        """As `ip link set DEVICE` does."""
+        """Run `ip link set DEVICE`."""
         _ip("-n", self.namespace, "link", "set", self.device, *words)
 
     def readdress(self, address: str) -> None:
@@ -94,7 +94,7 @@ def _connect(one: Machine, other: Machine) -> None:
 
 
 def _delete_left_behind() -> None:
-    """What is left of runs that were killed: the names end with a process that is no more."""
+    """Delete namespaces of runs that were killed: the names end with a process that is no more."""
     for folder in _FOLDERS:
         for left in folder.glob("feelahead-*-*"):
             owner = left.name.rpartition("-")[2]

@@ -10,7 +10,7 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry, Tune, Watch
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.watched_arm import WatchedArm
+from feelahead.lab.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
@@ -37,12 +37,12 @@ class Operator:
 
     @property
     def token(self) -> int:
-        """Of the lease, as last heard; 0 before."""
+        """The lease's token as last heard; 0 before."""
         return 0 if self.notice is None else self.notice.token
 
     @property
     def state(self) -> SessionState:
-        """Where it stands, as last heard."""
+        """The state of its session as last heard."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
@@ -64,7 +64,7 @@ class Operator:
 
 
 class Bench:
-    """The robot side, what it sent to whom, and what its arm did."""
+    """The robot side, its messages to each operator, and the motion of its arm."""
 
     def __init__(self, settings: RobotSettings = QUICK) -> None:
         self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)
@@ -74,9 +74,9 @@ class Bench:
         self.applied: dict[int, float] = {}
         """Sequence numbers of the commands that the arm was to follow, in turn, and how old each was at first."""
         self.moved_by: set[int] = set()
-        """Their operators' epochs."""
+        """Epochs of those commands' operators."""
         self.answer_delay_s = 0.0
-        """How long what the robot side sends is under way."""
+        """Delay of all messages from the robot side."""
         self._under_way: deque[tuple[float, Operator, StiffnessUpdate | Hello | LeaseNotice]] = deque()
 
     def _watch(self, arm: Arm) -> Arm:
@@ -90,12 +90,12 @@ class Bench:
 
     @property
     def state(self) -> str:
-        """The robot's."""
+        """The robot's state."""
         return self.robot.session.safety.state
 
     @property
     def speed_rad_s(self) -> float:
-        """Of the fastest joint, now."""
+        """The speed of the fastest joint, now."""
         return self.arm.speeds_rad_s[-1][1]
 
     @property
@@ -117,17 +117,17 @@ class Bench:
         return operator
 
     def say_hello(self, operator: Operator) -> None:
-        """Its Hello arrives."""
+        """Let a Hello of the operator arrive."""
         self.robot.receive(operator.peer, encode(operator.link.hello(self.now_s)), self.now_s)
 
     def send(self, operator: Operator, **fields: Any) -> bytes:
-        """Its command arrives; the payload."""
+        """Let a command of the operator arrive; return its payload."""
         payload = operator.command(self.now_s, **fields)
         self.robot.receive(operator.peer, payload, self.now_s)
         return payload
 
     def tick(self, count: int = 1) -> None:
-        """So many milliseconds; what the robot side sends arrives at once."""
+        """Tick `count` times, a millisecond each; messages of the robot side arrive at once."""
         for _ in range(count):
             self.ticks += 1
             for outgoing in self.robot.tick(self.now_s):
@@ -148,7 +148,7 @@ class Bench:
                 self.moved_by.add(command.header.epoch)
 
     def silence(self, duration_s: float) -> None:
-        """Nobody says anything."""
+        """Tick while nobody says anything."""
         self.tick(round(duration_s / TICK_S))
 
     def drive(self, duration_s: float, operator: Operator, **fields: Any) -> None:

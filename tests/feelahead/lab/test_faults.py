@@ -1,5 +1,9 @@
-"""Each guard of the robot side is needed: with it disabled, a row of the fault table no longer holds."""
+"""Every row of the fault table that virtual time can decide, and each guard of the robot side is needed for one.
 
+With a guard disabled, a row no longer holds.
+"""
+
+import ast
 import importlib
 import time
 from collections.abc import Callable, Mapping
@@ -11,16 +15,19 @@ import msgspec
 import pytest
 
 import common.protocol.session
+from common.errors import ConfigurationError
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import AnyMessage
 from common.protocol.session import SessionEvent, SessionState
-from feelahead.experiments.faults import virtual_session_faults as session_faults
-from feelahead.experiments.faults import virtual_stream_faults as stream_faults
-from feelahead.experiments.faults.fault import Outcome
+from feelahead.lab.faults import session_faults, stream_faults
+from feelahead.lab.faults.fault import VIRTUAL, Fault, Outcome
+from feelahead.lab.questions.faults import QUESTION
+from feelahead.lab.sweep import ask
 from robot_side.operators.lease import Lease
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission, Safety
 from robot_side.simulation.joint_reference import JointReference
+from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.long
 
@@ -160,3 +167,42 @@ def test_without_the_guard_the_row_fails(guard: Guard, monkeypatch: pytest.Monke
     except (RuntimeError, ValueError, msgspec.ValidationError):
         return  # it got so far astray that the row's own steps could not be taken
     assert not outcome.safe, outcome.measured
+
+
+@pytest.mark.parametrize("fault", VIRTUAL.values(), ids=lambda fault: fault.run.__name__)
+def test_the_row_holds(fault: Fault) -> None:
+    outcome = fault.run()
+    assert outcome.safe, outcome.measured
+
+
+def test_nobody_reads_the_wall_clock() -> None:
+    # Not by any of its names: what jumps by an hour must not be there to trip over.
+    wall_clocks = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.strftime", "time.ctime"}
+    for package in ("common", "robot_side", "operator_side"):
+        for path in (ROOT / package).rglob("*.py"):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+            imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+            assert not imported & {"datetime", "calendar"}, path
+            read = {ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+            # A recording's stamps are the wall clock's: it is read once, and for these alone.
+            if path == ROOT / "common" / "clock.py":
+                read.discard("time.time")
+            elif path.parent != ROOT / "common" / "recording":
+                assert "wall_clock_offset_s" not in path.read_text(encoding="utf-8"), path
+            assert not read & wall_clocks, path
+
+
+def test_an_unsafe_row_is_the_answer_and_the_exit_code(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Safety, "_check_gap", nothing)
+    one = VIRTUAL["stream stops"]
+    monkeypatch.setattr("feelahead.lab.questions.faults.VIRTUAL", {one.name: one})
+    assert ask(QUESTION, ["--only", "virtual"]) == 1
+    assert "UNSAFE" in capsys.readouterr().out
+
+
+def test_too_few_repetitions_are_refused() -> None:
+    with pytest.raises(ConfigurationError, match="repeats"):
+        ask(QUESTION, ["--repeats", "0"])

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from common.protocol.codec import encode
-from feelahead.experiments.faults.fault import Fault, Outcome
-from feelahead.experiments.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
+from feelahead.lab.faults.fault import Outcome, virtual
+from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
 
 T_S = QUICK.safety.gap_s
 _AGE_LIMIT_S = QUICK.safety.age_s + QUICK.safety.jitter_s
@@ -16,6 +16,7 @@ _RESTING_RAD_S = 0.005
 _STEADY_DELAY_S = 0.5
 
 
+@virtual("stream stops", "decelerate from the measured state, hold; explicit re-arm", "deceleration from T to T + 5 ms")
 def stream_stops() -> Outcome:
     """Kill -9, a half-open connection and a pulled cable all look like this from within."""
     bench = Bench()
@@ -36,10 +37,11 @@ def stream_stops() -> Outcome:
     again = bench.speed_rad_s > _RESTING_RAD_S
     return Outcome(
         at_limit > 0.995 * before and _begins_at_limit(onsets_s) and stood and stayed and again,
-        f"deceleration at {_milliseconds(onsets_s)}; it stood, and stood until armed anew",
+        f"deceleration at {_milliseconds(onsets_s)}; it stood, and stood until armed again",
     )
 
 
+@virtual("nobody ticks", "the arm stops by its own valid_until", "deceleration from T to T + 5 ms")
 def ticks_stop() -> Outcome:
     """The second line of defence: nobody ticks any more, and the arm goes on by itself for a second."""
     bench = Bench()
@@ -53,6 +55,7 @@ def ticks_stop() -> Outcome:
     return Outcome(safe, f"deceleration at {_milliseconds(onsets_s)}; then it stands")
 
 
+@virtual("gap shorter than T", "hold the last command", "no deceleration before T")
 def short_gap() -> Outcome:
     """Gaps up to T, one after the other."""
     bench = Bench()
@@ -68,6 +71,7 @@ def short_gap() -> Outcome:
     return Outcome(safe, f"{len(bench.arm.decelerations)} decelerations; least speed {100.0 * least:.1f} %")
 
 
+@virtual("backlog after a pause", "discarded by age", "0 applied older than 100 ms + jitter")
 def backlog() -> Outcome:
     """A queue that grows under the stream; then a pause of two seconds, and all that was held back at once."""
     bench = Bench()
@@ -91,6 +95,7 @@ def backlog() -> Outcome:
     return Outcome(safe, f"{old} applied, {bench.robot.session.safety.discarded_by_age} discarded by age")
 
 
+@virtual("robot side stopped and resumed", "disarmed", "0 old commands applied")
 def robot_stopped() -> Outcome:
     """The robot side neither ticks nor receives for a while; then all that came meanwhile is there at once."""
     measured, safe = [], True
@@ -115,6 +120,7 @@ def robot_stopped() -> Outcome:
     return Outcome(safe, ", ".join(measured))
 
 
+@virtual("replay, duplicate, reorder", "(epoch, sequence) strictly increasing", "0 applied")
 def replay() -> Outcome:
     """Everything that the owner sends comes twice, in any order within a window, and once more from elsewhere."""
     bench = Bench()
@@ -140,7 +146,7 @@ def replay() -> Outcome:
     back = sum(later < earlier for earlier, later in pairwise(order))
     bench.silence(0.2)
     told = bench.arm.told_to_move
-    # The owner is gone; what it once said keeps coming over another connection.
+    # The owner is gone; all its messages keep coming over another connection.
     for step in range(1500):
         bench.tick()
         bench.robot.receive(b"elsewhere", recorded[step % len(recorded)], bench.now_s)
@@ -150,6 +156,7 @@ def replay() -> Outcome:
     return Outcome(safe, f"{back} of {len(order)} applied twice or late; the replay kept no lease: {gone}")
 
 
+@virtual("steady 500 ms each way", "the arm moves normally", "speed within 2 %")
 def steady_delay() -> Outcome:
     """500 ms each way; not a fault at all."""
     speeds = [_mean_speed(delay_s) for delay_s in (0.0, _STEADY_DELAY_S)]
@@ -157,6 +164,7 @@ def steady_delay() -> Outcome:
     return Outcome(0.98 < ratio < 1.02, f"speed {100.0 * ratio:.1f} % of that without delay, no stop")
 
 
+@virtual("answers no longer arrive", "disarmed at max_delay", "2 s")
 def old_loop() -> Outcome:
     """The way back breaks off, so that the operator echoes the same stamp for ever."""
     bench = Bench()
@@ -173,7 +181,7 @@ def old_loop() -> Outcome:
 
 
 def _mean_speed(delay_s: float) -> float:
-    """Of the fastest joint while R2 is held evenly, over a link with that delay each way."""
+    """Return the speed of the fastest joint while R2 is held evenly, over a link with that delay each way."""
     bench = Bench()
     bench.answer_delay_s = delay_s
     operator = bench.operator(2)
@@ -198,7 +206,7 @@ def _mean_speed(delay_s: float) -> float:
 
 
 def _drive_late(bench: Bench, operator: Operator, duration_s: float, lateness_s: Callable[[int], float]) -> None:
-    """R2 held evenly, each command under way for as long as the millisecond of its sending says."""
+    """Hold R2 evenly, each command under way for a time that depends on the millisecond of sending."""
     under_way: deque[tuple[float, bytes]] = deque()
     for step in range(round(duration_s / TICK_S)):
         bench.tick()
@@ -215,20 +223,3 @@ def _begins_at_limit(onsets_s: Sequence[float]) -> bool:
 
 def _milliseconds(values_s: Sequence[float]) -> str:
     return " and ".join(f"{1e3 * one:.1f} ms" for one in values_s) or "no time"
-
-
-STREAM_FAULTS = (
-    Fault(
-        "stream stops",
-        "decelerate from the measured state, hold; explicit re-arm",
-        "deceleration from T to T + 5 ms",
-        stream_stops,
-    ),
-    Fault("nobody ticks", "the arm stops by its own valid_until", "deceleration from T to T + 5 ms", ticks_stop),
-    Fault("gap shorter than T", "hold the last command", "no deceleration before T", short_gap),
-    Fault("backlog after a pause", "discarded by age", "0 applied older than 100 ms + jitter", backlog),
-    Fault("replay, duplicate, reorder", "(epoch, sequence) strictly increasing", "0 applied", replay),
-    Fault("robot side stopped and resumed", "disarmed", "0 old commands applied", robot_stopped),
-    Fault("steady 500 ms each way", "the arm moves normally", "speed within 2 %", steady_delay),
-    Fault("answers no longer arrive", "disarmed at max_delay", "2 s", old_loop),
-)

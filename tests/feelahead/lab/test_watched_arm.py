@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from feelahead.experiments.faults.watched_arm import WatchedArm
+from feelahead.lab.faults.watched_arm import WatchedArm
 from robot_side.arm.port import ArmState
 from robot_side.simulation.joint_reference import MotionLimits
 

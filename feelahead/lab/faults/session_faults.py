@@ -13,8 +13,8 @@ import numpy as np
 from common.protocol.codec import decode, encode
 from common.protocol.messages import Header
 from common.protocol.session import SessionState
-from feelahead.experiments.faults.fault import Fault, Outcome
-from feelahead.experiments.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
+from feelahead.lab.faults.fault import Outcome, virtual
+from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
 from robot_side.operators.lease import MOST_AWAY, MOST_OBSERVERS
 
 _LEASE_S = QUICK.safety.lease_s
@@ -22,6 +22,7 @@ _HOUR_S = 3600.0
 _WALL_CLOCK_S = 1.8e9
 
 
+@virtual("operator restarts", "new epoch, disarmed", "step at most one tick of the speed limit")
 def operator_restarts() -> Outcome:
     """Killed in full motion; its successor pulls R2 from the start, over the same connection."""
     bench = Bench()
@@ -47,6 +48,9 @@ def operator_restarts() -> Outcome:
     return Outcome(safe, f"disarmed, moved by the new epoch: {moved}; largest change of speed {step:.4f} rad/s a tick")
 
 
+@virtual(
+    "two operators", "a lease; others observe", "0 commands from a non-owner; a dead owner's lease ends within 1 s"
+)
 def two_operators() -> Outcome:
     """The second one sends whatever could work: no token, the owner's, tokens to come; and stops, and presses."""
     bench = Bench()
@@ -80,6 +84,7 @@ def two_operators() -> Outcome:
     )
 
 
+@virtual("lease handed over", "disarmed, under a new token", "0 commands under the old token")
 def hand_over() -> Outcome:
     """The create button in full motion; both keep their triggers pulled and press to arm at once."""
     bench = Bench()
@@ -103,7 +108,7 @@ def hand_over() -> Outcome:
     bench.tick(5)
     still = bench.moved_by == {2} and bench.state == "disarmed"
     bench.cruise(other)
-    # Back to the first by way of the third; what it had sent under its first lease comes only now.
+    # Back to the first by way of the third; a command of its first lease comes only now.
     bench.send(other, hand_over=True)
     bench.tick(2)
     bench.send(third)
@@ -117,10 +122,11 @@ def hand_over() -> Outcome:
 
 
 def _renumbered(payload: bytes, operator: Operator, now_s: float) -> bytes:
-    """The same command with a newer sequence number, so that nothing but its token tells that it is old."""
+    """Give the command a newer sequence number, so that nothing but its token tells that it is old."""
     return encode(msgspec.structs.replace(decode(payload), header=operator.link.stamp(now_s)))
 
 
+@virtual("arming too early, pulled, blind", "disarmed until healthy", "never armed")
 def wrong_arming() -> Outcome:
     """The arming button in every way that must not arm, each for longer than the healthy second."""
     bench = Bench()
@@ -151,6 +157,7 @@ def wrong_arming() -> Outcome:
     return Outcome(safe, f"too early {early}, held all along {held}, pulled {pulled}, loop age unknown {unknown}")
 
 
+@virtual("owner comes back", "owner or observer, disarmed", "never armed")
 def comes_back() -> Outcome:
     """A break shorter than the lease, then a longer one, then one in which somebody else came."""
     bench = Bench()
@@ -176,6 +183,7 @@ def comes_back() -> Outcome:
     return Outcome(safe, "owner; later owner under a new token; at last observer: disarmed each time")
 
 
+@virtual("wall clock jumps an hour", "no effect", "0 trips")
 def wall_clock_jumps() -> Outcome:
     """The wall clock runs an hour ahead, then an hour back, in the middle of the motion."""
     traces = []
@@ -190,10 +198,11 @@ def wall_clock_jumps() -> Outcome:
     alike = traces[0] == traces[1] == traces[2]
     trips = sum(len(stops) for _, stops, _ in traces)
     return Outcome(
-        alike and trips == 0 and traces[0][2] == "armed", f"{trips} trips, motion alike to the last bit: {alike}"
+        alike and trips == 0 and traces[0][2] == "armed", f"{trips} trips, the same motion to the last bit: {alike}"
     )
 
 
+@virtual("NaN, inf, wrong size, out of range", "the whole message rejected and counted", "0 reach the controller")
 def bad_messages() -> Outcome:
     """A good command with one part replaced, as it would come over the wire."""
     bench = Bench()
@@ -244,6 +253,7 @@ def _spoil(payload: bytes, place: tuple[int, ...], value: Any) -> bytes:
     return bytes(msgpack.packb([version, content]))
 
 
+@virtual("emergency stop", "stopped until armed again, by anybody", "0 commands applied")
 def emergency_stop() -> Outcome:
     """Pressed once in full motion; the operator goes on pulling, leaves, and another one comes."""
     bench = Bench()
@@ -259,11 +269,12 @@ def emergency_stop() -> Outcome:
     bench.drive(0.3, other, r2=CRUISE)
     latched &= bench.state == "stopped" and bench.arm.told_to_move == told
     bench.cruise(other)
-    return Outcome(stopped and latched, "stopped at once; latched until the next operator armed anew")
+    return Outcome(stopped and latched, "stopped at once; latched until the next operator armed")
 
 
+@virtual("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded")
 def reconnect_storm() -> Outcome:
-    """50 strangers a second for four seconds, each with an epoch of its own, while the owner drives."""
+    """50 strangers a second for four seconds, each with another epoch, while the owner drives."""
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)
@@ -280,26 +291,3 @@ def reconnect_storm() -> Outcome:
     most = 1 + MOST_OBSERVERS + MOST_AWAY
     safe = bench.state == "armed" and not bench.robot.session.safety.stops and bench.moved_by == {2} and known <= most
     return Outcome(safe, f"no stop; at most {known} operators known at a time, {bench.robot.session.refused} refused")
-
-
-SESSION_FAULTS = (
-    Fault("operator restarts", "new epoch, disarmed", "step at most one tick of the speed limit", operator_restarts),
-    Fault(
-        "two operators",
-        "a lease; others observe",
-        "0 commands from a non-owner; a dead owner's lease ends within 1 s",
-        two_operators,
-    ),
-    Fault("lease handed over", "disarmed, under a new token", "0 commands under the old token", hand_over),
-    Fault("owner comes back", "owner or observer, disarmed", "never armed", comes_back),
-    Fault("wall clock jumps an hour", "no effect", "0 trips", wall_clock_jumps),
-    Fault(
-        "NaN, inf, wrong size, out of range",
-        "the whole message rejected and counted",
-        "0 reach the controller",
-        bad_messages,
-    ),
-    Fault("arming too early, pulled, blind", "disarmed until healthy", "never armed", wrong_arming),
-    Fault("emergency stop", "stopped until armed anew, by whomever", "0 commands applied", emergency_stop),
-    Fault("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded", reconnect_storm),
-)

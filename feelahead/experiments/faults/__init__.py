@@ -1,1 +1,0 @@
-"""Every row of the fault table, in virtual time and with real processes."""

@@ -1,1 +1,0 @@
-"""`feelahead try soak`: long runs."""
