@@ -7,7 +7,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.overlap.meshes import grid_tetrahedra, surface_of
+from feelahead.lab.reference.meshes import grid_tetrahedra, surface_of
 
 CELL_M = 0.04
 

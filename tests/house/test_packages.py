@@ -18,7 +18,7 @@ TELLING = {
     "robot_side/enlargement/prediction_errors.toml",
     "robot_side/simulation/assets/arm.xml",
     "operator_side/dualsense/hid/release_watchdog.py",
-    "feelahead/benchmarks/overlap/peer_driver.cpp",
+    "feelahead/lab/reference/peer_driver.cpp",
 }
 
 

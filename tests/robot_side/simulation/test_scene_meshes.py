@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.ahead.distances import distance_to_object
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER
 from robot_side.ahead.scene_table import scene_table
@@ -24,7 +25,6 @@ from robot_side.settings import RobotSettings
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import Scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.repository import ROOT
 from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
 
