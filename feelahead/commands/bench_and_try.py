@@ -90,36 +90,18 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
 bench = Menu(
     "bench",
     "benchmark",
-    ("link", "tick"),
+    ("overlap", "felt", "link", "tick"),
     {
-        "overlap": Entry(
-            "feelahead.benchmarks.overlap.bench",
-            "bench_overlap",
-            "run time against error of the exact overlaps and of what is used in their place",
-            "pip install 'feelahead[robot,bench]'",
-        ),
         "error": Entry(
             "feelahead.benchmarks.error.bench",
             "bench_error",
             "run time against error of the error propagation, and of the prediction of the gripper's way",
             "pip install 'feelahead[robot,operator,bench]'",
         ),
-        "cover": Entry(
-            "feelahead.benchmarks.cover.bench",
-            "bench_cover",
-            "how closely a gripper's spheres cover it, measured both ways",
-            "pip install 'feelahead[robot,bench]'",
-        ),
         "coverage": Entry(
             "feelahead.benchmarks.coverage.bench",
             "bench_coverage",
             "how often full stiffness stands in time, and how often without need, for each law",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
-        "felt": Entry(
-            "feelahead.benchmarks.felt.bench",
-            "bench_felt",
-            "run time against error of what is felt, as the look ahead is set otherwise",
             "pip install 'feelahead[robot,operator,bench]'",
         ),
     },
@@ -135,12 +117,6 @@ try_out = Menu(
             "try_approach",
             "a finger of constant force pulls the gripper towards things: does it hit them, and how fast",
             "pip install 'feelahead[robot,operator,bench]'",
-        ),
-        "field": Entry(
-            "feelahead.experiments.field.command",
-            "try_field",
-            "how far from things each strength begins, and what a look ahead costs",
-            "pip install 'feelahead[robot,bench]'",
         ),
     },
 )

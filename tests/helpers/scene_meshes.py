@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from feelahead.lab.reference.meshes import grid_tetrahedra, surface_of
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.overlap.meshes import grid_tetrahedra, surface_of
 
 CELL_M = 0.04
 

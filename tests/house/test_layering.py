@@ -106,7 +106,7 @@ LIBRARIES = {
     "zmq": ("common/sockets", "feelahead/lab/link/bare.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
-    "mujoco": ("robot_side/simulation", "robot_side/cameras", "feelahead/benchmarks/overlap/distances.py"),
+    "mujoco": ("robot_side/simulation", "robot_side/cameras"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
     "foxglove": ("common/recording",),

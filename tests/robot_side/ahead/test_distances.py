@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.ahead.distances import distance_to_object, object_distances
 from robot_side.ahead.scene_table import scene_table
 from robot_side.objects.perceived import Role
@@ -24,7 +25,6 @@ from tests.helpers.ahead.nearest_point import (
     nearest_on_sphere,
     nearest_on_tetrahedron,
 )
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 ORIGIN = np.zeros(3)

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray, IntArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
+from feelahead.lab.reference.ways_by_definition import Definition
 from robot_side.ahead.field import Ahead
 from robot_side.ahead.kinds.layout import LEAST_WAY_M
 from robot_side.ahead.kinds.prism import ball_in_prism
@@ -15,8 +17,6 @@ from robot_side.compiled.kernel import NUMBER, compiled
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import AHEAD, along, ball_pose, look
-from tests.helpers.ahead.ways_by_definition import Definition
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.scene_meshes import cup
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from robot_side.ahead import mesh_ways
 from robot_side.ahead.field import Ahead
 from robot_side.objects.perceived import PerceivedObjects
@@ -14,7 +15,6 @@ from robot_side.overlap.meshes import mesh_kernels
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from tests.helpers.ahead.fields import AHEAD, RADIUS_M, along, ball_pose, look, ways_of
 from tests.helpers.gripper_poses import free_pose, gripper_pose
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 EQUAL_M = 1e-4

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.ahead import scene_table as module
 from robot_side.ahead.field import Ahead
 from robot_side.ahead.kinds.blocks import TOGETHER
@@ -23,7 +24,6 @@ from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from tests.helpers.ahead.fields import along, ball_pose, look
 from tests.helpers.ahead.primitive_rows import object_bound
 from tests.helpers.ahead.primitive_rows import rows_of as rows_of_primitives
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.ahead.sideways import SPACING_M, FingerMotion, Sideways
 from robot_side.ahead.turns import FIELD_PERIOD_S
 from robot_side.arm.port import GripperPose
@@ -18,7 +19,6 @@ from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import RADIUS_M, ball_pose
 from tests.helpers.ahead.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOP_S = 0.1

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.ahead.field import Ahead, Field
 from robot_side.ahead.scene_table import scene_table
 from robot_side.ahead.tables import BLOCK, MEETING, PAIR, RAMP, Jobs, Tables
@@ -14,7 +15,6 @@ from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from tests.helpers.ahead.fields import AHEAD, along, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOKED = along(AHEAD, 0.007, reach_m=0.2)

@@ -6,6 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from feelahead.lab.reference.ways_by_definition import overlap_of
 from robot_side.ahead.find import PASSED_OVER
 from robot_side.ahead.scene_table import scene_table
 from robot_side.ahead.tables import Tables
@@ -13,8 +15,6 @@ from robot_side.ahead.total_overlap import total_overlap_m3
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh, sphere_sphere
 from tests.helpers.ahead.fields import REACH_M, along, ball_pose, ways_of
-from tests.helpers.ahead.ways_by_definition import overlap_of
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 TABLES = Tables()

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from feelahead.lab.reference.ways_by_definition import Definition
 from robot_side.ahead.distances import nearest_points
 from robot_side.ahead.field import Ahead
 from robot_side.ahead.kinds.layout import TOUCHING_M
 from robot_side.ahead.scene_table import scene_table
 from robot_side.objects.perceived import PerceivedObjects
 from tests.helpers.ahead.fields import AHEAD, RADIUS_M, along, ball_pose, look, ways_of
-from tests.helpers.ahead.ways_by_definition import Definition
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.objects.mesh_bounds import mesh_bounds, placed_middles
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.scene_meshes import CELL_M, cup
 

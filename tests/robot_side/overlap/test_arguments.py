@@ -132,16 +132,6 @@ def test_what_nobody_vouched_for_is_doubtful() -> None:
             kernels.tetrahedron_pairs(centers, radii, vertices, vouched=False, threads=threads)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name"), [("sphere", "radii"), ("box", "radii"), ("sphere", "other_radii"), ("box", "box_half_sizes")]
-)
-def test_negative_lengths_are_refused(kind: str, name: str) -> None:
-    value = CALLS[kind][1][name].copy()
-    value[-1] = -0.25
-    with pytest.raises(ValueError, match=rf"^{name}\[1.*\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"):
-        changed(kind, name, value)()
-
-
 @pytest.mark.parametrize(("kind", "name"), ARGUMENTS)
 def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
     value = CALLS[kind][1][name]
@@ -155,20 +145,40 @@ def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
         changed(kind, name, three)()
 
 
-@pytest.mark.parametrize("bad", ["far", None, 1j, True])
-def test_what_is_no_number_is_refused(bad: object) -> None:
-    with pytest.raises(ValueError, match=r"^radii has the type .*; valid: real numbers"):
-        changed("sphere", "radii", bad)()
-
-
-def test_ragged_lists_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"^vertices is no rectangular array; valid: the shape \(\.\.\., 4, 3\)"):
-        changed("tetrahedron", "vertices", [[0, 0, 0], [1, 0]])()
-
-
-def test_a_normal_of_zero_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"^normals\[1\] = \[0\.0, 0\.0, 0\.0\] is out of range; valid: a vector"):
-        changed("half-space", "normals", np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]]))()
+@pytest.mark.parametrize(
+    ("kind", "name", "value", "said"),
+    [
+        ("sphere", "radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
+        ("box", "radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
+        ("sphere", "other_radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
+        ("box", "box_half_sizes", [[1.0] * 3, [-0.25] * 3], r"\[1, 0\] = -0\.25 is out of range; valid: finite, 0 to"),
+        ("sphere", "radii", "far", " has the type .*; valid: real numbers"),
+        ("sphere", "radii", None, " has the type .*; valid: real numbers"),
+        ("sphere", "radii", 1j, " has the type .*; valid: real numbers"),
+        ("sphere", "radii", True, " has the type .*; valid: real numbers"),
+        (
+            "tetrahedron",
+            "vertices",
+            [[0, 0, 0], [1, 0]],
+            r" is no rectangular array; valid: the shape \(\.\.\., 4, 3\)",
+        ),
+        (
+            *("half-space", "normals", [[0.0, 0.0, 2.0], [0.0, 0.0, 0.0]]),
+            r"\[1\] = \[0\.0, 0\.0, 0\.0\] is out of range; valid: a vector",
+        ),
+        ("box", "box_rotations", 2.0 * np.eye(3), r" = \[\[.*\]\] is out of range; valid: an orthonormal"),
+        ("box", "box_rotations", np.zeros((3, 3)), r" = \[\[.*\]\] is out of range; valid: an orthonormal"),
+        (
+            "box",
+            "box_rotations",
+            np.eye(3) + 1e-6 * np.eye(3, k=1),
+            r" = \[\[.*\]\] is out of range; valid: an orthonormal",
+        ),
+    ],
+)
+def test_what_is_refused(kind: str, name: str, value: object, said: str) -> None:
+    with pytest.raises(ValueError, match=f"^{name}{said}"):
+        changed(kind, name, value)()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -183,12 +193,6 @@ def test_rotations_are_orthonormal_to_a_millionth_and_no_further(sign: float) ->
                 sphere_box(**{**arguments, "box_rotations": turned})
         else:
             sphere_box(**{**arguments, "box_rotations": turned})
-
-
-@pytest.mark.parametrize("rotation", [2.0 * np.eye(3), np.zeros((3, 3)), np.eye(3) + 1e-6 * np.eye(3, k=1)])
-def test_rotations_that_are_not_orthonormal_are_refused(rotation: object) -> None:
-    with pytest.raises(ValueError, match=r"^box_rotations = \[\[.*\]\] is out of range; valid: an orthonormal"):
-        changed("box", "box_rotations", rotation)()
 
 
 def test_a_rotation_within_its_tolerance_gives_the_set_that_it_describes() -> None:

@@ -118,39 +118,6 @@ def test_the_handedness_of_a_rotation_does_not_matter() -> None:
         assert (np.abs(first[1] - second[1]).max(axis=1) <= 4e-15 * np.pi * radii**2).all()
 
 
-def test_wrong_arrays_are_refused() -> None:
-    centers, radii, vertices = tetrahedra(4)
-    with pytest.raises(TypeError):
-        kernels.tetrahedron_pairs(centers.astype(np.float32), radii, vertices)
-
-
-NEEDLE = [
-    [3.000000011175871, -1.1250000018626451, -0.1250000074505806],
-    [2.6249999906867743, -0.2812499990686774, 0.8124999944120646],
-    [2.6249999990686774, -0.28124999068677425, 0.8125000055879354],
-    [2.625000006519258, -0.2812499925494219, 0.8125000093132257],
-]
-
-
-def test_a_needle_through_the_sphere_is_not_taken_for_apart() -> None:
-    # The planes of its long faces round by more than they lie apart.
-    volumes, _, areas = kernels.tetrahedron_pairs(
-        np.array([[2.75, -0.5625, 0.5]]), np.array([0.125]), np.array([NEEDLE])
-    )
-    assert volumes[0] == pytest.approx(2.0738419e-18, rel=1e-6)
-    assert areas[0] > 0.0
-
-
-def test_a_repeated_corner_has_no_volume() -> None:
-    centers, radii, vertices = tetrahedra(500)
-    for first, second in ((0, 1), (1, 2), (2, 3), (0, 3)):
-        flat = vertices.copy()
-        flat[:, second] = flat[:, first]
-        for scale in (1.0, 10.0):
-            for result in kernels.tetrahedron_pairs(centers, scale * radii, flat):
-                assert not result.any()
-
-
 @pytest.mark.processes
 def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
     program = (

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 from robot_side.overlap import Mesh, MeshLibrary, sphere_mesh
-from tests.helpers.overlap.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 WITH_NAN = np.where(np.arange(12).reshape(4, 3) == 7, np.nan, TETRAHEDRON)
@@ -136,3 +136,5 @@ def test_a_meshes_tables_cannot_be_changed() -> None:
         Mesh(TETRAHEDRON, TETRAHEDRON_TRIANGLES).tables.triangles[0, 0] = 5.0
     with pytest.raises(ValueError, match=re.escape("meshes[0] is a NoneType")):
         MeshLibrary([None])  # type: ignore[list-item]
+    with pytest.raises(ValueError, match="meshes is empty"):
+        MeshLibrary([])

@@ -41,18 +41,35 @@ def determinant_volume(vertices: FloatArray) -> float:
 
 
 @repeatable
-@given(points, radii, corners)
-def test_a_tetrahedron_bounds_its_overlap(center: FloatArray, radius: float, vertices: FloatArray) -> None:
-    volume, gradient, area = sphere_tetrahedron(center, radius, vertices, gradient=True)
-    assert 0.0 <= volume <= 4.0 / 3.0 * np.pi * radius**3 * (1.0 + 1e-15)
-    assert volume <= determinant_volume(vertices) + 1e-15 * SIZE**3
-    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
-    assert np.linalg.norm(gradient) <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
+@given(points, radii, radii, corners, st.floats(0.0, 1.0))
+def test_a_tetrahedron_bounds_its_overlap_and_is_the_sum_of_its_parts(
+    center: FloatArray, radius: float, other: float, vertices: FloatArray, share: float
+) -> None:
+    orders = np.array([vertices[list(order)] for order in itertools.permutations(range(4))])
+    volumes, gradients, areas = sphere_tetrahedron(center, radius, orders, gradient=True)
+    assert volumes.min() >= 0.0
+    assert volumes.max() <= 4.0 / 3.0 * np.pi * radius**3 * (1.0 + 1e-15)
+    assert volumes.max() <= determinant_volume(vertices) + 1e-15 * SIZE**3
+    assert areas.min() >= 0.0
+    assert areas.max() <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
+    assert np.linalg.norm(gradients, axis=1).max() <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
+    # Vertices may come in any order.
+    assert np.ptp(volumes) <= rounding(radius)
+    assert np.ptp(gradients, axis=0).max() <= 2e-15 * 4.0 * max(radius, SIZE) * radius
+    assert np.ptp(areas) <= 1e-15 * 13.0 * max(radius, SIZE) * radius
+    # Its parts add up. The cut is rounded, which moves the parts' faces by that.
+    cut = (1.0 - share) * vertices[2] + share * vertices[3]
+    parts = np.stack([[*vertices[:3], cut], [vertices[0], vertices[1], cut, vertices[3]]])
+    moved = 1e-15 * SIZE * 2.0 * np.pi * radius**2
+    assert abs(volumes[0] - sphere_tetrahedron(center, radius, parts).sum()) <= 2.0 * rounding(radius) + moved
+    # A larger sphere overlaps no less.
+    small, large = sphere_tetrahedron(center, sorted((radius, other)), vertices)
+    assert small <= large + rounding(max(radius, other))
 
 
 @repeatable
 @given(points, radii, points, seeds, half_sizes)
-def test_a_box_bounds_its_overlap(
+def test_a_box_bounds_its_overlap_and_is_the_sum_of_six_tetrahedra(
     center: FloatArray, radius: float, box: FloatArray, seed: int, half: FloatArray
 ) -> None:
     volume, gradient, area = sphere_box(center, radius, box, rotation(seed), half, gradient=True)
@@ -60,36 +77,6 @@ def test_a_box_bounds_its_overlap(
     assert volume <= 8.0 * half.prod() * (1.0 + 1e-14) + SUBNORMAL
     assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
     assert np.linalg.norm(gradient) <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
-
-
-@repeatable
-@given(points, radii, corners)
-def test_vertices_may_come_in_any_order(center: FloatArray, radius: float, vertices: FloatArray) -> None:
-    orders = np.array([vertices[list(order)] for order in itertools.permutations(range(4))])
-    volumes, gradients, areas = sphere_tetrahedron(center, radius, orders, gradient=True)
-    assert np.ptp(volumes) <= rounding(radius)
-    assert np.ptp(gradients, axis=0).max() <= 2e-15 * 4.0 * max(radius, SIZE) * radius
-    assert np.ptp(areas) <= 1e-15 * 13.0 * max(radius, SIZE) * radius
-
-
-@repeatable
-@given(points, radii, corners, st.floats(0.0, 1.0))
-def test_the_parts_of_a_tetrahedron_add_up(
-    center: FloatArray, radius: float, vertices: FloatArray, share: float
-) -> None:
-    cut = (1.0 - share) * vertices[2] + share * vertices[3]
-    parts = np.stack([[*vertices[:3], cut], [vertices[0], vertices[1], cut, vertices[3]]])
-    whole = sphere_tetrahedron(center, radius, vertices)
-    # The cut is rounded, which moves the parts' faces by as much.
-    moved = 1e-15 * SIZE * 2.0 * np.pi * radius**2
-    assert abs(whole - sphere_tetrahedron(center, radius, parts).sum()) <= 2.0 * rounding(radius) + moved
-
-
-@repeatable
-@given(points, radii, points, half_sizes)
-def test_a_box_is_the_sum_of_six_tetrahedra(
-    center: FloatArray, radius: float, box: FloatArray, half: FloatArray
-) -> None:
     whole = sphere_box(center, radius, box, np.eye(3), half)
     tetrahedra = []
     for order in itertools.permutations(range(3)):
@@ -115,15 +102,6 @@ def test_moving_both_changes_nothing(
     assert abs(before[0] - after[0]) <= moved * 4.0 * np.pi * radius**2
     # Where the sphere touches a face, a move of δ changes the disc in it by 2π R δ at once.
     np.testing.assert_allclose(turn @ before[1], after[1], rtol=0.0, atol=moved * 8.0 * np.pi * radius + 1e-30)
-
-
-@repeatable
-@given(points, corners, radii, radii)
-def test_a_larger_sphere_overlaps_no_less(
-    center: FloatArray, vertices: FloatArray, first: float, second: float
-) -> None:
-    small, large = sphere_tetrahedron(center, sorted((first, second)), vertices)
-    assert small <= large + rounding(max(first, second))
 
 
 @repeatable
@@ -206,30 +184,6 @@ def test_every_valid_input_gives_finite_results(
     )
     for result in results:
         assert np.isfinite(result).all()
-
-
-@repeatable
-@given(seeds)
-def test_gradients_are_finite_differences(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    center, radius = rng.normal(size=3), float(rng.uniform(0.5, 2.0))
-    vertices, box, half, turn = rng.normal(size=(4, 3)), rng.normal(size=3), rng.uniform(0.2, 1.5, 3), rotation(seed)
-    normal, other_radius = rng.normal(size=3), float(rng.uniform(0.5, 2.0))
-    step = 1e-5
-    centers = np.concatenate([center + step * np.eye(3), center - step * np.eye(3), [center, center]])
-    grown = np.array([radius] * 6 + [radius + step, radius - step])
-    for volumes, (_, gradient, area) in (
-        (sphere_tetrahedron(centers, grown, vertices), sphere_tetrahedron(center, radius, vertices, gradient=True)),
-        (sphere_box(centers, grown, box, turn, half), sphere_box(center, radius, box, turn, half, gradient=True)),
-        (
-            sphere_sphere(centers, grown, box, other_radius),
-            sphere_sphere(center, radius, box, other_radius, gradient=True),
-        ),
-        (sphere_half_space(centers, grown, normal, 0.3), sphere_half_space(center, radius, normal, 0.3, gradient=True)),
-    ):
-        differences = [*(volumes[:3] - volumes[3:6]), volumes[6] - volumes[7]]
-        # A corner or an edge at the sphere's surface lets the derivative turn within one step.
-        np.testing.assert_allclose(np.array(differences) / (2 * step), [*gradient, area], rtol=0.0, atol=2e-4)
 
 
 def test_a_tetrahedron_that_is_nothing_beside_its_sphere_is_whole() -> None:

@@ -1,1 +1,0 @@
-"""`feelahead bench cover`: how closely a gripper's spheres cover it, measured both ways."""

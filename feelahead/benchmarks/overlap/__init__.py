@@ -1,1 +1,0 @@
-"""Run time against error of the exact overlaps."""

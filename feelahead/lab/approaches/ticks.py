@@ -1,0 +1,169 @@
+"""Ticks of real runs, noted once in virtual time: what a law was asked, to ask any law the same again."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.settings import OperatorSettings
+from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
+from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.ahead.swept_law import SweptLaw
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.assembly import assemble
+from robot_side.core import RobotSide
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.overlap.meshes.mesh import Mesh
+from robot_side.overlap.meshes.mesh_library import MeshLibrary
+from robot_side.overlap.meshes.mesh_shapes import convex_hull_mesh
+from robot_side.settings import RobotSettings
+from robot_side.simulation.kinematics import MujocoKinematics
+from robot_side.simulation.mesh_arrays import mesh_vertices
+from robot_side.simulation.scene import Scene, load_scene
+
+DEMO: Final = "demo"
+FORCE_N: Final = 2.0
+_STRONGEST_N: Final = 2.0
+_BEFORE_S: Final = 0.5
+"""Of an approach, so much before its pull is kept, too."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """What the law was asked in one tick, and from which state the pose in it came."""
+
+    now_s: float
+    situation: Situation
+    state: ArmState
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run."""
+
+    name: str
+    ticks: tuple[Tick, ...]
+    settings: RobotSettings
+
+    def new_law(self) -> SweptLaw:
+        """Make a law as that of the run was at its start."""
+        law = assemble(self.settings, 0, "", scene=scene_of(self.name)).law
+        if not isinstance(law, SweptLaw):
+            raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
+        return law
+
+
+class _Noting:
+    """A law and the kinematics before it, in front of the real ones."""
+
+    def __init__(self, kinematics: MujocoKinematics, law: Law) -> None:
+        self.has_fingers = kinematics.has_fingers
+        self.ticks: list[Tick] = []
+        self._kinematics, self._law = kinematics, law
+        self._state: ArmState | None = None
+
+    def pose(self, state: ArmState) -> GripperPose:
+        """Measure the pose, and keep the state."""
+        self._state = state
+        return self._kinematics.pose(state)
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Ask the law, and keep what it was asked."""
+        if self._state is not None:
+            self.ticks.append(Tick(now_s, situation, self._state))
+        return self._law.sense(situation, now_s)
+
+    def summary(self) -> dict[str, int]:
+        """Return the law's."""
+        return self._law.summary()
+
+
+def record(name: str, duration_s: float, seed: int = 0) -> Recorded:
+    """Run the demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same for the same seed."""
+    model = None if name == DEMO else frozen_scene(name)
+    robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed)
+    noting: list[_Noting] = []
+
+    def noted(arm: Any, kinematics: Any, camera: Any, law: Law, *others: Any, **named: Any) -> RobotSide:
+        noting.append(_Noting(kinematics, law))
+        return RobotSide(arm, noting[0], camera, noting[0], *others, **named)
+
+    device = SimulatedDualSense(strength_step_n=_STRONGEST_N / MAX_STRENGTH)
+    hands = PullingHands(device, constant_force(FORCE_N))
+    run = Loopback(
+        LoopbackSettings(robot, OperatorSettings(seed=seed)),
+        scene=scene_of(name),
+        device=device,
+        person=None if model is None else lambda _: hands,
+        robot_side=noted,
+    )
+    from_s = 0.0 if model is None else wait_for_pull(run, hands, "") - _BEFORE_S
+    run.run_until(from_s + duration_s)
+    return Recorded(name, tuple(tick for tick in noting[0].ticks if tick.now_s >= from_s), robot)
+
+
+def scene_of(name: str) -> Scene:
+    """Load where the run of this name takes place, at its start."""
+    return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)
+
+
+def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
+    """Return the ticks, had the gripper been covered by spheres that stand out that far; what it held stays."""
+    scene = scene_of(recorded.name)
+    own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
+    first = len(own.cover.radii_m)
+    return tuple(_covered(tick, other, first) for tick in recorded.ticks)
+
+
+def _covered(tick: Tick, kinematics: MujocoKinematics, first: int) -> Tick:
+    """Cover one tick; after the `first` spheres those of what is held follow."""
+    before, pose = tick.situation.pose, kinematics.pose(tick.state)
+
+    def joined(name: str) -> Any:
+        return np.concatenate([getattr(pose, name), getattr(before, name)[first:]])
+
+    names = "sphere_centers_m", "sphere_radii_m", "sphere_on_finger"
+    pose = replace(pose, **{name: joined(name) for name in names})
+    return replace(tick, situation=replace(tick.situation, pose=pose))
+
+
+def with_hulls(recorded: Recorded) -> tuple[Tick, ...]:
+    """Return the ticks, had the meshes of each object been seen as their convex hull."""
+    # A frame stays the same object for as long as there is no newer one.
+    frames = {id(tick.situation.objects): tick.situation.objects for tick in recorded.ticks}
+    seen = dict(zip(frames, as_hulls(scene_of(recorded.name), list(frames.values())), strict=True))
+    return tuple(
+        replace(tick, situation=replace(tick.situation, objects=seen[id(tick.situation.objects)]))
+        for tick in recorded.ticks
+    )
+
+
+def as_hulls(scene: Scene, frames: list[PerceivedObjects]) -> list[PerceivedObjects]:
+    """Replace the meshes of each object, which do not move against each other, by their hull."""
+    objects, rows = np.unique(frames[0].mesh_object, return_index=True)
+    hulls, data = [], scene.data
+    for geoms in (scene.objects[thing].geoms for thing in objects.tolist()):
+        turned, first_m = data.geom_xmat[geoms[0]].reshape(3, 3), data.geom_xpos[geoms[0]]
+        in_world = [
+            mesh_vertices(scene.model, geom) @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+            for geom in geoms
+        ]
+        hull = convex_hull_mesh((np.concatenate(in_world) - first_m) @ turned)
+        hulls.append(Mesh(hull.vertices, hull.triangles))
+    library = MeshLibrary(hulls)
+    return [
+        replace(
+            seen,
+            mesh_library=library,
+            mesh_index=np.arange(len(rows)),
+            mesh_positions_m=np.ascontiguousarray(seen.mesh_positions_m[rows]),
+            mesh_rotations=np.ascontiguousarray(seen.mesh_rotations[rows]),
+            mesh_object=objects,
+        )
+        for seen in frames
+    ]

@@ -1,0 +1,1 @@
+"""What all else is held against: exact overlaps, classes that break algorithms, and the ways by definition."""

@@ -1,0 +1,132 @@
+"""What people use instead of exact overlaps: points in the ball, a grid of voxels, numerical quadrature.
+
+Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. They see a solid as the half-spaces of
+its faces, so that all are given the same.
+"""
+
+import math
+import warnings
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+
+import numpy as np
+from scipy import integrate
+
+from common.arrays import FloatArray
+from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, TETRAHEDRON_TRIANGLES, Pairs
+
+_CHUNK = 1 << 16
+"""Points at a time, so that they stay within the processor's cache."""
+
+
+def satellite_points() -> FloatArray:
+    """Return points (29, 3) in radii: the centre and two shells of 14 points, each standing for the same volume.
+
+    As in the divided void fraction of CFDEMcoupling (Goniva et al. 2012): the shells end at the radii that hold
+    1, 15 and 29 parts of 29 of the ball, and the points lie at a shell's mean radius along the axes and
+    diagonals of a cube.
+    """
+    axes = [sign * row for row in np.eye(3) for sign in (1.0, -1.0)]
+    diagonals = [np.array(signs) / math.sqrt(3.0) for signs in product((1.0, -1.0), repeat=3)]
+    ends = [(part / 29.0) ** (1.0 / 3.0) for part in (1, 15, 29)]
+    shells = [0.75 * (end**4 - start**4) / (end**3 - start**3) for start, end in ((ends[0], ends[1]), ends[1:])]
+    return np.array([np.zeros(3), *(radius * point for radius in shells for point in (*axes, *diagonals))])
+
+
+def satellites(pairs: Pairs) -> FloatArray:
+    """Take the share of 29 satellite points that lie within the solid."""
+    return _shares(pairs, satellite_points()) * pairs.sphere_volumes
+
+
+def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
+    """Take the share of `points` uniform random points of the ball that lie within the solid."""
+    rng = np.random.default_rng(points)
+    directions = rng.normal(size=(points, 3))
+    directions *= (np.cbrt(rng.random(points)) / np.linalg.norm(directions, axis=1))[:, None]
+    return _shares(pairs, directions) * pairs.sphere_volumes
+
+
+def voxels(pairs: Pairs, cells: int) -> FloatArray:
+    """Count the voxels, cells³ in the ball's cube, whose centres lie within both."""
+    ticks = (np.arange(cells) + 0.5) * 2.0 / cells - 1.0
+    grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    within = grid[np.einsum("ni,ni->n", grid, grid) <= 1.0]
+    return _shares(pairs, within) * len(within) * (2.0 * pairs.radii / cells) ** 3
+
+
+def quadrature(pairs: Pairs, tolerance: float) -> FloatArray:
+    """Integrate the length of the vertical chord within the solid over the disc below the ball, by SciPy's `dblquad`.
+
+    `tolerance` is its absolute one, as a share of the sphere's volume.
+    """
+    normals, heights = _face_planes(pairs)
+
+    def side(x: float) -> float:
+        return math.sqrt(max(1.0 - x * x, 0.0))
+
+    def volume(*planes: FloatArray) -> float:
+        found, _ = integrate.dblquad(
+            _chord, -1.0, 1.0, lambda x: -side(x), side, planes, epsabs=tolerance * 4.0 / 3.0 * math.pi, epsrel=0.0
+        )
+        return float(found)
+
+    with warnings.catch_warnings():
+        # Chord lengths have kinks, at which it complains of slow convergence.
+        warnings.simplefilter("ignore", integrate.IntegrationWarning)
+        rows = zip(normals, heights / pairs.radii[:, None], strict=True)
+        return np.array([volume(*row) for row in rows]) * pairs.radii**3
+
+
+SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
+    **{f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)},
+    **{f"voxels {cells}³": partial(voxels, cells=cells) for cells in (8, 32, 64)},
+    **{f"SciPy {tolerance:g}": partial(quadrature, tolerance=tolerance) for tolerance in (1e-3, 1e-6)},
+}
+"""By name; a pair takes each of these long."""
+
+
+def _chord(y: float, x: float, normals: FloatArray, heights: FloatArray) -> float:
+    """Return the length of the part of the unit ball's vertical chord at (x, y) that lies within every half-space."""
+    high = math.sqrt(max(1.0 - x * x - y * y, 0.0))
+    low = -high
+    for (a, b, c), height in zip(normals.tolist(), heights.tolist(), strict=True):
+        rest = height - a * x - b * y
+        if c > 0.0:
+            high = min(high, rest / c)
+        elif c < 0.0:
+            low = max(low, rest / c)
+        elif rest < 0.0:
+            return 0.0
+    return max(high - low, 0.0)
+
+
+def _face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+    """Return outward normals (p, f, 3) and heights (p, f) of the face planes above the sphere's centre, in m.
+
+    Nothing is below the planes of a solid without volume: their heights are -inf.
+    """
+    faces = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
+    corners = pairs.corners - pairs.centers[:, None]
+    rings = corners[:, np.array([face[:3] for face in faces])]
+    normals = np.cross(rings[:, :, 1] - rings[:, :, 0], rings[:, :, 2] - rings[:, :, 0])
+    lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+    edges = corners[:, 1:] - corners[:, :1] if pairs.solid == "tetrahedron" else pairs.parameters[1]
+    handedness = np.sign(np.linalg.det(edges))
+    normals = normals / np.where(lengths == 0.0, 1.0, lengths) * handedness[:, None, None]
+    heights = np.einsum("nfi,nfi->nf", normals, rings[:, :, 0])
+    heights[(handedness == 0.0) | (pairs.solid_volumes == 0.0)] = -np.inf
+    return normals, heights
+
+
+def _shares(pairs: Pairs, points: FloatArray) -> FloatArray:
+    """Return the share of the points (k, 3), in radii from each centre, within each solid."""
+    normals, heights = _face_planes(pairs)
+    heights = heights / pairs.radii[:, None]
+    found, at_once = np.zeros(len(pairs)), max(1, _CHUNK // len(points))
+    for first in range(0, len(pairs), at_once):
+        rows = slice(first, first + at_once)
+        for start in range(0, len(points), _CHUNK):
+            heights_of_points = np.einsum("nfi,ki->nkf", normals[rows], points[start : start + _CHUNK])
+            found[rows] += (heights_of_points <= heights[rows, None]).all(axis=2).sum(axis=1)
+    return found / len(points)

@@ -1,0 +1,111 @@
+"""Decide exactly whether an open ball meets a solid's interior, in whole numbers.
+
+Doubles are whole multiples of powers of two, so every coordinate of a pair becomes a Python integer once a common
+power of two is divided out, and no sign below is rounded. A ball meets the interior of a convex solid when the
+distance from its centre to the solid is less than the radius: the centre lies inside, or a vertex, or the foot
+of the perpendicular on an edge or a face is nearer than that.
+"""
+
+from fractions import Fraction
+from math import lcm
+
+import numpy as np
+
+from common.arrays import BoolArray
+from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, BOX_SIGNS, TETRAHEDRON_TRIANGLES, Pairs
+
+Whole = tuple[int, int, int]
+
+
+def contacts(pairs: Pairs) -> BoolArray:
+    """Tell for each pair (p,) whether the open ball meets the solid's interior, for the doubles exactly as they are."""
+    return np.array([exact_contact(pairs, row) for row in range(len(pairs))])
+
+
+def exact_contact(pairs: Pairs, row: int) -> bool:
+    """Tell whether the open ball of this row meets the interior of its solid."""
+    center = [Fraction(float(x)) for x in pairs.centers[row]]
+    radius = Fraction(float(pairs.radii[row]))
+    if radius == 0:
+        return False
+    if pairs.solid == "half-space":
+        normal = [Fraction(float(x)) for x in pairs.parameters[0][row]]
+        beyond = sum(n * x for n, x in zip(normal, center, strict=True)) - Fraction(float(pairs.parameters[1][row]))
+        return beyond < 0 or beyond**2 < radius**2 * sum(n * n for n in normal)
+    if pairs.solid == "sphere":
+        other = Fraction(float(pairs.parameters[1][row]))
+        apart_2 = sum((Fraction(float(a)) - b) ** 2 for a, b in zip(pairs.parameters[0][row], center, strict=True))
+        return other > 0 and apart_2 < (radius + other) ** 2
+    corners = exact_corners(pairs, row)
+    denominator = lcm(radius.denominator, *(x.denominator for point in (center, *corners) for x in point))
+    whole = [_whole([x - c for x, c in zip(corner, center, strict=True)], denominator) for corner in corners]
+    faces = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
+    return _origin_within(whole, faces, int(radius * denominator) ** 2)
+
+
+def exact_corners(pairs: Pairs, row: int) -> list[list[Fraction]]:
+    """Return the corners of a tetrahedron, right-handed or not, or those of a box, without rounding."""
+    if pairs.solid == "tetrahedron":
+        return [[Fraction(float(x)) for x in vertex] for vertex in pairs.parameters[0][row]]
+    place, turn, half_sizes = ([Fraction(float(x)) for x in values[row].ravel()] for values in pairs.parameters)
+    return [
+        [place[axis] + sum(turn[3 * axis + k] * half_sizes[k] * int(signs[k]) for k in range(3)) for axis in range(3)]
+        for signs in BOX_SIGNS
+    ]
+
+
+def _whole(point: list[Fraction], denominator: int) -> Whole:
+    x, y, z = (int(coordinate * denominator) for coordinate in point)
+    return x, y, z
+
+
+def _origin_within(corners: list[Whole], faces: tuple[tuple[int, ...], ...], reach_2: int) -> bool:
+    """Tell whether the origin lies nearer than √`reach_2` to the convex solid, which has an interior."""
+    a, b = corners[0], corners[1]
+    fourth = corners[3] if len(corners) == 4 else corners[4]
+    volume = _dot(_cross(_minus(b, a), _minus(corners[2], a)), _minus(fourth, a))
+    if volume == 0:
+        return False
+    if any(_dot(corner, corner) < reach_2 for corner in corners):
+        return True
+    handed = 1 if volume > 0 else -1
+    if len(corners) == 8:
+        # The corners count along the last axis first, which makes edges 1, 2, 4 left-handed in a right-handed box.
+        handed = -handed
+    inside = True
+    for face in faces:
+        ring = [corners[index] for index in face]
+        normal = _cross(_minus(ring[1], ring[0]), _minus(ring[2], ring[0]))
+        height = handed * _dot(normal, ring[0])
+        if height > 0:
+            continue
+        inside = False
+        if _face_within(ring, normal, reach_2):
+            return True
+    return inside
+
+
+def _face_within(ring: list[Whole], normal: Whole, reach_2: int) -> bool:
+    """Tell whether the foot of the origin on the face or on one of its edges exists and is nearer than √`reach_2`."""
+    foot_on_face = True
+    for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
+        along = _minus(end, start)
+        across = _cross(start, along)
+        # The foot on the plane is on the inner side of an edge when normal · (along × (foot - start)) > 0.
+        foot_on_face = foot_on_face and _dot(normal, across) >= 0
+        length_2 = _dot(along, along)
+        if 0 < -_dot(start, along) < length_2 and _dot(across, across) < reach_2 * length_2:
+            return True
+    return foot_on_face and _dot(normal, ring[0]) ** 2 < reach_2 * _dot(normal, normal)
+
+
+def _minus(a: Whole, b: Whole) -> Whole:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _dot(a: Whole, b: Whole) -> int:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Whole, b: Whole) -> Whole:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

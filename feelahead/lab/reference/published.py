@@ -1,0 +1,122 @@
+"""The published package `overlap` 0.2.0 on the same pairs: from Python, and its C++ header by itself.
+
+Both are optional: `missing` says what is not there and how to get it. The package takes one pair a call, wants its
+corners in an order of its own, and returns volumes only.
+"""
+
+import importlib.util
+import shutil
+import subprocess
+import tempfile
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.clock import Clock
+from feelahead.lab.reference.pairs import Pairs
+
+SDIST = "pip download --no-deps --no-binary overlap overlap==0.2.0"
+_EIGEN = (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3"), Path("/opt/homebrew/include/eigen3"))
+_HEXAHEDRON = (0, 4, 6, 2, 1, 5, 7, 3)
+"""The corners of `pairs.BOX_SIGNS` round the bottom and then the top, as the package wants them."""
+_TIMEOUT_S = 180.0
+_REPEATS = "2"
+_AT_ONCE = 128
+"""Pairs of a part that is timed by itself."""
+
+
+def package_corners(pairs: Pairs, *, mend: bool = True) -> FloatArray:
+    """Put the corners (p, 4 or 8, 3) in the package's order; `mend` turns inverted tetrahedra round."""
+    corners = pairs.corners
+    if pairs.solid == "box":
+        # A rotation that mirrors turns the box inside out, which the package would take for a negative volume.
+        mirrored = np.linalg.det(pairs.parameters[1]) < 0.0
+        ordered = corners[:, list(_HEXAHEDRON)]
+        ordered[mirrored] = ordered[mirrored][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+        return np.ascontiguousarray(ordered)
+    if mend:
+        corners = corners.copy()
+        inverted = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0.0
+        corners[inverted] = corners[inverted][:, [0, 1, 3, 2]]
+    return np.ascontiguousarray(corners)
+
+
+class PythonPackage:
+    """The package from Python."""
+
+    def __init__(self) -> None:
+        found = importlib.util.find_spec("overlap") is not None
+        self.missing = "" if found else "not installed: pip install 'feelahead[bench]'"
+
+    def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
+        """Return volumes (p,) with NaN for an exception."""
+        package: Any = importlib.import_module("overlap")
+        volumes, element = np.full(len(pairs), np.nan), _element(package, pairs)
+        for row, corners in enumerate(package_corners(pairs, mend=mend)):
+            try:
+                sphere = package.Sphere(pairs.centers[row], float(pairs.radii[row]))
+                volumes[row] = package.overlap_volume(sphere, element(corners))
+            except (ValueError, RuntimeError):
+                continue
+        return volumes
+
+    def turn_ns(self, pairs: Pairs, clock: Clock) -> FloatArray:
+        """Time one call after another, the objects built beforehand; ns (parts,), each of up to 128 pairs."""
+        package: Any = importlib.import_module("overlap")
+        overlap_volume, element, corners = package.overlap_volume, _element(package, pairs), package_corners(pairs)
+        taken_s = []
+        for first in range(0, len(pairs), _AT_ONCE):
+            rows = slice(first, first + _AT_ONCE)
+            spheres = [package.Sphere(*sphere) for sphere in zip(pairs.centers[rows], pairs.radii[rows], strict=True)]
+            built = list(zip(spheres, [element(corner) for corner in corners[rows]], strict=True))
+            start_s = clock.now()
+            for sphere, solid in built:
+                overlap_volume(sphere, solid)
+            taken_s.append(clock.now() - start_s)
+        return 1e9 * np.array(taken_s)
+
+
+def _element(package: Any, pairs: Pairs) -> Any:
+    return package.Tetrahedron if pairs.solid == "tetrahedron" else package.Hexahedron
+
+
+class CompiledHeader:
+    """The package's header, overlap.hpp of its source distribution, compiled into the driver beside this file."""
+
+    def __init__(self, header: Path | None) -> None:
+        folder = tempfile.mkdtemp(prefix="feelahead-peer-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self._driver = Path(folder) / "peer_driver"
+        compiler = next((path for name in ("c++", "g++", "clang++") if (path := shutil.which(name))), None)
+        eigen = next((path for path in _EIGEN if path.is_dir()), None)
+        if header is None:
+            self.missing = f"no header: {SDIST}, unpack it, --peer-header .../include/overlap/overlap.hpp"
+        elif compiler is None:
+            self.missing = "no C++ compiler (c++, g++ or clang++ in the PATH)"
+        elif eigen is None:
+            self.missing = "no Eigen: apt-get install libeigen3-dev"
+        else:
+            flags = ["-std=c++17", "-O3", "-march=native", "-DNDEBUG", f"-I{header.parent}", f"-isystem{eigen}"]
+            source = Path(__file__).with_name("peer_driver.cpp")
+            said = _run([compiler, *flags, str(source), "-o", str(self._driver)])
+            errors = [line for line in said.stderr.splitlines() if "error" in line]
+            self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
+
+    def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+        """Work out all pairs twice in a process of its own: the least ns (parts,), and the volumes (p,)."""
+        corners = package_corners(pairs)
+        rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)
+        given, found = (self._driver.with_name(name) for name in ("pairs", "volumes"))
+        given.write_bytes(np.array([len(pairs), corners.shape[1]], np.int64).tobytes() + rows.tobytes())
+        done = _run([str(self._driver), str(given), str(found), _REPEATS])
+        if done.returncode != 0:
+            raise OSError(f"the C++ driver ended with code {done.returncode}")
+        _, parts_ns = done.stdout.splitlines()
+        return np.array(parts_ns.split(), float), np.fromfile(found)
+
+
+def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False)

@@ -1,0 +1,231 @@
+"""The compiled law and the plain definition agree, and `feelahead bench felt` measures what it says."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import feelahead.main
+from common.errors import ConfigurationError
+from feelahead.lab.approaches.frozen import frozen_scene
+from feelahead.lab.approaches.ticks import DEMO, Recorded, as_hulls, record, scene_of, with_cover
+from feelahead.lab.questions.felt import LADDERS, WAYS, LateLaw, Replayed, Run, Variant, errors_mm, replay, run
+from feelahead.lab.reference import plain_feel, plain_ramp, plain_ways
+from feelahead.lab.reference.beside import Differences, compare_ticks
+from robot_side.ahead.field import Ahead, Along
+from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.ahead.scene_table import scene_table
+from robot_side.objects.perceived import PerceivedObjects
+from robot_side.overlap import Mesh
+from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
+from tests.helpers.ahead.fields import along, ball_pose, look
+from tests.helpers.ahead.situations import at, moving, situation, swept, walls
+from tests.helpers.gripper_poses import free_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation
+
+LIMIT = 1e-12
+REACH_M = 0.25
+ENCODER_SIGMA_RAD = np.full(6, 2e-3)
+HORIZON_M = 0.5
+
+
+def any_scene(rng: np.random.Generator) -> PerceivedObjects:
+    """Up to four objects of up to three primitives, some about the gripper and some ahead of it."""
+    scene = Scene()
+    for _ in range(rng.integers(1, 5)):
+        scene.add()
+        for kind in rng.choice(4, rng.integers(1, 4), p=(0.25, 0.35, 0.3, 0.1)):
+            center = rng.uniform((-0.08, -0.08, -0.08), (0.08, 0.08, 0.28))
+            size = float(rng.uniform(0.002, 0.05))
+            if kind == 0:
+                scene.sphere(center, size)
+            elif kind == 1:
+                scene.box(center, size * rng.uniform(0.1, 2.0, 3), random_rotation(rng))
+            elif kind == 2:
+                scene.tetrahedron(center + size * rng.normal(size=(4, 3)))
+            else:
+                normal = rng.normal(size=3)
+                normal /= np.linalg.norm(normal)
+                scene.half_space(normal, float(normal @ center) - 0.1)
+    return scene.objects()
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_any_look_has_the_ways_of_the_plain_formulation(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    objects, count = any_scene(rng), int(rng.integers(1, 10))
+    pose = free_pose(rng.uniform(-0.03, 0.03, (count, 3)), rng.uniform(0.004, 0.025, count))
+    pose = replace(pose, sphere_on_finger=rng.random(count) < 0.5)
+    direction = np.array([0.0, 0.0, 1.0]) + 0.4 * rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    things = len(objects.names)
+    early_m = rng.uniform(0.0, 0.03, things) if rng.random() < 0.5 else None
+    ahead = Along(direction, float(rng.uniform(-0.004, 0.006)), 0.002**2, 2.326, REACH_M, early_m)
+    standing = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET, PASSED_OVER], things).astype(np.int64)
+    widest_m = float(rng.choice([0.002, 0.01, np.inf]))
+    found = Ahead(ENCODER_SIGMA_RAD).look(pose, scene_table(objects), standing, ahead, widest_m).ways_m
+    expected = plain_ways.plain_ways(pose, objects, standing, ahead, widest_m, ENCODER_SIGMA_RAD)
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=LIMIT)
+
+
+def test_meshes_are_refused() -> None:
+    objects = Scene().add().mesh(Mesh(*capsule_mesh(0.01, 0.02, 8)[:2]), [0.0, 0.0, 0.1]).objects()
+    standing = np.full(1, OBSTACLE, dtype=np.int64)
+    with pytest.raises(ValueError, match="1 meshes; valid"):
+        plain_ways.plain_ways(ball_pose(), objects, standing, along(), np.inf, ENCODER_SIGMA_RAD)
+
+
+def test_what_only_one_knows_is_infinitely_far_apart() -> None:
+    found = Differences()
+    found.take("same", [np.inf, 1.0], [np.inf, 1.0])
+    found.take("apart", [0.25, 1.0], [0.25, 1.5])
+    found.take("one", [np.inf], [1.0])
+    found.take("none", [np.nan], [np.nan])
+    assert found.largest == {"same": 0.0, "apart": 0.5, "one": np.inf, "none": np.inf}
+
+
+@pytest.fixture(scope="module")
+def grasping() -> Recorded:
+    """Those of the demo's ticks in which the target is gripped, among objects of all kinds but meshes."""
+    recorded = record(DEMO, 6.2)
+    return replace(recorded, ticks=recorded.ticks[5940:])
+
+
+@pytest.mark.long
+def test_recorded_ticks_are_those_of_the_plain_formulation(grasping: Recorded) -> None:
+    found = compare_ticks(grasping.new_law(), grasping.ticks, grasping.settings.motion)
+    assert {len(tick.situation.pose.sphere_radii_m) for tick in grasping.ticks} == {246, 383}
+    assert found.ticks == 261
+    assert found.looks > 50
+    assert found.ways > 500
+    assert max(found.largest.values()) <= LIMIT
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("module", "name", "value", "noticed"),
+    [
+        (plain_ramp, "NODES_PER_MARGIN", 5, "ways of a look, m"),
+        (plain_ways, "MARGIN_M", 0.0121, "ways, m"),
+        (plain_feel, "STEADY_S", 0.01, "ways, m"),
+        (plain_feel, "HORIZON_S", 0.31, "horizon_m"),
+    ],
+)
+def test_another_formulation_is_noticed(
+    grasping: Recorded, module: object, name: str, value: float, noticed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, name, value)
+    found = compare_ticks(grasping.new_law(), grasping.ticks[:60], grasping.settings.motion)
+    assert found.largest[noticed] > LIMIT
+
+
+def replayed(*rows_m: float) -> Replayed:
+    """The same way of every kind in each tick."""
+    ways = np.repeat(np.array(rows_m)[:, None], len(WAYS), axis=1)
+    return Replayed(np.arange(1.0, len(ways) + 1.0), ways, np.full(len(ways), HORIZON_M), 246, 200.0)
+
+
+def test_too_late_is_above_0_and_what_neither_feels_does_not_count() -> None:
+    found = errors_mm(
+        replayed(0.101, 0.2, 0.3, HORIZON_M, HORIZON_M), replayed(0.1, 0.204, 0.3, HORIZON_M, 0.49), "fast first"
+    )
+    expected = {"mean": (1.0 - 4.0 + 0.0 + 10.0) / 4.0, "earliest": -4.0, "latest": 10.0, "p95": 10.0}
+    assert found == pytest.approx(expected)
+    nothing = replayed(HORIZON_M, HORIZON_M)
+    assert errors_mm(nothing, nothing, "slow full") == {}
+
+
+def first_felt(late_ticks: int, appears: int) -> int:
+    """In which tick a wall is felt that appears in one."""
+    law = LateLaw(swept(), late_ticks)
+    for tick in range(60):
+        sensed = law.sense(situation(at(0.0), walls(0.05 if tick >= appears else None)), 1.0 + 0.001 * tick)
+        if sensed.r2.fast_m[0] < sensed.horizon_m - 1e-9:
+            return tick
+    return 60
+
+
+@pytest.mark.parametrize("late_ticks", [1, 2, 4, 10])
+@pytest.mark.parametrize("appears", [7, 13])
+def test_a_look_that_is_late_is_felt_by_that_many_ticks_later(late_ticks: int, appears: int) -> None:
+    assert first_felt(late_ticks, appears) == first_felt(0, appears) + late_ticks
+
+
+def test_while_the_tool_moves_straight_on_a_late_look_is_felt_as_one_in_time() -> None:
+    on_time, late = LateLaw(swept(), 0), LateLaw(swept(), 7)
+    ways = []
+    for tick in range(40):
+        asked = situation(at(0.0002 * tick), walls(0.05), joint_velocities_rad_s=moving(np.array([0.0, 0.0, 0.2])))
+        ways.append([one.sense(asked, 1.0 + 0.001 * tick).r2.fast_m for one in (on_time, late)])
+    np.testing.assert_allclose(np.array(ways)[:, 0], np.array(ways)[:, 1], atol=1e-9)
+
+
+def test_each_ladder_holds_the_look_ahead_as_it_is_and_ends_with_its_finest() -> None:
+    for knob, rung in LADDERS.items():
+        assert sum(Variant(knob, one.value) == one for one in rung) == 1
+        assert len(set(rung)) == len(rung)
+
+
+def test_the_hull_of_a_u_is_a_block() -> None:
+    scene = scene_of("u_mesh")
+    nowhere = np.zeros((len(scene.objects), 3))
+    seen = scene.primitives.place(0.0, scene.roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
+    (hulls,) = as_hulls(scene, [seen])
+    assert hulls.mesh_library is not None
+    assert hulls.mesh_library.tables.volumes == pytest.approx([0.12 * 0.213 * 0.17])
+    # From above, between the sides: the bottom is 150 mm farther than the hull's top.
+    down = along(np.array([0.0, 0.0, -1.0]), reach_m=0.5)
+    pose = ball_pose(tool_position_m=[0.45, 0.0, 0.4])
+    apart = look(pose, seen, down).fast_m - look(pose, hulls, down).fast_m
+    np.testing.assert_allclose(apart, 0.15, atol=1e-6)
+
+
+@pytest.mark.long
+def test_recorded_ticks_go_through_the_law_as_it_is_and_otherwise() -> None:
+    recorded = record("wall", 2.0)
+    assert len(recorded.ticks) == 2001
+    for before, after in zip(recorded.ticks, with_cover(recorded, 0.008), strict=True):
+        assert len(after.situation.pose.sphere_radii_m) == 52
+        np.testing.assert_array_equal(after.situation.pose.tool_position_m, before.situation.pose.tool_position_m)
+    plain, late, coarse = replay(recorded, [Variant(), Variant(late_ticks=3), Variant(cover_m=0.008)], 1)
+    assert [one.looks_per_s for one in (plain, late)] == pytest.approx([200.0, 200.0], rel=0.02)
+    assert (plain.spheres, coarse.spheres) == (246, 52)
+    felt = plain.ways_m[:, 0] < plain.horizon_m
+    assert felt.sum() > 100
+    assert np.abs(late.ways_m - plain.ways_m)[felt, 0].max() < 1e-4
+    # Coarser spheres stand out farther.
+    assert 1e-4 < np.abs(coarse.ways_m - plain.ways_m)[felt, 0].max() < 0.01
+    assert (plain.took_us > 0.0).all()
+
+
+@pytest.mark.long
+def test_a_run_has_a_row_for_each_setting_that_it_can_have() -> None:
+    assert frozen_scene("place_held").is_file()
+    rows = list(run(Run("place_held", 0.3, times=1), 0))
+    settings_of = [(knob, one.value) for knob, rung in LADDERS.items() for one in rung if "mesh" not in knob]
+    assert [(row["knob"], row["value"].removesuffix(" (as it is)")) for row in rows] == settings_of
+    assert sum(row["value"].endswith("(as it is)") for row in rows) == 2
+
+
+@pytest.mark.long
+def test_equality_is_a_table_a_goal_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    written = tmp_path / "out.csv"
+    assert feelahead.main.command(["bench", "felt", "--equality", "--quick", f"--csv={written}"]) == 0
+    assert "met largest difference of compiled and plain" in " ".join(capsys.readouterr().out.split())
+    with written.open(newline="", encoding="utf-8") as file:
+        assert all(float(row["largest"]) <= LIMIT for row in csv.DictReader(file))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [(["--seed", "-1"], "seed = -1"), (["--equality", "--picture", "out.png"], "--equality has no figure")],
+)
+def test_bad_input_is_named(arguments: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError, match=named):
+        feelahead.main.command(["bench", "felt", *arguments])

@@ -1,0 +1,212 @@
+"""The oracle of overlaps against the definition (eq. 11), and the classes that others are held to."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from common.arrays import FloatArray
+from feelahead.lab.reference.classes import MAKERS, frozen_class, frozen_classes
+from feelahead.lab.reference.contact import contacts, exact_contact, exact_corners
+from feelahead.lab.reference.errors import count_failures, relabelled
+from feelahead.lab.reference.meshes import TETRAHEDRON_TRIANGLES, torus
+from feelahead.lab.reference.oracle import Truth, true_mesh_overlap, true_overlap, true_overlaps
+from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, Pairs
+
+Point = list[Any]
+
+
+def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
+    """The shares of a to b between which the segment runs inside the ball at the origin."""
+    step = [y - x for x, y in zip(a, b, strict=True)]
+    length_2, half = sum(x * x for x in step), sum(x * y for x, y in zip(a, step, strict=True))
+    inside = half**2 - length_2 * (sum(x * x for x in a) - radius**2)
+    if inside <= 0:
+        return None
+    enter, leave = ((-half + sign * mp.sqrt(inside)) / length_2 for sign in (-1, 1))
+    return (max(enter, 0), min(leave, 1)) if max(enter, 0) < min(leave, 1) else None
+
+
+def slice_area(rings: list[list[Point]], z: Any, radius: Any) -> Any:
+    """The area that the convex solid and the ball have in common at the height z."""
+    disc = mp.sqrt(max(mpf(0), radius**2 - z**2))
+
+    def sector(p: Point, q: Point) -> Any:
+        return disc**2 / 2 * mp.atan2(p[0] * q[1] - p[1] * q[0], p[0] * q[0] + p[1] * q[1])
+
+    total = mpf(0)
+    for ring in rings:
+        ends = {}
+        for a, b in pairwise([*ring, ring[0]]):
+            if (a[2] > z) != (b[2] > z):
+                share = (z - a[2]) / (b[2] - a[2])
+                ends[a[2] > z] = [x + share * (y - x) for x, y in zip(a[:2], b[:2], strict=True)]
+        if len(ends) == 2:
+            p, q = ends[True], ends[False]
+            cut = crossing(p, q, disc)
+            inner = [[x + at * (y - x) for x, y in zip(p, q, strict=True)] for at in cut or ()]
+            total += sector(p, q) if cut is None else sector(p, inner[0]) + sector(inner[1], q)
+            total += (inner[0][0] * inner[1][1] - inner[0][1] * inner[1][0]) / 2 if inner else 0
+    return abs(total)
+
+
+def volume_by_slices(pairs: Pairs) -> Any:
+    """Integrate the area of the horizontal slices of the first pair."""
+    radius, center = mpf(float(pairs.radii[0])), [mpf(float(x)) for x in pairs.centers[0]]
+    faces = TETRAHEDRON_TRIANGLES.tolist() if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
+    corners = [
+        [mpf(x.numerator) / x.denominator - c for x, c in zip(corner, center, strict=True)]
+        for corner in exact_corners(pairs, 0)
+    ]
+    rings = [[corners[index] for index in face] for face in faces]
+    levels = {-radius, radius, *(corner[2] for corner in corners)}
+    for ring in rings:
+        for a, b in pairwise([*ring, ring[0]]):
+            levels.update(a[2] + at * (b[2] - a[2]) for at in crossing(a, b, radius) or ())
+        sides = [[y - x for x, y in zip(ring[0], other, strict=True)] for other in ring[1:3]]
+        normal = [sides[0][i - 2] * sides[1][i - 1] - sides[0][i - 1] * sides[1][i - 2] for i in range(3)]
+        normal = [x / mp.sqrt(sum(y * y for y in normal)) for x in normal]
+        height = sum(x * y for x, y in zip(normal, ring[0], strict=True))
+        rise = mp.sqrt(max(mpf(0), (radius**2 - height**2) * (1 - normal[2] ** 2)))
+        levels.update((height * normal[2] + rise, height * normal[2] - rise))
+    low, high = max(-radius, min(c[2] for c in corners)), min(radius, max(c[2] for c in corners))
+    inner = sorted(level for level in levels if low <= level <= high)
+    parts = [[a, b] for a, b in pairwise(inner) if b - a > mpf("1e-22") * radius]
+    return sum(mp.quad(lambda z: slice_area(rings, z, radius), part) for part in parts)
+
+
+@pytest.mark.parametrize("solid", ["tetrahedron", "box"])
+@pytest.mark.parametrize("name", ["random", "centre on edge", "solid swallowed", "R/L 1e-1", "tangent inside"])
+def test_the_oracle_integrates_the_definition(solid: str, name: str) -> None:
+    pairs = next(
+        pairs
+        for seed in range(9)
+        if true_overlap(pairs := frozen_class(solid, name, 1, seed=seed)[1], 0).volume > 1e-6 * pairs.sphere_volumes[0]
+    )
+    with mp.workdps(25):
+        assert abs(volume_by_slices(pairs) - true_overlap(pairs, 0).volume) <= 1e-17 * pairs.sphere_volumes[0]
+
+
+@pytest.mark.parametrize("solid", MAKERS)
+def test_the_oracles_derivatives_are_those_of_its_volume(solid: str) -> None:
+    _, pairs = frozen_class(solid, "random", 6, seed=2)
+    step = 2.0**-30
+    for row, truth in enumerate(true_overlaps(pairs)):
+        one = pairs[slice(row, row + 1)]
+        radius = float(one.radii[0])
+
+        def at(shift: FloatArray, growth: float, one: Pairs = one) -> Truth:
+            return true_overlap(replace(one, centers=one.centers + shift, radii=one.radii + growth), 0)
+
+        grown = radius + step * radius - radius
+        difference = at(np.zeros(3), grown).volume - truth.volume
+        assert float(difference / grown / radius**2) == pytest.approx(float(truth.area / radius**2), abs=2e-7)
+        for axis in range(3):
+            shift = step * radius * np.eye(3)[axis]
+            moved = one.centers[0, axis] + shift[axis] - one.centers[0, axis]
+            slope = float((at(shift, 0.0).volume - truth.volume) / moved / radius**2)
+            assert slope == pytest.approx(float(truth.gradient[axis] / radius**2), abs=2e-7)
+
+
+def test_the_truth_is_exact_where_the_answer_is_known() -> None:
+    eighth = Pairs("box", np.zeros((1, 3)), np.ones(1), (np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3))))
+    truth = true_overlap(eighth, 0)
+    assert float(truth.volume) == pytest.approx(math.pi / 6.0, rel=1e-15)
+    assert float(truth.area) == pytest.approx(math.pi / 2.0, rel=1e-15)
+    assert truth.faces_cut == 3
+    # A cap of a half-space, and two spheres a diameter across: π h² (3R - h)/3.
+    height = 2.0**-20
+    cap = Pairs(
+        "half-space", np.zeros((1, 3)), np.ones(1), (np.array([[0.0, 0.0, 2.0]]), np.array([2.0 * (height - 1)]))
+    )
+    expected = Fraction(1, 2**40) * (3 - Fraction(1, 2**20)) / 3
+    assert float(true_overlap(cap, 0).volume) == pytest.approx(math.pi * float(expected), rel=1e-15)
+    lens = Pairs("sphere", np.zeros((1, 3)), np.ones(1), (np.array([[1.0, 0.0, 0.0]]), np.ones(1)))
+    assert float(true_overlap(lens, 0).volume) == pytest.approx(5.0 * math.pi / 12.0, rel=1e-15)
+
+
+def test_a_mesh_of_the_same_surface_has_the_same_truth() -> None:
+    _, pairs = frozen_class("tetrahedron", "random", 4)
+    for row, truth in enumerate(true_overlaps(pairs)):
+        radius, vertices = float(pairs.radii[row]), pairs.parameters[0][row]
+        mesh = true_mesh_overlap(pairs.centers[row], radius, vertices, TETRAHEDRON_TRIANGLES)
+        assert abs(mesh.volume - truth.volume) <= 1e-50
+
+
+def test_the_torus_is_closed_and_oriented_outward() -> None:
+    vertices, triangles = torus(20, 10)
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    forward = {tuple(edge) for edge in edges.tolist()}
+    assert len(forward) == len(edges)
+    assert {(b, a) for a, b in forward} == forward
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    volume = np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0
+    assert 0.85 * 2.0 * math.pi**2 * 0.35**2 < volume < 2.0 * math.pi**2 * 0.35**2
+    whole = true_mesh_overlap(np.zeros(3), 2.0, vertices, triangles)
+    assert float(whole.volume) == pytest.approx(volume, rel=1e-12)
+
+
+def box_below(gap: float) -> Pairs:
+    """A unit sphere `gap` above the edge (gap 3/5, 4/5 away) of a unit cube, grid-aligned but for the gap."""
+    corner = np.array([0.0, 3.0, 4.0]) * (5.0 + gap)
+    return Pairs("box", corner[None], np.array([25.0]), (-np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3))))
+
+
+def test_contact_sees_the_last_digit() -> None:
+    assert not exact_contact(box_below(0.0), 0)
+    assert exact_contact(box_below(-1e-15), 0)
+    assert not exact_contact(box_below(1e-15), 0)
+    larger = box_below(0.0)
+    assert exact_contact(replace(larger, radii=np.nextafter(larger.radii, 26.0)), 0)
+    # Where there is contact, there is volume: found without the decision beforehand.
+    for name, pairs in frozen_classes(1, seed=3, solids=("tetrahedron",)).items():
+        if "without volume" not in name:
+            triangles = TETRAHEDRON_TRIANGLES
+            mesh = true_mesh_overlap(pairs.centers[0], float(pairs.radii[0]), pairs.parameters[0][0], triangles)
+            if abs(mesh.volume) > 1e-60 * pairs.sphere_volumes[0]:
+                assert contacts(pairs)[0], name
+
+
+def test_an_error_of_nan_is_infinite_and_directions_are_compared() -> None:
+    truth = true_overlap(frozen_class("box", "face depth 1e-3", 1, grid=True)[1], 0)
+    assert truth.volume_error(math.nan) == math.inf
+    gradient = np.array([float(component) for component in truth.gradient])
+    assert truth.direction_error(3.0 * gradient) < 1e-15
+    assert truth.direction_error(-gradient) == truth.direction_error(np.zeros(3)) == 1.0
+    turned = gradient + 1e-3 * np.linalg.norm(gradient) * np.cross(gradient, [0.3, 0.5, 0.8]) / np.linalg.norm(gradient)
+    assert 1e-5 < truth.direction_error(turned) < 1e-2
+
+
+def test_the_classes_are_frozen_and_those_on_the_grid_short_binary_numbers() -> None:
+    first, again, other = frozen_classes(3), frozen_classes(3), frozen_classes(3, seed=1)
+    for name, pairs in first.items():
+        assert len(pairs) == 3
+        assert all(map(np.array_equal, pairs.arguments, again[name].arguments)), name
+        assert not np.array_equal(pairs.centers, other[name].centers), name
+    for solid, kind in (("tetrahedron", "tangent vertex"), ("box", "tangent edge"), ("box", "centre on face")):
+        for array in frozen_class(solid, kind, 50, grid=True)[1].arguments:
+            assert np.array_equal(array * 32.0, np.round(array * 32.0)), kind
+
+
+def test_relabelled_solids_are_the_same_sets() -> None:
+    for solid in ("tetrahedron", "box"):
+        _, pairs = frozen_class(solid, "random", 5)
+        original = np.sort(pairs.corners[:, :, 0], axis=1)
+        for other in relabelled(pairs):
+            assert not np.array_equal(other.corners, pairs.corners)
+            np.testing.assert_allclose(np.sort(other.corners[:, :, 0], axis=1), original, atol=1e-14)
+
+
+def test_counts_see_what_they_count() -> None:
+    _, pairs = frozen_class("box", "random", 6, grid=True)
+    spheres = pairs.sphere_volumes
+    volumes = np.array([np.nan, -1e-3, 0.0, 0.5, 0.0, 2.0 * spheres[5]])
+    found = count_failures(pairs, volumes, np.array([True, True, True, False, False, True]))
+    assert (found.undefined, found.negative, found.false_zeros, found.false_positives) == (1, 1, 1, 1)
+    assert found.largest_false_positive == pytest.approx(0.5 / spheres[3])
+    assert found.excess >= 1.0
