@@ -108,7 +108,10 @@ def _optional_check(check: _Check) -> _Check:
 def _elements_check(check: _Check) -> _Check:
     def check_each(name: str, values: Any) -> None:
         for place, value in enumerate(values):
-            check(f"{name}[{place}]", value)
+            try:
+                check(name, value)
+            except ValueError:
+                check(f"{name}[{place}]", value)
 
     return check_each
 
