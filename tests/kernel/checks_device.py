@@ -99,10 +99,12 @@ def writes_effects(plugged: Plugged) -> str:
         device.write(OutputReport(rumble=Rumble(left=1.0, right=0.2)), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
         require(plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers")
-        # Forty more, so that Bluetooth's sequence numbers go round.
+        # Forty more, so that Bluetooth's sequence numbers go round; the kernel keeps 32 for a slow reader.
         for number in range(40):
             device.write(OutputReport(l2=feedback(number % 10, 1 + number % 8)), 0.0)
-        wait_until("all arrive", lambda: plugged.ask(lambda c: c.write_count) == before + len(_EFFECTS) + 41)
+            if number % 10 == 9:
+                expected = before + len(_EFFECTS) + 2 + number
+                wait_until("all arrive", lambda count=expected: plugged.ask(lambda c: c.write_count) == count)  # type: ignore[misc]
         require(plugged.offered.counts.refused == 0, f"{plugged.offered.counts.refused} reports were refused")
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
     require(plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on")
