@@ -94,10 +94,12 @@ def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plu
         device.write(OutputReport(rumble=Rumble(left=1.0, right=0.2)), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
         assert plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers"
-        # Forty more, so that Bluetooth's sequence numbers go round.
+        # Forty more, so that Bluetooth's sequence numbers go round; the kernel keeps 32 for a slow reader.
         for number in range(40):
             device.write(OutputReport(l2=feedback(number % 10, 1 + number % 8)), 0.0)
-        wait_until("all arrive", lambda: plugged.ask(lambda c: c.write_count) == before + len(_EFFECTS) + 41)
+            if number % 10 == 9:
+                expected = before + len(_EFFECTS) + 2 + number
+                wait_until("all arrive", lambda count=expected: plugged.ask(lambda c: c.write_count) == count)  # type: ignore[misc]
         assert plugged.offered.counts.refused == 0
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
     assert plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on"
