@@ -66,7 +66,7 @@ ARROWS = """
     operator_side/feel: common common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
         operator_side/hands
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
-    operator_side/simulated_person: common/protocol operator_side/calibration operator_side/dualsense/reports
+    operator_side/simulated_person: common common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
     operator_side/facts.py: common/command
     operator_side/terminal_view: common common/command common/companion operator_side/facts.py

@@ -131,13 +131,6 @@ def test_without_history_the_robot_sides_counts_and_is_counted(echo_s: float | N
     assert bench.without_history == 1
 
 
-def test_older_than_the_window_is_no_history() -> None:
-    bench = Driving()
-    bench.drive(2.2)
-    bench.feel_field(bench.report())
-    assert bench.without_history == 1
-
-
 def test_who_observes_does_not_know_what_others_command() -> None:
     bench = Driving()
     bench.drive(0.2)
@@ -155,9 +148,3 @@ def test_a_robot_side_that_restarted_has_heard_nothing_of_ours() -> None:
     bench.side.receive(encode(bench.robot.hello(bench.now_s)), bench.now_s)
     bench.feel(8)
     assert bench.without_history == 1
-
-
-def test_nothing_is_counted_while_nothing_can_be_felt() -> None:
-    bench = Driving()
-    bench.feel(8, "disarmed")
-    assert bench.without_history == 0
