@@ -108,11 +108,11 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
     words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "4", "--media", "virtual", "--compose"]
     # Others' trials, and what older ones left, are not ours to judge.
     before = compose.existing(f"name={TRIALS}")
-    command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, "--out", str(tmp_path)]
+    command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, "--summary", str(tmp_path / "latency.json")]
     environment = {**compose.engine.environment, **compose.settings}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
-    trials = json.loads((tmp_path / "latency.json").read_text())["trials"]
+    trials = json.loads((tmp_path / "latency.json").read_text())["runs"]
     assert {trial["medium"]: trial["contact_speed_mm_s"] is not None for trial in trials} == {
         "virtual": True,
         "containers": True,

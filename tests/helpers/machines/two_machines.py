@@ -1,114 +1,22 @@
-"""Two machines on a cable, as far as the network goes: a namespace each, and a virtual Ethernet link between them.
-
-Needs root and iproute2's `ip`.
-"""
+"""Two machines on a cable for tests, which are skipped where the system grants none."""
 
 import contextlib
-import os
-import shutil
-import subprocess
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
-_PREFIX_BITS = 24
-_FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
-"""Folders of the namespaces, and of the files that `ip` mounts in each."""
+from feelahead.lab.faults import two_machines as cable
+from feelahead.lab.faults.two_machines import Machine, NotPermittedError
 
-
-@dataclass
-class Machine:
-    """One of the two."""
-
-    namespace: str
-    device: str
-    """The device at this end of the cable."""
-    address: str
-
-    @property
-    def surroundings(self) -> list[str]:
-        """The command that runs a program there."""
-        return ["ip", "netns", "exec", self.namespace]
-
-    @property
-    def own_files(self) -> Path:
-        """The folder whose files replace /etc's of the same name for programs started there."""
-        return Path("/etc/netns") / self.namespace
-
-    def unplug(self) -> None:
-        """Pull the cable out: neither end has a carrier any more."""
-        self.set_link("down")
-
-    def plug_in(self) -> None:
-        """Plug the cable in."""
-        self.set_link("up")
-
-    def set_link(self, *words: str) -> None:
-        """Run `ip link set DEVICE WORDS`."""
-        _ip("-n", self.namespace, "link", "set", self.device, *words)
-
-    def readdress(self, address: str) -> None:
-        """Another address instead of the present one, as a new lease of DHCP brings it."""
-        _ip("-n", self.namespace, "address", "flush", "dev", self.device)
-        self.address = address
-        _ip("-n", self.namespace, "address", "add", f"{address}/{_PREFIX_BITS}", "dev", self.device)
+__all__ = ["Machine", "two_machines"]
 
 
 @contextlib.contextmanager
-def two_machines(robot: str = "198.18.0.1", operator: str = "198.18.0.2") -> Iterator[tuple[Machine, Machine]]:
-    """The robot's and the operator's, with these addresses, both gone afterwards; skips the test without a right."""
-    if shutil.which("ip") is None or os.geteuid() != 0:
-        pytest.skip("network namespaces need root and iproute2 (apt install iproute2)")
-    machines = one, other = (
-        Machine(f"feelahead-robot-{os.getpid()}", "robot0", robot),
-        Machine(f"feelahead-operator-{os.getpid()}", "operator0", operator),
-    )
-    try:
-        _delete_left_behind()
-        if (refused := _run_ip("netns", "add", one.namespace)) is not None:
-            pytest.skip(refused)
-        _ip("netns", "add", other.namespace)
-        _connect(*machines)
-        yield one, other
-    finally:
-        for machine in machines:
-            _delete(machine.namespace)
-
-
-def _connect(one: Machine, other: Machine) -> None:
-    _ip("-n", one.namespace, "link", "add", one.device, "type", "veth", "peer", "name", other.device)
-    _ip("-n", one.namespace, "link", "set", other.device, "netns", other.namespace)
-    for machine in (one, other):
-        machine.readdress(machine.address)
-        machine.plug_in()
-        _ip("-n", machine.namespace, "link", "set", "lo", "up")
-
-
-def _delete_left_behind() -> None:
-    """Delete namespaces of killed runs: the names end with a process that is gone."""
-    for folder in _FOLDERS:
-        for left in folder.glob("feelahead-*-*"):
-            owner = left.name.rpartition("-")[2]
-            if owner.isdigit() and not Path("/proc", owner).exists():
-                _delete(left.name)
-
-
-def _delete(namespace: str) -> None:
-    _run_ip("netns", "del", namespace)
-    for files in Path("/etc/netns").glob(namespace):
-        shutil.rmtree(files, ignore_errors=True)
-        with contextlib.suppress(OSError):  # others have theirs there
-            files.parent.rmdir()
-
-
-def _ip(*arguments: str) -> None:
-    failed = _run_ip(*arguments)
-    assert failed is None, failed
-
-
-def _run_ip(*arguments: str) -> str | None:
-    """Why it failed; None when it did not."""
-    done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
-    return None if done.returncode == 0 else f"ip {' '.join(arguments)}: {done.stderr.strip()}"
+def two_machines() -> Iterator[tuple[Machine, Machine]]:
+    """Yield the robot's and the operator's machine; skip the test where they cannot be had."""
+    with contextlib.ExitStack() as stack:
+        try:
+            machines = stack.enter_context(cable.two_machines())
+        except NotPermittedError as error:
+            pytest.skip(str(error))
+        yield machines
