@@ -59,7 +59,7 @@ class Connections(RuleBasedStateMachine):
         self.patch.setattr(self.robot, "_watch_connections", lambda: None)
         self.patch.setattr(robot_sockets, "_shut_down", self.hang_up)
         self.patch.setattr(robot_sockets, "PEER_LIMIT_PER_S", LIMIT_PER_S)
-        self.patch.setattr(self.robot, "send_frames", lambda _, frames, limit: self.told.append(frames[0]) or True)
+        self.patch.setattr(self.robot, "send_frames", lambda _, frames, __: self.told.append(frames[0]) or True)
         self.patch.setattr(self.robot._inbox, "read", lambda: self.arriving)
         self.crowd = self.robot._gates[0].crowd
         self.robot._all_seen = True
@@ -167,6 +167,40 @@ def test_five_thousand_messages_a_second_are_heard_of_each_peer(monkeypatch: pyt
         monkeypatch.setattr(robot._inbox, "read", lambda: frames)
         assert len(robot.receive()) == 5000
         assert robot.flooding == 100
+
+
+@pytest.mark.parametrize(("doubt", "ended"), [("none", [7]), ("events wait", []), ("used again", []), ("gone", [])])
+def test_who_floods_is_hung_up_on_where_it_is_known_whose_the_connection_is(
+    monkeypatch: pytest.MonkeyPatch, doubt: str, ended: list[int]
+) -> None:
+    shut: list[int] = []
+    monkeypatch.setattr(robot_sockets, "_shut_down", shut.append)
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 1)
+    with RobotSockets(EPHEMERAL) as robot:
+        monkeypatch.setattr(robot, "_watch_connections", lambda: None)
+        robot._gates[0].crowd.came(7, 0.0)
+        robot._all_seen = True
+        assert robot._admits(b"peer", Frame("", 7))  # type: ignore[arg-type]
+        if doubt == "events wait":
+            robot._all_seen = False
+        elif doubt == "used again":
+            robot._spoke_by[7] = b"another"
+        elif doubt == "gone":
+            robot._gates[0].crowd.went(7)
+        assert not robot._admits(b"peer", Frame("", 7))  # type: ignore[arg-type]
+    assert shut == ended
+
+
+def test_a_revoked_peer_known_whose_connection_stands_is_told_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with RobotSockets(EPHEMERAL) as robot:
+        names = {"anna's": "anna"}
+        monkeypatch.setattr(robot, "_keys", SimpleNamespace(allowed=SimpleNamespace(names=names)))
+        monkeypatch.setattr(robot, "send_frames", lambda *_: True)
+        assert robot._admits(b"peer", Frame("anna's", 7))  # type: ignore[arg-type]
+        assert robot.send(b"peer", b"stiffness")
+        names.clear()
+        assert not robot.send(b"peer", b"stiffness")
+        assert robot.dropped == 1
 
 
 # Within a tick
