@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import zmq
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -14,6 +15,7 @@ from common.sockets import robot as robot_sockets
 from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
 from common.sockets.crowd import Crowd
 from common.sockets.robot import RobotSockets
+from common.sockets.shell import CONTROL_LIMIT_BYTES
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
 
 LIMIT_PER_S = 8
@@ -34,7 +36,7 @@ class Frame:
     """One that came by a connection."""
 
     def __init__(self, key: str, descriptor: int) -> None:
-        self._properties: dict[Any, Any] = {"User-Id": key, robot_sockets.zmq.SRCFD: descriptor}
+        self._properties: dict[Any, Any] = {"User-Id": key, zmq.SRCFD: descriptor}
         self.bytes = b"payload"
 
     def get(self, name: Any) -> Any:
@@ -59,7 +61,7 @@ class Connections(RuleBasedStateMachine):
         self.patch.setattr(self.robot, "_watch_connections", lambda: None)
         self.patch.setattr(robot_sockets, "_shut_down", self.hang_up)
         self.patch.setattr(robot_sockets, "PEER_LIMIT_PER_S", LIMIT_PER_S)
-        self.patch.setattr(self.robot, "send_frames", lambda _, frames, __: self.told.append(frames[0]) or True)
+        self.patch.setattr(self.robot, "send_frames", self.take)
         self.patch.setattr(self.robot._inbox, "read", lambda: self.arriving)
         self.crowd = self.robot._gates[0].crowd
         self.robot._all_seen = True
@@ -70,6 +72,11 @@ class Connections(RuleBasedStateMachine):
         self.unseen: list[tuple[str, int]] = []
         self.speaking: bytes = b""
         self.heard: dict[bytes, Counter[int]] = defaultdict(Counter)
+
+    def take(self, _: object, frames: list[bytes], limit_bytes: int) -> bool:
+        assert limit_bytes == CONTROL_LIMIT_BYTES
+        self.told.append(frames[0])
+        return True
 
     def hang_up(self, descriptor: int) -> None:
         assert self.owners.get(descriptor) == self.speaking, "somebody else's connection was ended"
@@ -157,7 +164,7 @@ class Connections(RuleBasedStateMachine):
 
 
 TestConnections = Connections.TestCase
-TestConnections.settings = settings(derandomize=True, deadline=None, max_examples=120, stateful_step_count=30)
+TestConnections.settings = settings(derandomize=True, deadline=None, max_examples=60, stateful_step_count=30)
 
 
 def test_five_thousand_messages_a_second_are_heard_of_each_peer(monkeypatch: pytest.MonkeyPatch) -> None:
