@@ -26,27 +26,12 @@ def test_loop_age_is_the_worst_case_until_known_and_after_reset() -> None:
     assert loop_age.value(1e6) == 0.5
 
 
-def test_loop_age_rises_at_once() -> None:
-    loop_age = LoopAge(worst_case_s=0.1, window=1)
-    loop_age.update(0.020, 0.0)
-    loop_age.update(0.300, 0.001)
-    assert loop_age.value(0.001) == 0.300
-
-
 @pytest.mark.parametrize("elapsed_s", [0.0, 0.1, 0.5, 3.0])
 def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
     loop_age = LoopAge(worst_case_s=0.4, window=1, time_constant_s=0.5)
     loop_age.update(0.100, 10.0)
     expected_s = 0.100 + 0.300 * math.exp(-elapsed_s / 0.5)
     assert loop_age.value(10.0 + elapsed_s) == pytest.approx(expected_s, rel=1e-12)
-
-
-def test_loop_age_falls_alike_however_often_it_is_updated() -> None:
-    often, once = LoopAge(worst_case_s=0.4), LoopAge(worst_case_s=0.4)
-    once.update(0.050, 0.0)
-    for tick in range(501):
-        often.update(0.050, 1e-3 * tick)
-    assert often.value(0.5) == pytest.approx(once.value(0.5), rel=1e-12)
 
 
 @repeatable
@@ -105,12 +90,6 @@ def test_loop_age_refuses_a_worst_case_that_is_none(worst_case_s: float) -> None
 
 
 # Queueing age
-
-
-def test_a_steady_delay_ages_nothing() -> None:
-    queueing = QueueingAge()
-    ages_s = [queueing.update(0.004 * number, 0.004 * number + 0.5) for number in range(5000)]
-    assert max(ages_s) < 1e-9
 
 
 @repeatable

@@ -55,27 +55,6 @@ def test_a_simulation_that_falls_behind_is_told() -> None:
     )
 
 
-def test_a_wide_terminal_has_room_for_words() -> None:
-    assert live_line(live_view(APPROACH), 130) == (
-        "advancing  L2 pulled   0 % resists   0 %  R2 pulled  62 % resists  34 %"
-        "  nearest tin  84 mm  target 120 mm  link 12 ms"
-    )
-
-
-@pytest.mark.parametrize(
-    ("width", "expected"),
-    [
-        (70, "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm"),
-        (60, "advancing  L2/R2 pull 0/62% resist 0/34%  target 120mm"),
-        (45, "advancing  L2/R2 pull 0/62% resist 0/34%"),
-        (20, "advancing  near 84mm"),
-        (8, ""),
-    ],
-)
-def test_a_narrow_one_drops_the_least_important_facts(width: int, expected: str) -> None:
-    assert live_line(live_view(APPROACH), width) == expected
-
-
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [

@@ -31,11 +31,6 @@ def test_the_first_call_is_told_at_once_whatever_the_clock_shows(start_s: float)
     assert Story().tell(start_s, RESTING) == "   0.0 s  link up; resting"
 
 
-def test_nothing_is_told_while_nothing_changes() -> None:
-    moving = [replace(ADVANCING, nearest_mm=80.0 - step, r2=TriggerView(0.01 * step, 0.0)) for step in range(50)]
-    assert told(*moving) == ["   0.0 s  link up; armed; advancing  (nearest 80 mm, target 120 mm)"]
-
-
 def test_a_run_reads_as_a_story() -> None:
     near = replace(ADVANCING, nearest="carton", nearest_mm=10.0, target_mm=10.0, r2=TriggerView(0.5, 0.3))
     lines = told(
@@ -88,19 +83,3 @@ def test_an_alarm_does_not_wait_even_if_it_is_short() -> None:
     stopped = replace(RESTING, phase="STOPPED", reason="emergency stop", alarm=True)
     lines = told(ADVANCING, stopped, ADVANCING, ADVANCING, step_s=0.01)
     assert [line.partition(" s  ")[2] for line in lines[1:]] == ["STOPPED: emergency stop"]
-
-
-def test_alarms_that_come_and_go_are_bounded_too() -> None:
-    stopped = replace(RESTING, phase="STOPPED", reason="emergency stop", alarm=True)
-    assert len(told(*[stopped, ADVANCING] * 500, step_s=0.01)) <= 2 * 10.0 / SHORTEST_GAP_S + 1
-
-
-def test_without_haptics_nobody_feels_anything() -> None:
-    views = [replace(ADVANCING, haptics=False, r2=TriggerView(0.5, value)) for value in (0.0, 0.5, 1.0, 0.5, 0.0)]
-    lines = told(*views)
-    assert [line.partition(" s  ")[2].partition("  (")[0] for line in lines[1:]] == [
-        "R2 would stiffen to 50 %",
-        "R2 would resist fully",
-        "R2 would ease to 50 %",
-        "R2 would yield freely, after up to 100 %",
-    ]

@@ -34,12 +34,6 @@ def test_json_is_one_event_a_line_five_times_a_second(capsys: pytest.CaptureFixt
     assert [event["tick"] for event in found] == pytest.approx(range(0, 2000, 200), abs=10)
 
 
-@pytest.mark.parametrize("start_s", [0.0, 1e6])
-def test_the_first_values_are_shown_at_once(capsys: pytest.CaptureFixture[str], start_s: float) -> None:
-    run("json", 0.05, start_s)
-    assert events(capsys) == [{"event": "status", "tick": 0}]
-
-
 def test_json_keeps_the_values_types(capsys: pytest.CaptureFixture[str]) -> None:
     values: dict[str, Value] = {"a": 0.125, "b": 3, "c": "armed", "d": True, "e": None}
     with Status("json", "robot") as status:
@@ -51,13 +45,6 @@ def test_json_keeps_the_values_types(capsys: pytest.CaptureFixture[str]) -> None
         {"event": "listening", "control": "tcp://127.0.0.1:5555"},
         {"event": "bare"},
     ]
-
-
-def test_events_do_not_wait_for_their_turn(capsys: pytest.CaptureFixture[str]) -> None:
-    with Status("json", "robot") as status:
-        for number in range(5):
-            status.event("count", number=number)
-    assert [event["number"] for event in events(capsys)] == [0, 1, 2, 3, 4]
 
 
 def test_without_a_terminal_only_what_changed_is_told(capsys: pytest.CaptureFixture[str]) -> None:
@@ -105,14 +92,6 @@ def test_facts_are_for_programs_that_want_them_ten_times_a_second(capsys: pytest
     found = events(capsys)
     assert [event["event"] for event in found] == [*["status", "facts"] * 10, "note", "bare"]
     assert found[1]["facts"] == {"a": 50.0, "b": None}
-
-
-def test_nothing_is_due_when_nothing_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
-    with Status("none", "robot") as status:
-        assert not status.due(0.0)
-        assert not status.due(1e9)
-        status.show(0.0, {"tick": 0})
-    assert capsys.readouterr() == ("", "")
 
 
 def test_due_says_whether_show_would_show(capsys: pytest.CaptureFixture[str]) -> None:
@@ -164,17 +143,6 @@ def test_the_terminal_is_given_back_after_an_error_too(
         fail()
     written = capsys.readouterr().out
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
-
-
-def test_errors_do_not_go_with_the_live_line(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("TERM", "xterm")
-    with Status("line", "robot") as status:
-        status.show(0.0, {"tick": 1})
-        sys.stderr.write("something is wrong\n")
-    assert capsys.readouterr().err == "something is wrong\n"
 
 
 def test_a_json_reader_that_has_gone_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

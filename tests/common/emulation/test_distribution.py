@@ -81,8 +81,3 @@ def test_exponential_is_a_floor_with_a_tail() -> None:
     mean_s, sd_s, greatest_s = moments(0.050, 0.010, "exponential")
     assert (mean_s, sd_s) == pytest.approx((0.060, 0.010), rel=1e-4)
     assert greatest_s == math.inf
-
-
-def test_a_negative_delay_sends_at_once() -> None:
-    assert delays_at(np.array([0.0, 0.5]), 0.005, 0.010, "uniform") == pytest.approx([0.0, 0.005])
-    assert moments(0.0, 0.010, "pareto")[2] == pytest.approx(0.040, abs=1e-5)

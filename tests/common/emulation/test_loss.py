@@ -40,13 +40,6 @@ def test_gilbert_elliott_with_losses_in_both_states() -> None:
     assert np.mean(lost) == pytest.approx(expected, abs=0.006)
 
 
-def test_one_probability_alone_is_independent_loss() -> None:
-    for spec in ("loss state 5%", "loss gemodel 5%"):
-        lost = Run(spec, 100_000).lost
-        assert np.mean(lost) == pytest.approx(0.05, abs=0.004)
-        assert np.mean(bursts(lost)) == pytest.approx(1.0 / 0.95, abs=0.02)
-
-
 def test_state_loss_has_the_chains_shares_and_bursts() -> None:
     p13, p31, p32, p23, p14 = 0.02, 0.10, 0.20, 0.40, 0.01
     lost = Run("loss state 2% 10% 20% 40% 1%", 400_000).lost
@@ -94,9 +87,3 @@ def test_exponential_delays_are_exponential() -> None:
     delays_s = Run("delay 50ms 10ms distribution exponential", 5000, seed=3).delays_s
     assert delays_s.min() >= 0.050
     assert kstest(delays_s - 0.050, "expon", args=(0.0, 0.010)).pvalue > 0.01
-
-
-def test_a_jitter_above_the_delay_sends_some_at_once() -> None:
-    delays_s = Run("delay 5ms 10ms", 10_000, seed=2).delays_s
-    assert delays_s.min() == 0.0
-    assert np.mean(delays_s == 0.0) == pytest.approx(0.25, abs=0.015)

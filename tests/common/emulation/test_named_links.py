@@ -10,11 +10,9 @@ from common.arrays import FloatArray
 from common.command.run_options import RunOptions
 from common.emulation.delay_line import DelayLine
 from common.emulation.distribution import delays_at
-from common.emulation.loss import GilbertElliott
 from common.emulation.named_links import NAMED_LINKS
 from common.emulation.spec import Direction, LinkSpec
 from common.errors import ConfigurationError
-from common.units import parse_duration
 from tests.helpers.repository import ROOT
 
 every_link = pytest.mark.parametrize("name", NAMED_LINKS)
@@ -78,18 +76,6 @@ def round_trips_ms(name: str) -> FloatArray:
 )
 def test_a_lone_packet_sees_what_was_published(name: str, figure: Any, published_ms: float, within_ms: float) -> None:
     assert figure(round_trips_ms(name)) == pytest.approx(published_ms, abs=within_ms)
-
-
-def test_the_lost_share_is_what_was_published() -> None:
-    loss = LinkSpec.parse("low-orbit").profile("to_robot").loss
-    assert isinstance(loss, GilbertElliott)
-    assert loss.share() == pytest.approx(0.01, rel=0.02)
-
-
-def test_a_stream_may_differ_from_the_named_link() -> None:
-    link = LinkSpec.parse("lan; video: rate 2mbit")
-    assert link.profile("to_operator", "video").delay_s == 0.0
-    assert link.profile("to_operator").delay_s == parse_duration("200us", "delay")
 
 
 def test_an_unknown_name_is_told_the_known_ones() -> None:

@@ -43,15 +43,6 @@ def test_the_new_file_is_there_at_once_and_whole(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_an_error_of_ours_leaves_the_old_file_too(tmp_path: Path) -> None:
-    path = tmp_path / "out.json"
-    path.write_text("old")
-    with pytest.raises(TypeError):
-        write_json("--summary", path, {"ticks": object()})
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_a_link_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "out.json"
@@ -78,14 +69,6 @@ def test_the_mode_stays(tmp_path: Path) -> None:
     path.chmod(0o600)
     write_json("--summary", path, 1)
     assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("1\n", 0o600)
-
-
-def test_both_names_of_a_file_lead_to_the_new_one(tmp_path: Path) -> None:
-    path, other = tmp_path / "out.json", tmp_path / "other.json"
-    path.write_text("old")
-    other.hardlink_to(path)
-    write_json("--summary", path, 1)
-    assert other.read_text() == "1\n"
 
 
 @pytest.mark.parametrize("function", ["geteuid", "getegid"])

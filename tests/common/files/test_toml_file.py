@@ -1,6 +1,5 @@
 """Files that people name: read whole without waiting, or refused."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -22,25 +21,6 @@ def test_a_file_and_a_link_to_one_are_read(path: Path) -> None:
     link = path.with_name("link.toml")
     link.symlink_to(path)
     assert read_toml(link, 100) == content
-
-
-def test_the_bound_is_on_bytes(path: Path) -> None:
-    path.write_text("a = 1")
-    assert read_toml(path, 5) == {"a": 1}
-    with pytest.raises(ValueError, match="more than 4 bytes"):
-        read_toml(path, 4)
-
-
-def test_a_pipe_is_refused_without_waiting_for_its_writer(path: Path) -> None:
-    os.mkfifo(path)
-    with pytest.raises(ValueError, match="is no regular file"):
-        read_toml(path, 100)
-
-
-@pytest.mark.parametrize("device", ["/dev/zero", "/dev/null"])
-def test_a_device_is_refused(device: str) -> None:
-    with pytest.raises(ValueError, match="is no regular file"):
-        read_toml(Path(device), 100)
 
 
 def test_what_the_system_does_not_let_us_at(path: Path) -> None:

@@ -1,6 +1,5 @@
 """A recording opens wherever it was cut, up to the last complete second; what is none is told in one line."""
 
-import itertools
 import os
 from pathlib import Path
 
@@ -102,12 +101,6 @@ def test_what_is_no_recording_is_told_in_one_line(content: bytes, tmp_path: Path
     assert "\n" not in str(caught.value)
 
 
-def test_a_folder_and_a_missing_file(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "missing.mcap"):
-        with pytest.raises(ConfigurationError, match="cannot be read"):
-            open_recording(path)
-
-
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mcap")
     with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
@@ -164,13 +157,6 @@ def test_a_cut_file_is_made_whole(short: tuple[bytes, list[int]], tmp_path: Path
     assert open_recording(whole).headers == open_recording(cut).headers
     with pytest.raises(ConfigurationError, match="is there already"):
         mend(cut, whole)
-
-
-def test_messages_are_in_order_of_time(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
-    path = tmp_path / "whole.mcap"
-    path.write_bytes(short[0])
-    stamps = [one.log_ns for one in open_recording(path).messages(["/robot/inputs"])]
-    assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
 
 
 def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:

@@ -1,25 +1,17 @@
-"""Who is heard, who is told and who is hung up on: a state machine over the robot side's end, and what it rests on."""
+"""Who is heard, who is told and who is hung up on: over a crowd, a flood and a revocation."""
 
-from collections import Counter, defaultdict
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import settings
-from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+import zmq
 
 from common.clock import MonotonicClock
 from common.sockets import robot as robot_sockets
 from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
 from common.sockets.crowd import Crowd
 from common.sockets.robot import RobotSockets
-from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
-
-LIMIT_PER_S = 8
-"""In the machine, so that floods are short."""
-KEYS = ("anna's", "ben's", "carl's")
-DESCRIPTORS = range(10_000, 10_003)
+from tests.helpers.socket_talk import EPHEMERAL
 
 
 class Clock(MonotonicClock):
@@ -34,130 +26,11 @@ class Frame:
     """One that came by a connection."""
 
     def __init__(self, key: str, descriptor: int) -> None:
-        self._properties: dict[Any, Any] = {"User-Id": key, robot_sockets.zmq.SRCFD: descriptor}
+        self._properties: dict[Any, Any] = {"User-Id": key, zmq.SRCFD: descriptor}
         self.bytes = b"payload"
 
     def get(self, name: Any) -> Any:
         return self._properties[name]
-
-
-class Connections(RuleBasedStateMachine):
-    """Peers with keys that come, speak, flood, leave and are revoked, while descriptors are used again.
-
-    What the gates know of a connection comes late, as from ZeroMQ: `unseen` holds it.
-    """
-
-    @initialize()
-    def start(self) -> None:
-        self.patch = pytest.MonkeyPatch()
-        self.allowed = dict.fromkeys(KEYS, "")
-        self.robot = RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S)
-        self.clock = Clock()
-        self.patch.setattr(self.robot, "_clock", self.clock)
-        keys = SimpleNamespace(allowed=SimpleNamespace(names=self.allowed))
-        self.patch.setattr(self.robot, "_keys", keys)
-        self.patch.setattr(self.robot, "_watch_connections", lambda: None)
-        self.patch.setattr(robot_sockets, "_shut_down", self.hang_up)
-        self.patch.setattr(robot_sockets, "PEER_LIMIT_PER_S", LIMIT_PER_S)
-        self.patch.setattr(self.robot, "send_frames", lambda _, frames, limit: self.told.append(frames[0]) or True)
-        self.patch.setattr(self.robot._inbox, "read", lambda: self.arriving)
-        self.crowd = self.robot._gates[0].crowd
-        self.robot._all_seen = True
-        self.arriving: list[Any] = []
-        self.told: list[bytes] = []
-        self.owners: dict[int, bytes] = {}
-        self.keys: dict[bytes, str] = {}
-        self.unseen: list[tuple[str, int]] = []
-        self.speaking: bytes = b""
-        self.heard: dict[bytes, Counter[int]] = defaultdict(Counter)
-
-    def hang_up(self, descriptor: int) -> None:
-        assert self.owners.get(descriptor) == self.speaking, "somebody else's connection was ended"
-        self.go(descriptor)
-
-    def go(self, descriptor: int) -> None:
-        del self.owners[descriptor]
-        self.unseen.append(("went", descriptor))
-        self.robot._all_seen = False
-
-    @rule(data=st.data(), key=st.sampled_from(KEYS))
-    def come(self, data: st.DataObject, key: str) -> None:
-        free = [descriptor for descriptor in DESCRIPTORS if descriptor not in self.owners]
-        if free:
-            descriptor = data.draw(st.sampled_from(free))
-            name = b"peer%d" % len(self.keys)
-            self.owners[descriptor], self.keys[name] = name, key
-            self.unseen.append(("came", descriptor))
-            self.robot._all_seen = False
-
-    @precondition(lambda self: self.owners)
-    @rule(data=st.data())
-    def leave(self, data: st.DataObject) -> None:
-        self.go(data.draw(st.sampled_from(sorted(self.owners))))
-
-    @rule()
-    def the_gates_hear_of_all(self) -> None:
-        for event, descriptor in self.unseen:
-            if event == "came":
-                self.crowd.came(descriptor, self.clock.now())
-            else:
-                self.crowd.went(descriptor)
-        self.unseen.clear()
-        self.robot._all_seen = True
-
-    @rule(key=st.sampled_from(KEYS))
-    def allow_or_revoke(self, key: str) -> None:
-        if self.allowed.pop(key, None) is None:
-            self.allowed[key] = ""
-
-    @rule()
-    def a_second_passes(self) -> None:
-        self.clock.second += 1
-
-    @precondition(lambda self: self.keys)
-    @rule(data=st.data(), count=st.sampled_from([1, 3, LIMIT_PER_S + 1]), left=st.booleans())
-    def speak(self, data: st.DataObject, count: int, left: bool) -> None:
-        """Messages of one peer are read, who may have left since: then another one may have its descriptor."""
-        owned = {owner: descriptor for descriptor, owner in self.owners.items()}
-        names = sorted(set(self.robot._peers) - set(owned)) if left else sorted(owned)
-        if not names:
-            return
-        name = data.draw(st.sampled_from(names))
-        allowed = self.keys[name] in self.allowed
-        before = self.heard[name][self.clock.second]
-        self.speaking = name
-        descriptor = owned.get(name, self.robot._peers[name].descriptor if name in self.robot._peers else -1)
-        self.arriving = [[SimpleNamespace(bytes=name), Frame(self.keys[name], descriptor)]] * count
-        seen = not self.unseen
-        received = self.robot.receive()
-        assert received == [(name, b"payload")] * (min(count, max(0, LIMIT_PER_S - before)) if allowed else 0)
-        self.heard[name][self.clock.second] += len(received)
-        if seen and not left and len(received) < count:
-            assert descriptor not in self.owners, "who floods or was revoked keeps its connection"
-
-    @precondition(lambda self: self.keys)
-    @rule(data=st.data())
-    def tell(self, data: st.DataObject) -> None:
-        name = data.draw(st.sampled_from([*sorted(self.robot._peers), b"nobody"]))
-        self.told.clear()
-        dropped = self.robot.dropped
-        sent = self.robot.send(name, b"stiffness")
-        may = name in self.robot._peers and self.keys[name] in self.allowed
-        assert (sent, self.told) == ((True, [name]) if may else (False, []))
-        assert self.robot.dropped == dropped + (not may)
-
-    @invariant()
-    def the_crowd_is_bounded(self) -> None:
-        assert len(self.robot._peers) <= robot_sockets._REMEMBERED_PEERS
-
-    def teardown(self) -> None:
-        if hasattr(self, "patch"):
-            self.patch.undo()
-            self.robot.close()
-
-
-TestConnections = Connections.TestCase
-TestConnections.settings = settings(derandomize=True, deadline=None, max_examples=120, stateful_step_count=30)
 
 
 def test_five_thousand_messages_a_second_are_heard_of_each_peer(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,6 +40,40 @@ def test_five_thousand_messages_a_second_are_heard_of_each_peer(monkeypatch: pyt
         monkeypatch.setattr(robot._inbox, "read", lambda: frames)
         assert len(robot.receive()) == 5000
         assert robot.flooding == 100
+
+
+@pytest.mark.parametrize(("doubt", "ended"), [("none", [7]), ("events wait", []), ("used again", []), ("gone", [])])
+def test_who_floods_is_hung_up_on_where_it_is_known_whose_the_connection_is(
+    monkeypatch: pytest.MonkeyPatch, doubt: str, ended: list[int]
+) -> None:
+    shut: list[int] = []
+    monkeypatch.setattr(robot_sockets, "_shut_down", shut.append)
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 1)
+    with RobotSockets(EPHEMERAL) as robot:
+        monkeypatch.setattr(robot, "_watch_connections", lambda: None)
+        robot._gates[0].crowd.came(7, 0.0)
+        robot._all_seen = True
+        assert robot._admits(b"peer", Frame("", 7))  # type: ignore[arg-type]
+        if doubt == "events wait":
+            robot._all_seen = False
+        elif doubt == "used again":
+            robot._spoke_by[7] = b"another"
+        elif doubt == "gone":
+            robot._gates[0].crowd.went(7)
+        assert not robot._admits(b"peer", Frame("", 7))  # type: ignore[arg-type]
+    assert shut == ended
+
+
+def test_a_revoked_peer_known_whose_connection_stands_is_told_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with RobotSockets(EPHEMERAL) as robot:
+        names = {"anna's": "anna"}
+        monkeypatch.setattr(robot, "_keys", SimpleNamespace(allowed=SimpleNamespace(names=names)))
+        monkeypatch.setattr(robot, "send_frames", lambda *_: True)
+        assert robot._admits(b"peer", Frame("anna's", 7))  # type: ignore[arg-type]
+        assert robot.send(b"peer", b"stiffness")
+        names.clear()
+        assert not robot.send(b"peer", b"stiffness")
+        assert robot.dropped == 1
 
 
 # Within a tick

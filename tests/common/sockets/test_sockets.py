@@ -44,21 +44,6 @@ def test_control_goes_both_ways(robot: RobotSockets, operator: OperatorSockets) 
     assert (robot.dropped, robot.rejected, operator.rejected) == (0, 0, 0)
 
 
-def test_operators_are_told_apart(robot: RobotSockets, operator: OperatorSockets) -> None:
-    with OperatorSockets(robot.control_endpoint, robot.view_endpoint) as second:
-        first_peer, second_peer = greet(robot, operator), greet(robot, second)
-        assert first_peer != second_peer
-        assert robot.send(second_peer, b"for the second")
-        assert second.wait(PATIENT_S)
-        assert second.receive() == [b"for the second"]
-        assert operator.receive() == []
-
-
-def test_empty_payloads_are_messages(robot: RobotSockets, operator: OperatorSockets) -> None:
-    send_until_connected(operator, b"")
-    assert receive_one(robot)[1] == b""
-
-
 def test_an_unknown_peer_is_counted(robot: RobotSockets) -> None:
     assert not robot.send(b"nobody", b"stiffness")
     assert robot.dropped == 1
