@@ -176,15 +176,15 @@ class LinkEnd:
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
-        """What the peer's clock is ahead of ours: `value` and `bound` in ms and the `estimator` behind it.
-
-        `rejected` counts stamps, `jumps` those of a clock. None where unknown.
+        """What the peer's clock is ahead of ours: `value` and `bound` in ms, `skew_ppm`, the `estimator` behind it,
+        and how many stamps were `rejected` and clock `jumps` seen; None where unknown.
         """
         offset = self.clock_offset
-        value_s, bound_s = offset.offset_s, offset.bound_s
+        value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew
         return {
             "value": None if value_s is None else 1e3 * value_s,
             "bound": None if bound_s is None else 1e3 * bound_s,
+            "skew_ppm": None if skew is None else 1e6 * skew,
             "estimator": offset.estimator,
             "rejected": offset.rejected,
             "jumps": offset.jumps,

@@ -1,0 +1,350 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.timing.clock_offset import MAX_SKEW, ClockOffset
+from common.timing.difference_blocks import MOST_BLOCKS
+from tests.helpers.clock_exchanges import ahead, error_s, exchange, talk
+
+repeatable = settings(derandomize=True, deadline=None)
+
+
+def test_nothing_is_known_before_the_first_exchange() -> None:
+    offset = ClockOffset(shared_clock=False)
+    offset.arrived(100.0, 1.0)
+    assert (offset.offset_s, offset.bound_s, offset.round_trip_s) == (None, None, None)
+    assert (offset.skew, offset.estimator) == (None, None)
+    assert offset.one_way_from_peer_s(101.0, 2.0) is None
+    assert not offset.settled
+
+
+@repeatable
+@given(st.floats(-1e5, 1e5), st.floats(1e-6, 1.0), st.floats(0.0, 1.0))
+def test_a_symmetric_link_gives_the_exact_offset(apart_s: float, way_s: float, held_s: float) -> None:
+    offset = ClockOffset(shared_clock=False)
+    received_s = exchange(offset, 7.0, way_s, held_s, way_s, ahead(apart_s))
+    loosened_s = MAX_SKEW * (received_s - 7.0)
+    assert offset.offset_s == pytest.approx(apart_s, abs=1e-9 + loosened_s)
+    assert offset.round_trip_s == pytest.approx(2.0 * way_s, abs=1e-9)
+    assert offset.bound_s == pytest.approx(way_s, abs=1e-9 + loosened_s)
+    sent_s = received_s + apart_s
+    assert offset.one_way_from_peer_s(sent_s, received_s + way_s) == pytest.approx(way_s, abs=1e-9 + 2 * loosened_s)
+
+
+@repeatable
+@given(st.floats(1e-6, 1.0), st.floats(1e-6, 1.0))
+def test_an_asymmetric_floor_costs_half_of_itself_and_stays_within_the_bound(there_s: float, back_s: float) -> None:
+    offset, clock = ClockOffset(shared_clock=False), ahead(100.0)
+    received_s = exchange(offset, 0.0, there_s, 0.002, back_s, clock)
+    assert offset.bound_s is not None
+    assert error_s(offset, clock, received_s) == pytest.approx((there_s - back_s) / 2.0, abs=1e-9 + MAX_SKEW * 2.002)
+    assert abs(error_s(offset, clock, received_s)) <= offset.bound_s
+
+
+def test_an_asymmetry_that_is_known_costs_nothing() -> None:
+    generator, clock = np.random.default_rng(5), ahead(-3.0, 20e-6)
+    offset = ClockOffset(shared_clock=False, asymmetry_s=0.020)
+    end_s = talk(offset, clock, 0.050 + generator.exponential(0.002, 1000), 0.030 + generator.exponential(0.002, 1000))
+    assert abs(error_s(offset, clock, end_s)) < 0.1e-3
+
+
+# The two estimators
+
+
+@pytest.mark.parametrize("skew", [0.0, 20e-6, -100e-6, 500e-6])
+def test_a_floor_under_queues_gives_offset_and_skew(skew: float) -> None:
+    generator, clock = np.random.default_rng(8), ahead(1234.5, skew)
+    offset = ClockOffset(shared_clock=False)
+    end_s = talk(offset, clock, 0.050 + generator.exponential(0.010, 1250), 0.050 + generator.exponential(0.001, 1250))
+    assert offset.estimator == "lower envelope"
+    assert abs(error_s(offset, clock, end_s)) < 0.1e-3
+    assert offset.skew == pytest.approx(skew, abs=25e-6)
+
+
+def test_a_minute_of_queues_gives_the_skew_to_a_few_parts_in_a_million() -> None:
+    generator, clock = np.random.default_rng(9), ahead(-99.0, 37e-6)
+    offset = ClockOffset(shared_clock=False)
+    queues_s = generator.exponential(0.010, (2, 15_000))
+    end_s = talk(offset, clock, 0.050 + queues_s[0], 0.050 + queues_s[1])
+    assert offset.skew == pytest.approx(37e-6, abs=2e-6)
+    assert abs(error_s(offset, clock, end_s)) < 0.05e-3
+
+
+@pytest.mark.parametrize("skew", [0.0, 20e-6, -100e-6])
+def test_a_minute_of_symmetric_jitter_averages_out(skew: float) -> None:
+    generator, clock = np.random.default_rng(11), ahead(1e5, skew)
+    offset = ClockOffset(shared_clock=False)
+    there_s, back_s = np.abs(generator.normal(0.050, 0.010, (2, 15_000)))
+    end_s = talk(offset, clock, there_s, back_s)
+    assert offset.estimator == "mean"
+    assert abs(error_s(offset, clock, end_s)) < 0.37e-3  # what the mean of all offsets has, without skew
+    assert offset.skew == pytest.approx(skew, abs=15e-6)
+
+
+def test_unlike_jitter_that_is_symmetric_takes_the_mean() -> None:
+    generator, clock = np.random.default_rng(12), ahead(0.0)
+    offset = ClockOffset(shared_clock=False)
+    end_s = talk(offset, clock, generator.normal(0.050, 0.010, 5000), generator.normal(0.050, 0.002, 5000))
+    assert offset.estimator == "mean"
+    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
+
+
+def test_a_slow_queue_under_symmetric_jitter_takes_no_mean() -> None:
+    generator, clock = np.random.default_rng(13), ahead(0.0)
+    offset = ClockOffset(shared_clock=False)
+    queue_s = 0.060 * np.abs(np.sin(np.arange(5000) / 200.0))
+    there_s = generator.normal(0.050, 0.005, 5000) + queue_s
+    end_s = talk(offset, clock, there_s, generator.normal(0.050, 0.005, 5000))
+    assert offset.estimator == "lower envelope"
+    mean_error_s = queue_s.mean() / 2.0
+    assert abs(error_s(offset, clock, end_s)) < mean_error_s / 4.0
+
+
+def test_a_stall_does_not_drive_the_mean_out() -> None:
+    generator, clock = np.random.default_rng(14), ahead(50.0)
+    offset = ClockOffset(shared_clock=False)
+    there_s, back_s = generator.normal(0.050, 0.010, (2, 5000))
+    back_s[2000:2050] += np.linspace(0.200, 0.0, 50)
+    end_s = talk(offset, clock, there_s, back_s)
+    assert offset.estimator == "mean"
+    assert abs(error_s(offset, clock, end_s)) < 1.0e-3
+
+
+def test_the_choice_is_not_made_on_a_handful() -> None:
+    generator, clock = np.random.default_rng(15), ahead(0.0)
+    offset = ClockOffset(shared_clock=False)
+    talk(offset, clock, generator.normal(0.050, 0.010, 100), generator.normal(0.050, 0.010, 100))
+    assert offset.estimator == "lower envelope"
+    assert not offset.settled
+
+
+def test_a_link_that_turns_from_jitter_to_queues_turns_to_the_envelope() -> None:
+    generator, clock = np.random.default_rng(16), ahead(7.0)
+    offset = ClockOffset(shared_clock=False)
+    estimators = []
+    end_s = 0.0
+    for there_s, back_s in (
+        generator.normal(0.050, 0.005, (2, 2500)),
+        0.05 + generator.exponential(0.005, (2, 10_000)),
+    ):
+        end_s = talk(offset, clock, there_s, back_s, start_s=end_s)
+        estimators.append(offset.estimator)
+    assert estimators == ["mean", "lower envelope"]
+
+
+def test_the_same_echo_many_times_and_in_any_order_is_one_sample() -> None:
+    once, often = ClockOffset(shared_clock=False), ClockOffset(shared_clock=False)
+    generator, clock = np.random.default_rng(17), ahead(3.0)
+    for k, (there_s, back_s) in enumerate(generator.normal(0.050, 0.010, (1500, 2))):
+        sent_s, slow = 0.01 * k, there_s > 0.055
+        received_s = exchange(once, sent_s, there_s, 0.0, back_s, clock)
+        exchange(often, sent_s, there_s, 0.0, back_s, clock)
+        # What took long is echoed eight times, by turns with the stamp before it.
+        for repeat in range(8 if slow and k else 0):
+            later_s, before_s = 1e-4 * repeat, 0.01 * repeat % 0.02
+            peer_sent_s = clock(sent_s + there_s + later_s)
+            often.update(sent_s - before_s, peer_sent_s, later_s, received_s + later_s, arrived_last=before_s == 0.0)
+            often.overtaken(sent_s, peer_sent_s, later_s, received_s + later_s)
+    assert often.estimator == once.estimator == "mean"
+    sampled = [sum(block.count for block in offset._tracking.to_peer.blocks) for offset in (once, often)]
+    assert sampled[0] == pytest.approx(sampled[1], abs=20)
+
+
+# Clocks that are one, and clocks that jump
+
+
+def test_a_shared_clock_needs_no_estimate() -> None:
+    offset = ClockOffset(shared_clock=True)
+    assert (offset.offset_s, offset.bound_s, offset.skew, offset.estimator) == (0.0, 0.0, 0.0, "shared clock")
+    assert offset.settled
+    assert offset.one_way_from_peer_s(1.0, 1.25) == 0.25
+    exchange(offset, 2.0, 0.3, 0.0, 0.1, ahead(0.0))
+    assert (offset.offset_s, offset.bound_s) == (0.0, 0.0)
+    assert offset.round_trip_s == pytest.approx(0.4)
+
+
+def test_a_shared_clock_with_another_shape_stays_exact() -> None:
+    offset = ClockOffset(shared_clock=True)
+    talk(offset, ahead(0.0), np.full(500, 0.3), np.full(500, 0.1))
+    assert offset.offset_s == 0.0
+
+
+@pytest.mark.parametrize("jump_s", [-3600.0, -5.0, -0.150, -0.070, 0.070, 0.150, 5.0, 3600.0])
+def test_a_clock_that_jumps_is_followed_within_a_second(jump_s: float) -> None:
+    generator, before, after = np.random.default_rng(23), ahead(70.0, 20e-6), ahead(70.0 + jump_s, 20e-6)
+    offset = ClockOffset(shared_clock=False)
+    queues_s = 0.050 + generator.exponential(0.005, (2, 2000))
+    end_s = talk(offset, before, queues_s[0], queues_s[1])
+    assert offset.jumps == 0
+    end_s = talk(offset, after, queues_s[0][:250], queues_s[1][:250], start_s=end_s)
+    assert offset.jumps == 1
+    assert abs(error_s(offset, after, end_s)) < 0.5e-3
+    bound_s = offset.bound_at(end_s)
+    assert bound_s is not None
+    assert abs(error_s(offset, after, end_s)) <= bound_s
+
+
+def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> None:
+    offset, slept_s = ClockOffset(shared_clock=False), 0.100
+
+    def ours(true_s: float) -> float:
+        """Stands still while we sleep."""
+        return true_s if true_s < 5.0 else max(5.0, true_s - slept_s)
+
+    messages = []
+    for k in range(1500):
+        sent_s = 0.004 * k + (0.0 if k < 1250 else slept_s)
+        # The last ones before the sleep take long to come back.
+        back_s = 0.300 if 4.95 < sent_s < 5.0 else 0.020
+        messages.append((sent_s + 0.020 + back_s, sent_s))
+    for received_s, sent_s in sorted(messages):
+        offset.update(ours(sent_s), sent_s + 0.020, 0.0, ours(received_s))
+        if received_s > 5.25:
+            bound_s, estimate_s = offset.bound_at(ours(received_s)), offset.offset_at(ours(received_s))
+            assert estimate_s is not None
+            assert bound_s is not None
+            assert abs(estimate_s - slept_s) <= bound_s
+    assert offset.jumps == 1
+    assert offset.offset_s == pytest.approx(slept_s, abs=1e-6)
+
+
+def delays_of(kind: str, generator: np.random.Generator, count: int) -> np.ndarray:
+    """Delays in seconds of messages 4 ms apart, as real links have them."""
+    exponential_s = generator.exponential(0.001, count)
+    if kind == "wireless":
+        return 0.002 + exponential_s + (generator.random(count) < 0.02) * generator.exponential(0.030, count)
+    if kind == "local":
+        return 50e-6 + exponential_s / 50.0
+    if kind == "queue":  # Lindley's recursion: waiting behind all that came before
+        waits_s = np.zeros(count)
+        for k, served_s in enumerate(generator.exponential(0.0032, count - 1)):
+            waits_s[k + 1] = max(0.0, waits_s[k] + served_s - 0.004)
+        return 0.020 + waits_s
+    if kind == "bursts":
+        busy = np.repeat(generator.random(-(-count // 400)) < 0.4, 400)[:count]
+        return 0.020 + exponential_s + 0.060 * busy
+    wave_s = 0.010 * np.cumsum(generator.normal(0.0, 0.1, count))
+    return 0.050 + np.abs(wave_s)  # wandering
+
+
+@pytest.mark.parametrize("in_order", [False, True])
+@pytest.mark.parametrize("kind", ["wireless", "local", "queue", "bursts", "wandering"])
+def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool) -> None:
+    generator, clock = np.random.default_rng(22), ahead(-7.0, 60e-6)
+    offset = ClockOffset(shared_clock=False)
+    sent_s = 0.004 * np.arange(2500)
+    arrived_s = sent_s + delays_of(kind, generator, 2500)
+    if in_order:
+        arrived_s = np.maximum.accumulate(arrived_s)
+    received_s = arrived_s + delays_of(kind, generator, 2500)
+    if in_order:
+        received_s = np.maximum.accumulate(received_s)
+    for k in np.argsort(received_s, kind="stable"):
+        now_s = float(received_s[k])
+        offset.update(float(sent_s[k]), clock(float(arrived_s[k])), 0.0, now_s)
+        bound_s = offset.bound_at(now_s)
+        assert bound_s is not None
+        assert abs(error_s(offset, clock, now_s)) <= bound_s
+    assert (offset.jumps, offset.rejected) == (0, 0)
+    if kind != "wandering":  # that has no floor to speak of
+        assert abs(error_s(offset, clock, now_s)) < 0.5e-3
+
+
+def test_a_route_that_gets_shorter_is_no_jump() -> None:
+    generator, clock = np.random.default_rng(24), ahead(70.0)
+    offset = ClockOffset(shared_clock=False)
+    queues_s = generator.exponential(0.005, (2, 2000))
+    end_s = talk(offset, clock, 0.080 + queues_s[0], 0.080 + queues_s[1])
+    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1], start_s=end_s)
+    assert offset.jumps == 0
+    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
+
+
+def test_a_route_that_gets_longer_changes_nothing() -> None:
+    generator, clock = np.random.default_rng(25), ahead(70.0)
+    offset = ClockOffset(shared_clock=False)
+    queues_s = generator.exponential(0.005, (2, 2000))
+    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1])
+    end_s = talk(offset, clock, 0.140 + queues_s[0], 0.080 + queues_s[1], start_s=end_s)
+    assert offset.jumps == 0
+    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
+
+
+# Stamps that are wrong
+
+
+@pytest.mark.parametrize(
+    ("sent_s", "peer_s", "held_s", "received_s"),
+    [
+        (1.0, 5.0, -0.001, 1.1),
+        (1.0, 5.0, 0.2, 1.1),
+        (1.0, 5.0, 0.0, 0.9),
+        (1.0, math.nan, 0.0, 1.1),
+        (1.0, 5.0, math.nan, 1.1),
+        (-math.inf, 5.0, 0.0, 1.1),
+    ],
+)
+def test_contradictory_stamps_are_counted_and_change_nothing(
+    sent_s: float, peer_s: float, held_s: float, received_s: float
+) -> None:
+    offset = ClockOffset(shared_clock=False)
+    assert not offset.update(sent_s, peer_s, held_s, received_s)
+    assert offset.rejected == 1
+    assert (offset.offset_s, offset.bound_s, offset.round_trip_s) == (None, None, None)
+
+
+@pytest.mark.parametrize(("there_s", "back_s"), [(-0.5, 0.6), (0.6, -0.5)])
+def test_a_message_from_the_future_is_counted_and_leaves_the_estimate_in_doubt_until_the_next(
+    there_s: float, back_s: float
+) -> None:
+    offset, clock = ClockOffset(shared_clock=False), ahead(4.0)
+    end_s = talk(offset, clock, np.full(500, 0.02), np.full(500, 0.02))
+    exchange(offset, end_s, there_s, 0.0, back_s, clock)
+    assert offset.rejected == 1
+    assert offset.offset_s is None
+    assert offset.one_way_from_peer_s(clock(end_s), end_s + 0.02) is None
+    end_s = exchange(offset, end_s + 0.2, 0.02, 0.0, 0.02, clock)
+    assert abs(error_s(offset, clock, end_s)) < 1e-6
+    assert offset.jumps == 0
+
+
+@pytest.mark.parametrize("invented_s", [-1e300, -1e6])
+def test_delays_longer_than_any_never_reach_the_mean(invented_s: float) -> None:
+    generator, clock = np.random.default_rng(26), ahead(4.0)
+    offset = ClockOffset(shared_clock=False)
+    jitter_s = generator.normal(0.050, 0.005, (2, 2500))
+    end_s = talk(offset, clock, jitter_s[0], jitter_s[1])
+    offset.arrived(invented_s, end_s)
+    assert not offset.update(invented_s, clock(end_s), 0.0, end_s)
+    assert offset.rejected == 2
+    end_s = talk(offset, clock, jitter_s[0][:500], jitter_s[1][:500], start_s=end_s)
+    assert offset.estimator == "mean"
+    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
+
+
+def test_a_holding_time_by_a_fast_clock_is_no_contradiction() -> None:
+    offset = ClockOffset(shared_clock=False)
+    exchange(offset, 0.0, 1e-6, 10.0, 1e-6, ahead(0.0, 100e-6))
+    assert offset.rejected == 0
+    assert offset.round_trip_s == 0.0
+
+
+@pytest.mark.parametrize(("name", "value"), [("asymmetry_s", math.nan), ("asymmetry_s", math.inf), ("max_skew", 0.0)])
+def test_refuses_settings_that_are_none(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"{name} = "):
+        ClockOffset(shared_clock=False, **{name: value})
+
+
+def test_memory_stays_bounded() -> None:
+    offset, clock = ClockOffset(shared_clock=False), ahead(4.0, 1e-6)
+    generator = np.random.default_rng(30)
+    for start in range(20):
+        queues_s = 0.01 + generator.exponential(0.002, (2, 2000))
+        talk(offset, clock, queues_s[0], queues_s[1], start_s=8.1 * start)
+    tracking = offset._tracking
+    assert 0 < len(tracking.to_peer.blocks) <= MOST_BLOCKS
+    assert 0 < len(tracking.from_peer.blocks) <= MOST_BLOCKS
+    assert len(offset._echoed_fairly_s) <= 1025

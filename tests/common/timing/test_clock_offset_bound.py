@@ -1,0 +1,81 @@
+"""The bound that is published with a clock's offset holds, whatever the delays, the drift and the jitter."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.timing.clock_offset import MAX_SKEW, ClockOffset
+from tests.helpers.clock_exchanges import ahead, error_s, exchange
+
+repeatable = settings(derandomize=True, deadline=None)
+
+
+delay = st.floats(0.0, 0.5) | st.floats(0.0, 1e-4) | st.just(0.0)
+drift = st.floats(-MAX_SKEW, MAX_SKEW) | st.sampled_from([-MAX_SKEW, MAX_SKEW, 0.0])
+rounds = st.lists(
+    st.tuples(delay, delay, delay, st.floats(0.0, 2.0) | st.just(0.004), drift, st.booleans()), max_size=60
+)
+
+
+@repeatable
+@given(rounds, st.floats(-1e6, 1e6), st.floats(-0.5, 0.5) | st.just(0.0))
+def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
+    steps: list[tuple[float, float, float, float, float, bool]], apart_s: float, asymmetry_s: float
+) -> None:
+    offset = ClockOffset(shared_clock=False, asymmetry_s=asymmetry_s)
+    now_s, peer_s = 5.0, 5.0 + apart_s
+    for there_s, held_s, back_s, pause_s, skew, lost in steps:
+        rate, start_s = 1.0 + skew, now_s
+        peer_received_s = peer_s + rate * there_s
+        peer_sent_s = peer_received_s + rate * held_s
+        now_s += there_s + held_s + back_s
+        peer_s = peer_sent_s + rate * back_s
+        if not lost:
+            offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, now_s)
+        now_s, peer_s = now_s + pause_s, peer_s + rate * pause_s
+        estimate_s, bound_s = offset.offset_at(now_s), offset.bound_at(now_s)
+        if estimate_s is not None and bound_s is not None:
+            assert abs(estimate_s - (peer_s - now_s)) <= bound_s
+    assert offset.jumps == 0
+
+
+@settings(repeatable, max_examples=40)
+@given(st.integers(0, 1000), st.floats(-0.05, 0.05), st.sampled_from(["normal", "exponential", "constant"]), drift)
+def test_the_bound_holds_while_lines_are_fitted(seed: int, asymmetry_s: float, shape: str, skew: float) -> None:
+    generator, clock = np.random.default_rng(seed), ahead(-40.0, skew)
+    offset = ClockOffset(shared_clock=False)
+    base_s, spread_s = generator.uniform(0.0, 0.05), generator.uniform(0.0, 0.02)
+    shapes = {
+        "normal": generator.standard_normal((2, 400)),
+        "exponential": generator.standard_exponential((2, 400)),
+        "constant": np.zeros((2, 400)),
+    }
+    there_s, back_s = np.maximum(0.0, base_s + spread_s * shapes[shape])
+    there_s += max(0.0, asymmetry_s)
+    back_s += max(0.0, -asymmetry_s)
+    for k in np.argsort(0.05 * np.arange(400) + there_s + back_s):
+        received_s = exchange(offset, 0.05 * k, float(there_s[k]), 0.001, float(back_s[k]), clock)
+        bound_s = offset.bound_at(received_s)
+        assert bound_s is not None
+        assert abs(error_s(offset, clock, received_s)) <= bound_s
+    assert offset.jumps == 0
+
+
+def test_the_bound_is_half_the_least_round_trip_and_loosens_with_time() -> None:
+    offset = ClockOffset(shared_clock=False)
+    exchange(offset, 0.0, 0.040, 0.0, 0.040, ahead(9.0))
+    received_s = exchange(offset, 0.1, 0.010, 0.0, 0.010, ahead(9.0))
+    assert offset.bound_at(received_s) == pytest.approx(0.010, abs=MAX_SKEW * 0.02)
+    assert offset.bound_at(received_s + 100.0) == pytest.approx(0.010 + MAX_SKEW * 100.0, abs=MAX_SKEW * 0.02)
+
+
+@pytest.mark.parametrize("asymmetry_s", [-0.5, 0.0, 0.5])
+def test_one_way_delays_are_never_negative(asymmetry_s: float) -> None:
+    generator, clock = np.random.default_rng(21), ahead(0.0, 100e-6)
+    offset = ClockOffset(shared_clock=False, asymmetry_s=asymmetry_s)
+    for k, (there_s, back_s) in enumerate(generator.exponential(0.010, (1000, 2))):
+        received_s = exchange(offset, 0.5 * k, there_s, 0.0, back_s, clock)
+        one_way_s = offset.one_way_from_peer_s(clock(received_s - back_s), received_s)
+        assert one_way_s is not None
+        assert one_way_s >= -1e-9
