@@ -122,7 +122,7 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
     environment = {**compose.engine.environment, **compose.settings}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
-    trials = json.loads((tmp_path / "latency.json").read_text())["runs"]
+    trials = json.loads(summary.read_text())["runs"]
     assert {trial["medium"]: trial["contact_speed_mm_s"] is not None for trial in trials} == {
         "virtual": True,
         "containers": True,
