@@ -65,7 +65,6 @@ def test_keys_are_made_without_extras(base: Path, tmp_path: Path) -> None:
         (["feelahead", "bench", "overlap"], "robot,bench"),
         (["feelahead", "bench", "coverage"], "robot,operator,bench"),
         (["feelahead", "try", "haptics"], "robot,operator"),
-        (["feelahead", "try", "soak"], "robot,operator"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else value,
 )
