@@ -17,7 +17,7 @@ class Cable:
     def __init__(self, port: int) -> None:
         with socket.create_server(("127.0.0.1", 0)) as listener:
             self.port = int(listener.getsockname()[1])
-            """Where to connect instead"""
+            """The port to connect to instead"""
             context = multiprocessing.get_context("spawn")
             self._process = context.Process(target=_forward, args=(listener, port), daemon=True)
             self._process.start()

@@ -39,11 +39,11 @@ class DriverSettings:
     """An operator side whose hands obey signals."""
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
-    """Where the robot side listens."""
+    """Address of the robot side."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where it publishes what the screen shows."""
+    """Address at which it publishes views."""
     healthy_ms: float = 200.0
-    """How long to rest before arming."""
+    """Rest before arming."""
     backward: bool = False
     """Begin with L2 instead of R2; then the other way each time."""
     status: StatusMode = "json"

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 
 @dataclass(frozen=True)
@@ -39,29 +39,28 @@ class Fault(NamedTuple):
     """Part of the repetitions, of rows that real processes try."""
 
 
+Run = TypeVar("Run", bound=Callable[..., Outcome])
 VIRTUAL: Final[dict[str, Fault]] = {}
 """Rows that virtual time decides, exactly, by name; called without arguments."""
 REAL: Final[dict[str, Fault]] = {}
 """Rows of real processes, by name; called with the number of repetitions."""
 
 
-def virtual(name: str, safe_behaviour: str, number: str) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
+def virtual(name: str, safe_behaviour: str, number: str) -> Callable[[Run], Run]:
     """Register a row that needs no process."""
-
-    def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        VIRTUAL[name] = Fault(name, safe_behaviour, number, run)
-        return run
-
-    return register
+    return _registering(VIRTUAL, name, safe_behaviour, number)
 
 
-def real(
-    name: str, safe_behaviour: str, number: str, share: float = 0.0
-) -> Callable[[Callable[[int], Outcome]], Callable[[int], Outcome]]:
+def real(name: str, safe_behaviour: str, number: str, share: float = 0.0) -> Callable[[Run], Run]:
     """Register a row of real processes."""
+    return _registering(REAL, name, safe_behaviour, number, share)
 
-    def register(run: Callable[[int], Outcome]) -> Callable[[int], Outcome]:
-        REAL[name] = Fault(name, safe_behaviour, number, run, share)
+
+def _registering(
+    table: dict[str, Fault], name: str, safe_behaviour: str, number: str, share: float = 0.0
+) -> Callable[[Run], Run]:
+    def register(run: Run) -> Run:
+        table[name] = Fault(name, safe_behaviour, number, run, share)
         return run
 
     return register

@@ -145,8 +145,8 @@ def _median(table: Table, phase: str, name: str) -> float:
 
 def growth_mb(table: Table, phase: str) -> float:
     """Add up the growth of memory in all stretches of one kind; the statistics of a run fill up in both."""
-    rows = [row for row in table if "memory_mb" in row]
-    steps = itertools.pairwise(rows)
+    runs = (rows for _, rows in Table(row for row in table if "memory_mb" in row).groups("seed"))
+    steps = (step for rows in runs for step in itertools.pairwise(rows))
     return float(sum(after["memory_mb"] - before["memory_mb"] for before, after in steps if after["phase"] == phase))
 
 

@@ -257,12 +257,12 @@ def flat(samples: Sequence[Row], sides: int = 1) -> bool:
     return bool(last["mb"] - settled["mb"] < sides * _FLAT_MB and last["descriptors"] <= settled["descriptors"])
 
 
-def show(_: SoakSweep, table: Table) -> Iterator[RenderableType]:
+def show(_settings: SoakSweep, table: Table) -> Iterator[RenderableType]:
     """Show start, settled, middle and end of each process, then the rest in words."""
     shown = Shown(title="soak", box=MARKDOWN)
     for heading in ("process", "at, min", "resident, MB", "descriptors"):
         shown.add_column(heading, justify="left" if heading == "process" else "right")
-    for (name,), rows in Table(row for row in table if "process" in row).groups("process"):
+    for (_, name), rows in Table(row for row in table if "process" in row).groups("seed", "process"):
         for index in (0, int(_SETTLED * len(rows)), len(rows) // 2, len(rows) - 1):
             one = rows.rows[index]
             shown.add_row(name, f"{one['at_min']:.1f}", f"{one['mb']:.1f}", str(one["descriptors"]))

@@ -176,7 +176,7 @@ def test_the_row_holds(fault: Fault) -> None:
 
 
 def test_nobody_reads_the_wall_clock() -> None:
-    # Not by any of its names: what jumps by an hour must not be there to trip over.
+    # Not by any name: a clock that jumps by an hour must not be there to trip over.
     wall_clocks = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.strftime", "time.ctime"}
     for package in ("common", "robot_side", "operator_side"):
         for path in (ROOT / package).rglob("*.py"):
