@@ -3,7 +3,7 @@
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
@@ -57,36 +57,6 @@ class Goal:
             return "not measured"
         reached = self.value <= self.limit if self.compare == "at most" else self.value >= self.limit
         return "met" if reached else "missed"
-
-
-@dataclass
-class Report:
-    """All that a run found, in the order in which it is to be shown."""
-
-    figures: list[Figure] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
-    goals: list[Goal] = field(default_factory=list)
-
-    def add(self, section: str, method: str, solid: str, case: str, values: dict[str, tuple[float, str]]) -> None:
-        """Append a figure for each quantity: its value and unit."""
-        for quantity, (value, unit) in values.items():
-            self.figures.append(Figure(section, method, solid, case, quantity, value, unit))
-
-    def value(self, section: str, method: str, solid: str, case: str, quantity: str) -> float | None:
-        """A figure that was added, or None where it was not measured."""
-        wanted = (section, method, solid, case, quantity)
-        for figure in self.figures:
-            if (figure.section, figure.method, figure.solid, figure.case, figure.quantity) == wanted:
-                return figure.value
-        return None
-
-    def goal_table(self) -> Table:
-        """Every goal with its verdict."""
-        rows = [
-            (goal.claim, _or_dash(goal.value), f"{goal.compare} {short(goal.limit)}", goal.verdict, goal.detail)
-            for goal in self.goals
-        ]
-        return Table("Goals", ("shows", "measured", "goal", "verdict", ""), rows)
 
 
 def show_goals(console: Console, goals: Sequence[Goal]) -> None:

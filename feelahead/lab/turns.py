@@ -9,7 +9,7 @@ from common.arrays import FloatArray
 from common.clock import Clock
 
 _TURN_S = 0.03
-"""What takes turns with others goes on for about that long."""
+"""A turn goes on for about this long."""
 
 
 def in_turns(contenders: Mapping[str, Callable[[], FloatArray]], turns: int) -> dict[str, float]:

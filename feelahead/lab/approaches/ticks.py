@@ -30,12 +30,12 @@ DEMO: Final = "demo"
 FORCE_N: Final = 2.0
 _STRONGEST_N: Final = 2.0
 _BEFORE_S: Final = 0.5
-"""Of an approach, so much before its pull is kept, too."""
+"""This much before the pull of an approach is kept, too."""
 
 
 @dataclass(frozen=True)
 class Tick:
-    """What the law was asked in one tick, and from which state the pose in it came."""
+    """One tick's question to the law, and the state that the pose in it came from."""
 
     now_s: float
     situation: Situation
@@ -73,7 +73,7 @@ class _Noting:
         return self._kinematics.pose(state)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Ask the law, and keep what it was asked."""
+        """Ask the law, and keep the question."""
         if self._state is not None:
             self.ticks.append(Tick(now_s, situation, self._state))
         return self._law.sense(situation, now_s)
@@ -113,7 +113,7 @@ def scene_of(name: str) -> Scene:
 
 
 def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
-    """Return the ticks, had the gripper been covered by spheres that stand out that far; what it held stays."""
+    """Return the ticks, had the gripper been covered by spheres that stand out that far; held things stay."""
     scene = scene_of(recorded.name)
     own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
     first = len(own.cover.radii_m)

@@ -35,10 +35,10 @@ COVER_M: Final = RobotSettings().cover_m
 WAYS: Final = tuple(
     f"{side} {kind} {strength}" for side in ("R2", "L2") for kind in ("fast", "slow") for strength in ("first", "full")
 )
-"""What is compared: where strength begins and is full, of both triggers' fast and slow zones."""
+"""Ways that are compared: where strength begins and is full, of both triggers' fast and slow zones."""
 KINDS: Final = ("fast first", "fast full", "slow first", "slow full")
 _FULL_SLOW: Final = 3
-"""What is to be touched is felt by four of the eight strengths at most."""
+"""Things to be touched are felt by four of the eight strengths at most."""
 _OF_MESHES: Final = ("mug", "u_mesh")
 _CHUNK: Final = 250
 _LIMIT_M: Final = 1e-12
@@ -69,7 +69,7 @@ class Run:
     duration_s: float
     equality: bool = False
     times: int = 2
-    """How often each tick is gone through; the least time counts."""
+    """Each tick is gone through this often; the least time counts."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Variant:
     late_ticks: int = 0
     """A look is felt by that many ticks later, shortened by what the tool has moved along since."""
     cover_m: float = COVER_M
-    """How far the gripper's spheres stand out: fewer of them for more"""
+    """The gripper's spheres stand out this far: fewer of them for more"""
     hulls: bool = False
     """Meshes count as their convex hulls, each object's as one."""
 
@@ -97,7 +97,7 @@ LADDERS: Final = {
         Variant("objects of meshes", "as meshes"),
     ],
 }
-"""What is set otherwise, one thing at a time; each is compared with the finest of its own, the last."""
+"""One thing is set otherwise at a time; each is compared with the finest of the same ladder, the last."""
 
 
 def cells(settings: FeltSweep) -> Iterator[Run]:
@@ -146,7 +146,7 @@ class Replayed:
     looks_per_s: float
 
     def costs(self) -> dict[str, float]:
-        """Sum up what it took."""
+        """Sum up the costs."""
         p50, p99 = np.quantile(self.took_us, (0.5, 0.99)).tolist()
         times = {"p50_us": p50, "p99_us": p99, "mean_us": float(self.took_us.mean())}
         return {"spheres": self.spheres, "looks_per_s": self.looks_per_s, **times}

@@ -159,9 +159,10 @@ def _accuracy(cell: Piece, seed: int) -> Iterator[Row]:
     group = {"family": family(f"{cell.case}, general")}
     yield {"method": "ours", **group, **worst, relative: float(found.relative[known].max(initial=0.0))}
     if (volumes := _package_volumes(cell, pairs)) is not None:
-        most = {"volume": float(errors.volume_errors(pairs, truths, volumes).max())}
-        most[relative] = float(errors.relative_errors(truths, volumes)[known].max(initial=0.0))
-        yield {"method": PACKAGE, **group, **most}
+        answered = np.isfinite(volumes)
+        most = {"volume": float(errors.volume_errors(pairs, truths, volumes)[answered].max(initial=0.0))}
+        most[relative] = float(errors.relative_errors(truths, volumes)[known & answered].max(initial=0.0))
+        yield {"method": PACKAGE, **group, **most, "undefined": int((~answered).sum())}
 
 
 def _failures(cell: Piece, seed: int) -> Iterator[Row]:

@@ -1,1 +1,1 @@
-"""What all else is held against: exact overlaps, classes that break algorithms, and the ways by definition."""
+"""References that all else is held against: exact overlaps, classes that break algorithms, the ways by definition."""

@@ -1,7 +1,7 @@
-"""What people use instead of exact overlaps: points in the ball, a grid of voxels, numerical quadrature.
+"""Approximations that people use instead of exact overlaps: points in the ball, a grid of voxels, numerical quadrature.
 
 Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. They see a solid as the half-spaces of
-its faces, so that all are given the same.
+the faces, so that all are given the same.
 """
 
 import math
@@ -23,9 +23,9 @@ _CHUNK = 1 << 16
 def satellite_points() -> FloatArray:
     """Return points (29, 3) in radii: the centre and two shells of 14 points, each standing for the same volume.
 
-    As in the divided void fraction of CFDEMcoupling (Goniva et al. 2012): the shells end at the radii that hold
-    1, 15 and 29 parts of 29 of the ball, and the points lie at a shell's mean radius along the axes and
-    diagonals of a cube.
+    The divided void fraction of CFDEMcoupling (Goniva et al. 2012) has them. The shells end at the radii that hold
+    1, 15 and 29 parts of 29 of the ball. The points lie at a shell's mean radius, along the axes and diagonals of a
+    cube.
     """
     axes = [sign * row for row in np.eye(3) for sign in (1.0, -1.0)]
     diagonals = [np.array(signs) / math.sqrt(3.0) for signs in product((1.0, -1.0), repeat=3)]
@@ -83,7 +83,7 @@ SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
     **{f"voxels {cells}³": partial(voxels, cells=cells) for cells in (8, 32, 64)},
     **{f"SciPy {tolerance:g}": partial(quadrature, tolerance=tolerance) for tolerance in (1e-3, 1e-6)},
 }
-"""By name; a pair takes each of these long."""
+"""Those that take long for each pair, by name."""
 
 
 def _chord(y: float, x: float, normals: FloatArray, heights: FloatArray) -> float:

@@ -43,14 +43,14 @@ class Differences:
 
 
 class _NotedAhead(Ahead):
-    """Looks, and notes what it was asked."""
+    """Looks, and notes the question."""
 
     asked: tuple[GripperPose, SceneTable, IntArray, Along]
     widest_m: float
     situation: Situation
-    """Of this tick"""
+    """The one of this tick"""
     began: Situation
-    """Of the tick in which the look began"""
+    """The one of the tick in which the look began"""
 
     def begin(
         self, pose: GripperPose, scene: SceneTable, standing: IntArray, along: Along, widest_m: float = np.inf

@@ -1,4 +1,4 @@
-"""The one family of frozen, seeded classes of pairs on which overlap algorithms are known to fail.
+"""One family of frozen, seeded classes of pairs on which overlap algorithms are known to fail.
 
 Each class comes twice: general doubles, and grid-aligned ones whose every coordinate is a short binary number,
 so that contacts are exact. The same seed and count give the same pairs again.
@@ -164,7 +164,7 @@ def _sliver(ratio: float) -> Maker:
 
 
 def _needle(thickness: float, *, spike: bool = False) -> Maker:
-    """Put all vertices within `thickness` of a line; those of a `spike` but one near one of its ends."""
+    """Put all vertices within `thickness` of a line; a `spike` has three of them near one end."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         start, along = points(rng, count, grid=grid), points(rng, count, grid=grid)
@@ -189,7 +189,7 @@ def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
 
 
 def shifted(make: Maker) -> Maker:
-    """The same, far from the origin: there the doubles are 1e-10 m apart."""
+    """Shift pairs far from the origin, where the doubles are 1e-10 m apart."""
 
     def made(rng: Rng, count: int, grid: bool) -> Pairs:
         pairs = make(rng, count, grid)
@@ -249,7 +249,7 @@ def spheres(depth: float | None, ratio: float = 1.0) -> Maker:
 
 
 def _features(solid: str) -> dict[str, Maker]:
-    """What tetrahedra and boxes have in common."""
+    """Make the classes that tetrahedra and boxes have in common."""
     return {
         **{f"centre on {feature}": touching(solid, feature, 1.0) for feature in FEATURES},
         **{f"tangent {feature}": touching(solid, feature, 0.0) for feature in FEATURES},

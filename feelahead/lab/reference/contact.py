@@ -1,9 +1,9 @@
 """Decide exactly whether an open ball meets a solid's interior, in whole numbers.
 
-Doubles are whole multiples of powers of two, so every coordinate of a pair becomes a Python integer once a common
-power of two is divided out, and no sign below is rounded. A ball meets the interior of a convex solid when the
-distance from its centre to the solid is less than the radius: the centre lies inside, or a vertex, or the foot
-of the perpendicular on an edge or a face is nearer than that.
+Doubles are whole multiples of powers of two. Every coordinate of a pair becomes a Python integer once a common power
+of two is divided out, and no sign below is rounded. A ball meets the interior of a convex solid when the solid is
+nearer to the centre than the radius. Then the centre lies inside, or a vertex, or the foot of the perpendicular on an
+edge or a face, is nearer than that.
 """
 
 from fractions import Fraction
@@ -23,7 +23,7 @@ def contacts(pairs: Pairs) -> BoolArray:
 
 
 def exact_contact(pairs: Pairs, row: int) -> bool:
-    """Tell whether the open ball of this row meets the interior of its solid."""
+    """Tell whether the open ball of this row meets the interior of the solid."""
     center = [Fraction(float(x)) for x in pairs.centers[row]]
     radius = Fraction(float(pairs.radii[row]))
     if radius == 0:
@@ -86,7 +86,7 @@ def _origin_within(corners: list[Whole], faces: tuple[tuple[int, ...], ...], rea
 
 
 def _face_within(ring: list[Whole], normal: Whole, reach_2: int) -> bool:
-    """Tell whether the foot of the origin on the face or on one of its edges exists and is nearer than √`reach_2`."""
+    """Tell whether the foot of the origin on the face or on an edge of it exists and is nearer than √`reach_2`."""
     foot_on_face = True
     for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
         along = _minus(end, start)

@@ -1,4 +1,4 @@
-"""How far overlaps are from the truth, and what must not happen even once."""
+"""Errors of overlaps beside the truth, and counts of what must not happen even once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ LEAST_SHARE = 1e-12
 """Smaller overlaps, as shares of the sphere, are held to no relative error but where they are made so shallow."""
 _SLOPE = 1e-2
 _EXAMINED = 5
-"""Of a class, false zeros whose true volume is worked out."""
+"""The true volumes of about this many false zeros of a class are worked out."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class Errors:
     gradient: FloatArray
     area: FloatArray
     relative: FloatArray
-    """Of the volume to the true one; 0 where both are 0, infinite where only the truth is."""
+    """The volume's error over the true volume; 0 where both are 0, infinite where only the truth is."""
     direction: FloatArray
-    """Of the gradient, in radians; 0 where the ball does not just reach in."""
+    """The gradient's, in radians; 0 where the ball does not just reach in."""
     shares: FloatArray
     """The true volume as a share of the sphere's."""
 
@@ -101,7 +101,7 @@ def partial_pairs(solid: str, count: int, seed: int) -> Pairs:
 
 @dataclass(frozen=True)
 class Failures:
-    """What happened over all pairs of one class; sizes are shares of the sphere's volume."""
+    """Counts over all pairs of one class; sizes are shares of the sphere's volume."""
 
     pairs: int
     undefined: int

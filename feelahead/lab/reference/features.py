@@ -14,7 +14,7 @@ from common.arrays import FloatArray
 Rng = np.random.Generator
 
 FEATURES = {"face": 3, "edge": 2, "vertex": 1}
-"""How many corners of a tetrahedron make the feature."""
+"""Corners of a tetrahedron that make the feature."""
 
 GRID = 0.125
 """The grid's spacing (m)."""
@@ -27,7 +27,7 @@ _WHOLE = {
 """(x, y, z, length): vectors across each feature whose length is a whole number."""
 
 _WEIGHTS = {"face": (0.25, 0.25, 0.5), "edge": (0.25, 0.75), "vertex": (1.0,)}
-"""Of the corners, for a point within the feature that stays a short binary number."""
+"""Weights of the corners, for a point within the feature that stays a short binary number."""
 
 
 @dataclass(frozen=True)

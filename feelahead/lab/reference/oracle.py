@@ -1,4 +1,4 @@
-"""The one oracle: true overlaps to 30 digits or more, for the doubles exactly as they are.
+"""One oracle: true overlaps to 30 digits or more, for the doubles exactly as they are.
 
 Solids with flat faces: the sum of signed orthoschemes over every edge of every face, with the sphere's centre as
 the origin, in 60 decimal digits, and in twice as many again while cancellation leaves fewer than 30 of them.
@@ -96,7 +96,7 @@ def true_overlap(pairs: Pairs, row: int) -> Truth:
         return _sphere(mp, center, radius, pairs.parameters[0][row], float(pairs.parameters[1][row]))
     faces: Sequence[Face] = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
     corners = exact_corners(pairs, row)
-    # An inverted solid gives the negative of its overlap, which is turned round.
+    # An inverted solid gives a negative sum, which is turned round.
     return _with_enough_digits(corners, faces, center, radius)
 
 
@@ -123,7 +123,7 @@ def _with_enough_digits(
 def _face_sum(
     mp: Any, corners: Sequence[Sequence[Any]], faces: Sequence[Face], center: FloatArray, radius: float
 ) -> tuple[Truth, Number]:
-    """Return the sum over all faces, and the sum of its terms' magnitudes."""
+    """Return the sum over all faces, and the sum of the terms' magnitudes."""
     origin = [mp.mpf(float(x)) for x in center]
     big_r = mp.mpf(radius)
     points = [_relative(mp, corner, origin) for corner in corners]

@@ -47,21 +47,6 @@ class Pairs:
         """The pairs of these rows."""
         return Pairs(self.solid, self.centers[rows], self.radii[rows], tuple(p[rows] for p in self.parameters))
 
-    @classmethod
-    def joined(cls, parts: "list[Pairs]") -> "Pairs":
-        """The pairs of several `Pairs` of one kind of solid."""
-        return cls(
-            parts[0].solid,
-            np.concatenate([part.centers for part in parts]),
-            np.concatenate([part.radii for part in parts]),
-            tuple(np.concatenate(arrays) for arrays in zip(*(part.parameters for part in parts), strict=True)),
-        )
-
-    def in_single_precision(self) -> "Pairs":
-        """The same pairs, each number rounded to the nearest float32."""
-        rounded = [array.astype(np.float32).astype(float) for array in self.arguments]
-        return Pairs(self.solid, rounded[0], rounded[1], tuple(rounded[2:]))
-
     @property
     def arguments(self) -> tuple[FloatArray, ...]:
         """The arguments of the public function, and of the kernel."""
@@ -71,18 +56,6 @@ class Pairs:
     def sphere_volumes(self) -> FloatArray:
         """(p,) in m³."""
         return np.asarray(4.0 / 3.0 * np.pi * self.radii**3)
-
-    @property
-    def scales(self) -> FloatArray:
-        """(p,) in m: the largest magnitude among the coordinates and the radius of each pair."""
-        return np.asarray(np.maximum(np.abs(self.points).max(axis=(1, 2)), self.radii))
-
-    @property
-    def points(self) -> FloatArray:
-        """(p, k, 3) in m: the sphere's centre and, for solids that have them, the corners."""
-        if self.solid in ("half-space", "sphere"):
-            return self.centers[:, None]
-        return np.concatenate([self.centers[:, None], self.corners], axis=1)
 
     @property
     def corners(self) -> FloatArray:

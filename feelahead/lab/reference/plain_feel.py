@@ -1,4 +1,4 @@
-"""What is felt of the looks that were kept, and how much overlaps, in plain NumPy: to hold the compiled law against."""
+"""Plain NumPy for what is felt of the looks that were kept, and for how much overlaps."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ class Look:
     at_s: float
     direction: FloatArray
     began_m: float
-    """Where the tool was along it"""
+    """The tool's place along it"""
     ways_m: FloatArray
     """(2, 8)"""
     reach_m: float
@@ -40,7 +40,7 @@ class Look:
 
 @dataclass(frozen=True)
 class PlainlyFelt:
-    """What Sensed has: of R2 and L2 the ways (2, 2, 8), δ, and s(δ)."""
+    """The same as Sensed: the ways (2, 2, 8) of R2 and L2, δ, and s(δ)."""
 
     ways_m: FloatArray
     displacement_m: FloatArray
@@ -53,7 +53,7 @@ class PlainlyFelt:
 
 
 class PlainLooks:
-    """Those that hold: as new as 0.1 s, and of each place along the direction of its newest."""
+    """Keeps the looks that hold: as new as 0.1 s, and of each place along the direction of the newest."""
 
     def __init__(self) -> None:
         self._kept: list[Look] = []
@@ -76,7 +76,7 @@ class PlainLooks:
         self._kept = [one for one in self._kept if one.side != side or one.place < places]
 
     def felt(self, situation: Situation, stick_speed_m_s: float, touch_speed_m_s: float) -> PlainlyFelt:
-        """What is felt of them where the gripper is now."""
+        """Find what is felt of them where the gripper is now."""
         pose, age_s = situation.pose, situation.loop_age_s
         tool_m, approach = pose.tool_position_m, pose.tool_rotation[:, 2]
         velocity = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s

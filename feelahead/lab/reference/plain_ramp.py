@@ -1,4 +1,4 @@
-"""How the overlap of one sphere with one object grows along a way, and where the strengths begin, in plain NumPy.
+"""The overlap of one sphere with one object along a way, and where the strengths begin, in plain NumPy.
 
 W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
 s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
@@ -30,15 +30,15 @@ class Ramp:
     radius: float
     along: FloatArray
     overlaps: Sequence[Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]]
-    """Of each primitive of the object that it meets: V (k,) and gradients (k, 3) of spheres at (k, 3), radii (k,)"""
+    """For each primitive of the object that it meets: V (k,) and gradients (k, 3) of spheres at (k, 3), radii (k,)"""
     entries: FloatArray
     """(p,) the ways at which it meets them"""
     least: float
     """V_min"""
     sooner_m: float
-    """By so much the ways to the object are shorter."""
+    """The ways to the object are shorter by this."""
     later_m: float
-    """And so much longer in slow zones where the object is to be touched."""
+    """They are longer by this in slow zones where the object is to be touched."""
     touchable: bool
     nodes: list[tuple[float, float, float]] = field(default_factory=list)
     """Way, V and dV/dE"""
@@ -157,12 +157,12 @@ class Ramp:
         return False
 
     def _to_come(self) -> tuple[float, bool]:
-        """Where the next primitive is entered, and whether V may rise before."""
+        """Find where the next primitive is entered, and whether V may rise before."""
         later = self.entries[self.entries > self.nodes[-1][0]]
         return float(later.min(initial=math.inf)), self._rising > NOTHING * self._disc
 
     def _go_on(self, reach: float) -> bool:
-        """Begin anew where V could begin to exceed V(0); whether that is within the reach."""
+        """Begin again where V could begin to exceed V(0); whether that is within the reach."""
         entered, may_rise = self._to_come()
         if not may_rise:
             self.nodes, self.start = [], entered

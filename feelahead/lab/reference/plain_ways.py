@@ -23,12 +23,12 @@ from robot_side.overlap import MeshLibrary, sphere_box, sphere_half_space, spher
 from robot_side.overlap.meshes.mesh_library import mesh_pairs
 
 _CORNERS: Final = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
-"""Of a tetrahedron's faces, and the vertex that each lies opposite to."""
+"""Corners of a tetrahedron's faces, and the vertex that each lies opposite to."""
 _EDGES: Final = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """From points (m, 3) to distances (m,), negative or 0 inside, and unit directions (m, 3) in which they fall."""
 Overlaps = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""Of spheres at (k, 3) with radii (k,): V (k,) and its gradients (k, 3)."""
+"""From spheres at (k, 3) with radii (k,) to V (k,) and the gradients (k, 3)."""
 
 
 Ways = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]

@@ -1,7 +1,7 @@
-"""The published package `overlap` 0.2.0 on the same pairs: from Python, and its C++ header by itself.
+"""The published package `overlap` 0.2.0 on the same pairs: from Python, and the C++ header alone.
 
-Both are optional: `missing` says what is not there and how to get it. The package takes one pair a call, wants its
-corners in an order of its own, and returns volumes only.
+Both are optional: `missing` names what is not there and how to get it. The package takes one pair a call, wants
+corners in another order, and returns volumes only.
 """
 
 import importlib.util
@@ -84,7 +84,7 @@ def _element(package: Any, pairs: Pairs) -> Any:
 
 
 class CompiledHeader:
-    """The package's header, overlap.hpp of its source distribution, compiled into the driver beside this file."""
+    """The package's header, overlap.hpp of the source distribution, compiled into the driver beside this file."""
 
     def __init__(self, header: Path | None) -> None:
         folder = tempfile.mkdtemp(prefix="feelahead-peer-")
@@ -106,7 +106,7 @@ class CompiledHeader:
             self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
 
     def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
-        """Work out all pairs twice in a process of its own: the least ns (parts,), and the volumes (p,)."""
+        """Work out all pairs twice in another process: the least ns (parts,), and the volumes (p,)."""
         corners = package_corners(pairs)
         rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)
         given, found = (self._driver.with_name(name) for name in ("pairs", "volumes"))

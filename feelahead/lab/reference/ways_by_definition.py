@@ -32,7 +32,7 @@ class Definition:
     ) -> FloatArray:
         """Find the eight ways (k, 8) of spheres (m,) that are inflated by `inflated_m` (m,); infinite beyond the reach.
 
-        slacks (k,): by so much more than its own strength, of 1, each must be reached.
+        slacks (k,): each strength must be exceeded by this much, of 1.
         """
         ways = np.full((len(slacks), 8), np.inf)
         for center, radius, inflated in zip(centers_m, radii_m, inflated_m, strict=True):

@@ -207,7 +207,7 @@ def test_recorded_ticks_go_through_the_law_as_it_is_and_otherwise() -> None:
 @pytest.mark.long
 def test_a_run_has_a_row_for_each_setting_that_it_can_have() -> None:
     assert frozen_scene("place_held").is_file()
-    rows = list(run(Run("place_held", 0.3, times=1), 0))
+    rows = list(run(Run("place_held", 0.6, times=1), 0))
     settings_of = [(knob, one.value) for knob, rung in LADDERS.items() for one in rung if "mesh" not in knob]
     assert [(row["knob"], row["value"].removesuffix(" (as it is)")) for row in rows] == settings_of
     assert sum(row["value"].endswith("(as it is)") for row in rows) == 2

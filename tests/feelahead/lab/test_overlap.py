@@ -49,7 +49,8 @@ template<int N> double overlap_volume(const Sphere& s, const Element<N>& e) {
 @pytest.mark.long
 def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written, picture = tmp_path / "out.csv", tmp_path / "out.png"
-    arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--picture={picture}"]
+    summary = tmp_path / "out.json"
+    arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--picture={picture}", f"--summary={summary}"]
     assert feelahead.main.command(arguments) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "not measured: overlap, C++: no header: pip download" in said
@@ -62,6 +63,7 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
     methods = {row["method"] for row in rows if row["part"] == "tradeoff"}
     assert {"ours, batch", "29 points", "Monte Carlo 1e3", "voxels 8³", "SciPy 0.001"} <= methods
     assert picture.read_bytes().startswith(b"\x89PNG")
+    assert not {"Infinity", "NaN"} & set(summary.read_text().replace(",", "").split())
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import mpf
 
 from common.arrays import FloatArray, IntArray
@@ -16,8 +14,7 @@ from feelahead.lab.reference.meshes import (
     torus,
 )
 from feelahead.lab.reference.oracle import true_mesh_overlap
-from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.meshes.mesh_library import mesh_pairs
+from robot_side.overlap import Mesh
 
 WORST = 1e-15
 """Of the sphere's volume, surface and, for the gradient, great circle."""
@@ -133,40 +130,6 @@ def test_faces_edges_and_corners_barely_reached_keep_their_relative_accuracy(fix
         assert true.volume_error(float(volume)) <= 1e-12 * true.volume
         assert true.area_error(float(area)) <= 1e-12 * true.area
         assert true.gradient_error(gradient) <= 1e-9 * np.linalg.norm(gradient)
-
-
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(
-    center=st.tuples(*[st.floats(-2.0, 2.0)] * 3),
-    radius=st.floats(1e-3, 3.0),
-    turn=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: sum(x * x for x in q) > 0.1),
-    shift=st.tuples(*[st.floats(-10.0, 10.0)] * 3),
-)
-def test_rigid_motions_and_growth(
-    center: tuple[float, ...], radius: float, turn: tuple[float, ...], shift: tuple[float, ...]
-) -> None:
-    mesh = Mesh(*torus(6, 4))
-    volume, gradient, area = mesh.overlap(center, radius, gradient=True)
-    sphere = 4.0 / 3.0 * np.pi * radius**3
-    assert 0.0 <= volume <= min(sphere, mesh.volume_m3) * (1.0 + 1e-15)
-    assert 0.0 <= area <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
-    assert mesh.overlap(center, radius * 1.001) >= volume - WORST * sphere
-    w, x, y, z = np.array(turn) / np.linalg.norm(turn)
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    placed = rotation @ np.array(center) + np.array(shift)
-    arrays = np.zeros(1, dtype=np.int64), np.array([shift]), rotation[None].copy()
-    volumes, gradients, areas = mesh_pairs(placed[None], np.array([radius]), MeshLibrary([mesh]), *arrays)
-    # The placed centre is rounded where the shift is large.
-    rounding = 3e-15 * 10.0 / radius
-    assert abs(volumes[0] - volume) <= (WORST + rounding) * sphere
-    assert abs(areas[0] - area) <= (WORST + 10.0 * rounding) * 4.0 * np.pi * radius**2 + 1e-6 * np.sqrt(rounding)
-    assert np.abs(gradients[0] - rotation @ gradient).max() <= 1e-6 * np.sqrt(rounding) + 10.0 * rounding * radius**2
 
 
 def test_relabelling_and_splitting_change_nothing() -> None:
