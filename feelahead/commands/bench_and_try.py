@@ -81,7 +81,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
 bench = Menu(
     "bench",
     "benchmark",
-    (),
+    ("coverage", "error"),
     {
         "overlap": Entry(
             "feelahead.benchmarks.overlap.bench",
@@ -89,23 +89,11 @@ bench = Menu(
             "run time against error of the exact overlaps and of what is used in their place",
             "pip install 'feelahead[robot,bench]'",
         ),
-        "error": Entry(
-            "feelahead.benchmarks.error.bench",
-            "bench_error",
-            "run time against error of the error propagation, and of the prediction of the gripper's way",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
         "cover": Entry(
             "feelahead.benchmarks.cover.bench",
             "bench_cover",
             "how closely a gripper's spheres cover it, measured both ways",
             "pip install 'feelahead[robot,bench]'",
-        ),
-        "coverage": Entry(
-            "feelahead.benchmarks.coverage.bench",
-            "bench_coverage",
-            "how often full stiffness stands in time, and how often without need, for each law",
-            "pip install 'feelahead[robot,operator,bench]'",
         ),
         "link": Entry(
             "feelahead.benchmarks.link.bench",
@@ -157,14 +145,8 @@ bench = Menu(
 try_out = Menu(
     "try",
     "experiment",
-    ("demo",),
+    ("demo", "approach"),
     {
-        "approach": Entry(
-            "feelahead.experiments.approach.command",
-            "try_approach",
-            "a finger of constant force pulls the gripper towards things: does it hit them, and how fast",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
         "field": Entry(
             "feelahead.experiments.field.command",
             "try_field",

@@ -117,6 +117,7 @@ LIBRARIES = {
         "operator_side/dualsense/hid/release_watchdog.py",
         "feelahead/commands",
         "feelahead/containers",
+        "feelahead/lab",
         "feelahead/benchmarks",
         "feelahead/experiments",
     ),

@@ -16,10 +16,9 @@ from rich.table import Table
 from common.command.command_line import parse_settings
 from common.files.input_file import require_input_file
 from common.files.output_file import require_output_file, write_json
-from feelahead.experiments.approach.table import scene_names
 from feelahead.experiments.field.looking import Look, Looker
 from feelahead.experiments.field.picture import draw
-from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene
+from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene, scene_names
 from feelahead.lab.figures import PICTURES
 from feelahead.lab.progress import progress
 

@@ -23,14 +23,14 @@ from robot_side.simulation.posed_scene import let_through
 from robot_side.simulation.scene import Scene, load_scene
 
 POSE_S = 0.01
-"""The true pose is noted this often."""
+"""The period at which the true pose is noted."""
 TICK_S = 0.001
-"""And what each side has of the other, this often."""
+"""The period at which the newest messages of both sides are noted."""
 
 
 @dataclass(frozen=True)
 class RecordedApproach:
-    """What happened on both sides, on the one virtual clock that both share; the pull begins at `began_s`."""
+    """A pull on both sides, on their one virtual clock; it begins at `began_s`."""
 
     pull: PullKind
     link: str
@@ -62,16 +62,16 @@ class RecordedApproach:
     """(c,) calibrated travel of R2 less that of L2, in that command"""
 
     def pose_row(self, time_s: float) -> int:
-        """The newest row of the poses at `time_s`, the first one before it."""
+        """Find the newest row of the poses at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.pose_time_s, time_s + 1e-9) - 1, 0, len(self.pose_time_s) - 1))
 
     def tick_row(self, time_s: float) -> int:
-        """The newest row of the ticks at `time_s`, the first one before it."""
+        """Find the newest row of the ticks at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.tick_time_s, time_s + 1e-9) - 1, 0, len(self.tick_time_s) - 1))
 
     def arrives_s(self, sent_s: float) -> float:
-        """When a command that was sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
-        # What is newest never gets older but for a gap, in which nothing is followed.
+        """Find when a command sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
+        # The newest command never gets older, but for a gap in which none is followed.
         newest = np.fmax.accumulate(np.where(np.isnan(self.applied_sent_s), -np.inf, self.applied_sent_s))
         row = int(np.searchsorted(newest, sent_s - 1e-9))
         return float(self.tick_time_s[row]) if row < len(newest) else float("inf")
@@ -111,7 +111,7 @@ def record_approach(
 
 
 class _Notes:
-    """What is noted after each turn of the robot side."""
+    """Notes taken after each turn of the robot side."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -121,7 +121,7 @@ class _Notes:
         self._applied = (float("nan"), float("nan"))
 
     def take(self, run: Loopback, now_s: float) -> None:
-        """One turn."""
+        """Note one turn."""
         data, robot = self._scene.data, self._scene.robot
         command = run.robot.session.safety.command
         if command is None:
@@ -146,7 +146,7 @@ class _Notes:
             )
 
     def record(self, pull: PullKind, link: str, seed: int, began_s: float) -> RecordedApproach:
-        """All of it from a second before the pull on."""
+        """Return the record from a second before the pull on."""
         from_s = began_s - 1.0
         times, positions, velocities, fingers, ages = zip(
             *(row for row in self._poses if row[0] >= from_s), strict=True
