@@ -63,7 +63,6 @@ def test_keys_are_made_without_extras(base: Path, tmp_path: Path) -> None:
         (["feelahead-robot"], "robot"),
         (["feelahead", "demo", "--duration", "1"], "robot"),
         (["feelahead", "bench", "overlap"], "robot,bench"),
-        (["feelahead", "bench", "coverage"], "robot,operator,bench"),
         (["feelahead", "try", "haptics"], "robot,operator"),
         (["feelahead", "try", "soak"], "robot,operator"),
     ],
@@ -75,6 +74,13 @@ def test_what_needs_an_extra_says_which(base: Path, arguments: list[str], extras
     assert ended.returncode == 2
     [line] = ended.stderr.splitlines()
     assert line.endswith(f"pip install 'feelahead[{extras}]'")
+
+
+def test_a_question_of_the_lab_names_the_extras_to_look_in(base: Path) -> None:
+    ended = run(base / "feelahead", "bench", "coverage")
+    assert ended.returncode == 2
+    [line] = ended.stderr.splitlines()
+    assert line.endswith("is not installed; it is in one of the extras robot, operator, experiments, bench")
 
 
 def test_a_controller_needs_the_operators_extra(base: Path) -> None:

@@ -245,7 +245,7 @@ def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
     } >= feelahead.main._COMMANDS.keys()
     for menu in (bench, try_out):
         [listed] = re.findall(rf"`{menu.name} NAME`\s+\(([^)]*)\)", section)
-        assert set(listed.replace("\n", " ").split(", ")) == menu.entries.keys()
+        assert set(listed.replace("\n", " ").split(", ")) == {*menu.questions, *menu.entries}
 
 
 def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:

@@ -222,7 +222,9 @@ def _where(rows: Table, name: str, value: float) -> str:
 
 def by_law(table: Table, laws: Sequence[str]) -> Shown:
     """Make a row for each law and P, over all cells, with the cost in time."""
-    shown = Shown(title="the laws side by side", caption="means over the cells; slowdown at 200 ms and P = 0.99")
+    shown = Shown(
+        title="the laws side by side", caption="means over the cells; slowdown at 200 ms and P = 0.99 (arrived)"
+    )
     headings = ("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never")
     for heading in (*headings, "false alarms a minute", "share", *(f"slowdown, {scene}" for scene in RACED)):
         shown.add_column(heading)
@@ -244,8 +246,7 @@ def mean(rows: Table, name: str, form: str = ".3f") -> str:
 
 
 def _slowdown(row: Row) -> str:
-    arrived = f"{row['arrived']} of {row['of']} arrive"
-    return arrived if row["ratio"] is None else f"{row['ratio']:.2f} ({arrived})"
+    return f"{'-' if row['ratio'] is None else format(row['ratio'], '.2f')} ({row['arrived']}/{row['of']})"
 
 
 def check_lines(table: Table) -> Iterator[str]:

@@ -189,11 +189,10 @@ def show(_: ErrorSweep, table: Table) -> Iterator[RenderableType]:
         yield from failures(propagated)
     times = [(row["method"], f"{row['run_time_us']:.1f}") for row in table.where(kind="run time")]
     yield _shown("Run time of one point and direction: processor time", ("method", "µs a call"), times)
-    kinds, named = list(COMPENSATIONS), [_KINDS[kind][0] for kind in COMPENSATIONS]
-    columns = ("pull", "loop age, ms", "moments", *named)
+    columns = ("pull", "loop age, ms", "moments", *(name for name, _ in _KINDS.values()))
     title = "Displacement until a command takes effect, truth less prediction, mm: mean, sd, 99 %, greatest"
-    yield _shown(title, columns, list(_spreads(judged, kinds, within_reach=True)))
-    edge = list(_spreads(judged, [*kinds, "v_max as set"], within_reach=False))
+    yield _shown(title, columns, list(_spreads(judged, COMPENSATIONS, within_reach=True)))
+    edge = list(_spreads(judged, [*COMPENSATIONS, "v_max as set"], within_reach=False))
     yield _shown("At the edge of the arm's reach, not in the table above", (*columns, "own, v_max as set"), edge)
     both = {name: [cell_of(over(judged, name, within_reach=within)) for within in (True, False)] for name in VARIANTS}
     title = "v_max and a in the prediction by the commands under way"
@@ -236,9 +235,7 @@ def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iter
 
 def cell_of(found: Spread) -> str:
     """Write mean, standard deviation, 99 % and greatest, in mm."""
-    if not found.moments:
-        return "-"
-    return f"{found.mean_mm:+.2f}  {found.sd_mm:.2f}  {found.p99_mm:.2f}  {found.max_mm:.2f}"
+    return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 
 def draw(_: ErrorSweep, table: Table, path: Path) -> None:
@@ -247,13 +244,11 @@ def draw(_: ErrorSweep, table: Table, path: Path) -> None:
         times_us = {row["method"]: row["run_time_us"] for row in table.where(kind="run time")}
         _draw_propagation(left, table.where(kind="propagation"), times_us)
         for kind, (label, colour) in _KINDS.items():
-            found = [over(table.where(kind="prediction"), kind, ages_s) for ages_s in AGE_BINS_S]
-            known = [one for one in found if one.moments]
-            ages_ms = [one.loop_age_ms for one in known]
-            right.plot(
-                ages_ms, [max(one.p99_mm, _LEAST_MM) for one in known], "o-", color=colour, label=f"{label}: 99 %"
-            )
-            right.plot(ages_ms, [max(one.sd_mm, _LEAST_MM) for one in known], ".--", color=colour, label="its sd")
+            every = (over(table.where(kind="prediction"), kind, ages_s) for ages_s in AGE_BINS_S)
+            found = [one for one in every if one.moments]
+            for of, style, said in (("p99_mm", "o-", f"{label}: 99 %"), ("sd_mm", ".--", "standard deviation")):
+                errors_mm = [max(getattr(one, of), _LEAST_MM) for one in found]
+                right.plot([one.loop_age_ms for one in found], errors_mm, style, color=colour, label=said)
         right.set(yscale="log", xlabel="loop age, ms", ylabel="error, mm")
         right.set_title("Displacement until a command takes effect, what predictions miss", fontsize=9)
         right.grid(alpha=0.3)

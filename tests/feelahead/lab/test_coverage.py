@@ -303,7 +303,7 @@ def test_the_question_is_answered_whole(
     assert "covered: full strength stood in time" in shown
     assert "| bell | 200 ms |" in shown
     assert "of 1 as reckoned" in shown
-    assert "(1 of 1 arrive)" in shown
+    assert "1.00 (1/1)" in shown
     assert picture.read_bytes().startswith(b"\x89PNG")
     kinds = [line.split(",") for line in table.read_text().splitlines()]
     assert [kinds[0].count(name) for name in ("kind", "cell", "law", "coverage", "ratio")] == [1] * 5
