@@ -20,9 +20,6 @@ Compensation = Literal["operator", "robot", "momentary"]
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
 """operator: the commands under way, as their sender knows them. robot: v t_d, t_d the robot's high quantile of the
 loop age (eq. 8). momentary: v times the loop age of this very moment."""
-VARIANTS: Final = ("as reported", "v_max as set", "a of home", "a 2 m/s²", "a 3 m/s²", "a 5 m/s²", "a infinite")
-"""v_max and a of the operator's own prediction: of the pose in the report (as in COMPENSATIONS), or v_max as it is
-set, or always the same a."""
 _STEP_S: Final = 0.01
 _LEAST_SPEED: Final = 1e-9
 AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
@@ -185,31 +182,20 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
     """Compare every prediction with the arm's true way; full_speed_m_s is v_max as it is set.
 
     Lists (k,) with an entry for each moment: `loop_age_s`, `within_reach` (False: at the edge of its reach the arm
-    cannot do as commanded), `way_m` (true, along the direction in which R2 advances), and truth less prediction by
-    COMPENSATIONS and VARIANTS; NaN where there is no prediction.
+    cannot do as commanded), `way_m` (true, along the direction in which R2 advances), and truth less prediction
+    by COMPENSATIONS; NaN where there is no prediction.
     """
     path = ToolPath(record, pose_at, limits, full_speed_m_s)
     at = moments(record)
     way_m = path.ways_m(at.reported_s, at.arrives_s)
     speed_m_s = path.speeds_m_s(at.reported_s)
     full_m_s, here_m_s2 = path.full_speeds_m_s(at.reported_s), path.accelerations_m_s2(at.reported_s)
-    pose = pose_at(record.joint_positions_rad[0])
-    home = along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s)
-    fixed_m_s2 = (home.acceleration_m_s2, 2.0, 3.0, 5.0, np.inf)
-    candidates = [
-        (full_m_s, here_m_s2),
-        (np.full(len(at), full_speed_m_s), here_m_s2),
-        *((full_m_s, np.full(len(at), value)) for value in fixed_m_s2),
-    ]
-    found = {
-        name: predicted(record, at, speed_m_s, *candidate) for name, candidate in zip(VARIANTS, candidates, strict=True)
-    }
-    errors = {name: way_m - own_m for name, (own_m, _) in found.items()}
-    errors |= {
-        "operator": errors[VARIANTS[0]],
+    own_m, own_m_s = predicted(record, at, speed_m_s, full_m_s, here_m_s2)
+    errors = {
+        "operator": way_m - own_m,
         "robot": way_m - speed_m_s * at.loop_age_quantile_s,
         "momentary": way_m - speed_m_s * at.loop_age_s,
-        "speed at the end": path.speeds_m_s(at.arrives_s) - found[VARIANTS[0]][1],
+        "speed at the end": path.speeds_m_s(at.arrives_s) - own_m_s,
     }
     within = path.within_reach(at.reported_s, at.arrives_s)
     known = {"loop_age_s": at.loop_age_s, "way_m": way_m, "within_reach": within}

@@ -20,7 +20,6 @@ from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene
 from feelahead.lab.approaches.prediction import (
     AGE_BINS_S,
     COMPENSATIONS,
-    VARIANTS,
     Compensation,
     Spread,
     error_table,
@@ -180,7 +179,7 @@ def write_table(settings: ErrorSweep, table: Table) -> None:
 
 
 def show(_: ErrorSweep, table: Table) -> Iterator[RenderableType]:
-    """Make tables of the propagation by joint noise, and of the prediction by loop age, pull and variant."""
+    """Make tables of the propagation by joint noise, and of the prediction by loop age and pull."""
     propagated, judged = table.where(kind="propagation"), table.where(kind="prediction")
     if len(propagated):
         yield _by_noise(propagated, "Standard deviation along the approach: error in %", "sd_error_percent")
@@ -192,11 +191,8 @@ def show(_: ErrorSweep, table: Table) -> Iterator[RenderableType]:
     columns = ("pull", "loop age, ms", "moments", *(name for name, _ in _KINDS.values()))
     title = "Displacement until a command takes effect, truth less prediction, mm: mean, sd, 99 %, greatest"
     yield _shown(title, columns, list(_spreads(judged, COMPENSATIONS, within_reach=True)))
-    edge = list(_spreads(judged, [*COMPENSATIONS, "v_max as set"], within_reach=False))
-    yield _shown("At the edge of the arm's reach, not in the table above", (*columns, "own, v_max as set"), edge)
-    both = {name: [cell_of(over(judged, name, within_reach=within)) for within in (True, False)] for name in VARIANTS}
-    title = "v_max and a in the prediction by the commands under way"
-    yield _shown(title, ("", "within reach", "at the edge"), [(name, *shown) for name, shown in both.items()])
+    edge = list(_spreads(judged, COMPENSATIONS, within_reach=False))
+    yield _shown("At the edge of the arm's reach, not in the table above", columns, edge)
 
 
 def _shown(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Shown:

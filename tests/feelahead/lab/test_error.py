@@ -17,7 +17,6 @@ from common.errors import ConfigurationError
 from feelahead.lab.approaches.prediction import (
     AGE_BINS_S,
     COMPENSATIONS,
-    VARIANTS,
     ToolPath,
     error_table,
     judge,
@@ -250,14 +249,11 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
 
 
-def test_the_acceleration_that_is_assumed_matters_when_the_hand_lets_go() -> None:
+def test_the_prediction_follows_a_hand_that_lets_go() -> None:
     travels = np.where(np.arange(1500) * 0.004 < 4.0, 1.0, 0.0)
     judged = judge(recorded(travels, 200, 200), pose_at, LIMITS, FULL_M_S)
-    greatest_mm = {name: 1e3 * greatest_m(judged, name) for name in VARIANTS}
-    assert greatest_mm["as reported"] == pytest.approx(greatest_mm["a of home"], abs=1e-9)
-    assert greatest_mm["as reported"] < 0.6
-    assert greatest_mm["a infinite"] == pytest.approx(1e3 * FULL_M_S**2 / (2.0 * 8.0), abs=0.6)
-    assert greatest_mm["a 2 m/s²"] == pytest.approx(1e3 * FULL_M_S**2 / 2.0 * (1.0 / 2.0 - 1.0 / 8.0), abs=0.6)
+    # An arm of infinite acceleration would be v²/2a = 3.9 mm off.
+    assert greatest_m(judged, "operator") < 0.6e-3
 
 
 def test_moments_are_those_that_can_be_compared() -> None:
@@ -299,7 +295,6 @@ def made_up(errors_mm: list[float], age_s: float = 0.4, link: str = "") -> dict[
     errors_m, count = 1e-3 * np.array(errors_mm), len(errors_mm)
     row = {"kind": "prediction", "pull": "bell", "link": link, "seed": 3, "loop_age_s": [age_s] * count}
     row |= {"within_reach": [False] + [True] * (count - 1), "way_m": [0.0] * count}
-    row |= dict.fromkeys(VARIANTS, errors_m.tolist())
     return row | {"operator": errors_m.tolist(), "robot": (10.0 * errors_m).tolist(), "momentary": errors_m.tolist()}
 
 
