@@ -41,7 +41,7 @@ _Force = Annotated[float, Meta(ge=0.0, le=20.0)]
 
 
 @dataclass(frozen=True)
-class ApproachSweep(Sweep):
+class ApproachSettings(Sweep):
     """A finger that presses R2 with a constant force, until the gripper touches something or comes to rest.
 
     Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
@@ -110,7 +110,7 @@ class ApproachSweep(Sweep):
         return tuple(dict.fromkeys(with_compensation(law, side) for law in self.law for side in self.compensation))
 
 
-def cells(settings: ApproachSweep) -> Iterator[Approach]:
+def cells(settings: ApproachSettings) -> Iterator[Approach]:
     """Combine all values; frozen scenes that a straight pull passes have their sticks deflected."""
     for model, link, force_n, strongest_n, law in product(
         settings.models(), settings.link, settings.force, settings.strongest_effect, settings.laws()
@@ -157,7 +157,7 @@ def figures(approach: Approach, outcome: Outcome) -> Row:
     }
 
 
-def show(_: ApproachSweep, table: Table) -> Iterator[RenderableType]:
+def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
     """Show one run as a sentence, several as a table."""
     yield Text(sentence(table.rows[0])) if len(table) == 1 else comparison(table)
 
@@ -197,7 +197,7 @@ def comparison(table: Table) -> Shown:
     return shown
 
 
-def draw(settings: ApproachSweep, table: Table, path: Path) -> None:
+def draw(settings: ApproachSettings, table: Table, path: Path) -> None:
     """Draw zones, travel, speed and gap over time (one run), or contact speed against delay (several)."""
     (_draw_run if len(table) == 1 else _draw_comparison)(table, frozen_hash(settings.models()), path)
 
@@ -287,7 +287,7 @@ def _spread(values: Sequence[float], digits: int) -> str:
 
 QUESTION = Question(
     "try approach",
-    ApproachSweep,
+    ApproachSettings,
     cells,
     run,
     show,

@@ -41,7 +41,7 @@ _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
 
 
 @dataclass(frozen=True)
-class CoverageSweep(Sweep):
+class CoverageSettings(Sweep):
     """The share of approaches in which full strength stands in time, and false alarms, for each law.
 
     Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
@@ -134,7 +134,7 @@ def quick_cells() -> Iterator[tuple[PullKind, str, Placed]]:
         yield "bell", "200 ms", Placed(name)
 
 
-def cells(settings: CoverageSweep) -> Iterator[Pulls | Race | Checks]:
+def cells(settings: CoverageSettings) -> Iterator[Pulls | Race | Checks]:
     """Lay out motions, races and checks."""
     raced = settings.raced if settings.raced is not None else (2 if settings.quick else 10)
     checked = settings.checked if settings.checked is not None else (6 if settings.quick else 300)
@@ -156,7 +156,7 @@ def run(cell: Pulls | Race | Checks, seed: int) -> Iterator[Row]:
         yield from ({"kind": "check"} | asdict(one) for one in check(cell.first, cell.count, seed))
 
 
-def show(settings: CoverageSweep, table: Table) -> Iterator[RenderableType]:
+def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     """Make tables by cell, by pull and by law, and say how the checks ended."""
     found = Table(sorted(table.where(kind="cell"), key=lambda row: row["cell"]))
     yield _by_cell(found, settings.laws, "covered: full strength stood in time", _covered)
@@ -259,7 +259,7 @@ def check_lines(table: Table) -> Iterator[str]:
             yield f"closed loop, {kind}: {len(rows) - len(others)} of {len(rows)} as reckoned{but}"
 
 
-def draw(settings: CoverageSweep, table: Table, path: Path) -> None:
+def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
     """Draw coverage against false alarms: a point for each law and P, means over the cells."""
     found = table.where(kind="cell")
     probabilities = sorted(set(found.values("probability")))
@@ -286,7 +286,7 @@ def draw(settings: CoverageSweep, table: Table, path: Path) -> None:
 
 QUESTION = Question(
     "bench coverage",
-    CoverageSweep,
+    CoverageSettings,
     cells,
     run,
     show,

@@ -66,7 +66,7 @@ _Draws = Annotated[int, Meta(ge=100 * BATCHES, le=10_000_000)]
 
 
 @dataclass(frozen=True)
-class ErrorSweep(Sweep):
+class ErrorSettings(Sweep):
     """Run time against error of the error propagation (eq. 5), and the error of predicting the gripper's way.
 
     First: the joints of the built-in arm are off by 1e-5 to 1e-1 rad. The gripper's error is estimated by eq. 5 in each
@@ -128,7 +128,7 @@ def link_spec(delay_ms: int) -> str:
     return f"delay {delay_ms}ms {jitter_ms}ms distribution normal" if jitter_ms > 0 else ""
 
 
-def cells(settings: ErrorSweep) -> Iterator[Cell]:
+def cells(settings: ErrorSettings) -> Iterator[Cell]:
     """Lay out configurations, the run times, and each pull over each link; only pulls have several seeds."""
     quick, second = settings.quick, settings.seed + 1
     configurations = 4 if quick else 12
@@ -170,7 +170,7 @@ def _gripper() -> PosedGripper:
     return PosedGripper(load_scene(frozen_scene(_SCENE), SITE))
 
 
-def write_table(settings: ErrorSweep, table: Table) -> None:
+def write_table(settings: ErrorSettings, table: Table) -> None:
     """Write what --table asks for."""
     if settings.table is not None:
         arm, speed_m_s = load_scene().robot.fingerprint, ToolMotionSettings().trigger_speed_m_s
@@ -178,7 +178,7 @@ def write_table(settings: ErrorSweep, table: Table) -> None:
             file.write(error_table(table.where(kind="prediction"), arm, frozen_hash(), speed_m_s))
 
 
-def show(_: ErrorSweep, table: Table) -> Iterator[RenderableType]:
+def show(_: ErrorSettings, table: Table) -> Iterator[RenderableType]:
     """Make tables of the propagation by joint noise, and of the prediction by loop age and pull."""
     propagated, judged = table.where(kind="propagation"), table.where(kind="prediction")
     if len(propagated):
@@ -234,7 +234,7 @@ def cell_of(found: Spread) -> str:
     return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 
-def draw(_: ErrorSweep, table: Table, path: Path) -> None:
+def draw(_: ErrorSettings, table: Table, path: Path) -> None:
     """Draw run time against error of the propagation, and the predictions' errors against the loop age."""
     with figure(path, 1, 2, f"frozen {frozen_hash()}", figsize=(11.0, 4.4)) as (_, (left, right)):
         times_us = {row["method"]: row["run_time_us"] for row in table.where(kind="run time")}
@@ -284,7 +284,7 @@ def _draw_propagation(axes: Any, propagated: Table, times_us: dict[str, float]) 
 
 QUESTION = Question(
     "bench error",
-    ErrorSweep,
+    ErrorSettings,
     cells,
     run,
     show,

@@ -19,7 +19,7 @@ from feelahead.lab.approaches.laws import LAWS
 from feelahead.lab.approaches.outcome import End, Outcome, Trace
 from feelahead.lab.figures import LAW_COLOURS
 from feelahead.lab.questions import approach as module
-from feelahead.lab.questions.approach import QUESTION, ApproachSweep, comparison, figures, sentence
+from feelahead.lab.questions.approach import QUESTION, ApproachSettings, comparison, figures, sentence
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Table
 from tests.helpers.repository import DATA, ROOT
@@ -224,7 +224,7 @@ def test_each_end_has_its_sentence_and_names_are_printed_as_they_are() -> None:
     approach = Approach(Path("some/wall.xml"), 3.0, law="none")
     assert "stops 5.0 mm off (6.0 mm along the approach)" in sentence(row(approach, outcome("stopped", 5.0)))
     assert "undecided" in sentence(row(approach, outcome("undecided")))
-    [shown] = module.show(ApproachSweep(), Table([row(approach, outcome()) | {"contact_with": "[red]wall"}]))
+    [shown] = module.show(ApproachSettings(), Table([row(approach, outcome()) | {"contact_with": "[red]wall"}]))
     assert "touches [red]wall at" in str(shown)
 
 
@@ -262,6 +262,7 @@ def test_bad_input_is_one_line_before_anything_runs(runs: MadeUp, arguments: lis
         tried(*arguments, *(() if "--model" in arguments else ("--model", WALL)))
     text = str(refused.value)
     assert "\n" not in text
+    assert "Settings" not in text
     assert named in text
     assert valid in text
     assert runs.asked == []

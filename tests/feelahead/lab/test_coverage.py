@@ -31,7 +31,7 @@ from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
 from feelahead.lab.approaches.spoilt import Spoil
-from feelahead.lab.questions.coverage import QUESTION, CoverageSweep
+from feelahead.lab.questions.coverage import QUESTION, CoverageSettings
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
 from robot_side.settings import EncoderSettings
@@ -264,13 +264,13 @@ def test_physics_does_as_reckoned() -> None:
 
 
 def test_the_plans() -> None:
-    full = CoverageSweep().pulls()
+    full = CoverageSettings().pulls()
     cells = [(pulls.pull, pulls.link, cell) for pulls in full for cell in pulls.cells]
     assert len({cell.key(pull, link) for pull, link, cell in cells}) == len(cells) == 179
     names = {cell.scene for _, _, cell in cells}
     assert names == {*AHEAD, *ASIDE, *PASSED} - {"moving", "fleeing", "place_held", "terrain_ahead"}
     assert {link for _, link, _ in cells} == set(LINKS)
-    quick = CoverageSweep(quick=True, only=("wall/bell",)).pulls()
+    quick = CoverageSettings(quick=True, only=("wall/bell",)).pulls()
     assert [(pulls.pull, pulls.link, pulls.cells) for pulls in quick] == [("bell", "200 ms", (Placed("wall"),))]
     assert set(quick[0].cells) < {cell for _, _, cell in cells}
 
