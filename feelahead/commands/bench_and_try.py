@@ -2,58 +2,59 @@
 
 import ast
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 from common.errors import ConfigurationError
 
 _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
-
-
-class Entry(NamedTuple):
-    """One thing to run."""
-
-    module: str
-    function: str
-    what: str
-    """What it measures, for `--help`."""
-    remedy: str = "pip install feelahead"
-    """What brings the packages that it needs."""
+_OWN = "robot,operator,experiments"
+"""Extras of a question in a file of one's own."""
 
 
 @dataclass(frozen=True)
 class Menu:
-    """One command whose first argument names what to run."""
+    """One command whose first argument names a question."""
 
     name: str
-    kind: str
-    questions: tuple[str, ...]
-    entries: dict[str, Entry]
+    questions: Mapping[str, str]
+    """Each question's name, with the extras that it needs."""
 
     def __call__(self, arguments: Sequence[str]) -> int:
-        """Run what the first argument names."""
+        """Answer the question that the first argument names, or that a file of one's own holds."""
         if not arguments or arguments[0] in ("-h", "--help", "--list"):
-            lines = [f"  {name:<12}{_sentence(name)}" for name in self.questions]
-            lines += [f"  {name:<12}{entry.what}" for name, entry in self.entries.items()]
+            lines = "\n".join(f"  {name:<10}{_sentence(name)}" for name in self.questions)
             sys.stdout.write(
-                f"usage: feelahead {self.name} NAME [OPTIONS]\n\n" + "\n".join(lines) + "\n\nEach has its own --help.\n"
+                f"usage: feelahead {self.name} NAME|FILE.py [OPTIONS]\n\n{lines}\n\nEach has its own --help. A file of"
+                " your own: feelahead/lab/README.md.\n"
             )
             return 0
         name, *rest = arguments
-        if name in self.questions or name.endswith(".py"):
-            return _ask(self.name, name, rest)
-        if name not in self.entries:
-            valid = ", ".join((*self.questions, *self.entries))
-            raise ConfigurationError(f"{self.name} {name!r}: no such {self.kind}; valid: {valid}")
-        entry = self.entries[name]
+        if name in self.questions:
+            return self._ask(f"feelahead.lab.questions.{name}", name, rest)
+        if not name.endswith(".py"):
+            valid = f"{', '.join(self.questions)}, or a question's file"
+            raise ConfigurationError(f"{self.name} {name!r}: no such question; valid: {valid}")
+        if not Path(name).is_file():
+            raise ConfigurationError(f"{self.name} {name}: there is no such file; valid: a question's file")
+        sys.path.insert(0, str(Path(name).absolute().parent))  # worker processes are given the same path
+        return self._ask(Path(name).stem, name, rest)
+
+    def _ask(self, module: str, name: str, arguments: Sequence[str]) -> int:
         try:
-            result: int = getattr(import_module(entry.module), entry.function)(rest)
+            sweep = import_module("feelahead.lab.sweep")
+            question = import_module(module).QUESTION
         except ModuleNotFoundError as error:
-            raise ConfigurationError(f"{self.name} {name}: {error.name} is not installed; {entry.remedy}") from error
-        return result
+            extras = self.questions.get(name, _OWN)
+            raise ConfigurationError(
+                f"{self.name} {name}: {error.name} is not installed; pip install 'feelahead[{extras}]'"
+            ) from error
+        except (AttributeError, SyntaxError) as error:
+            raise ConfigurationError(f"{self.name} {name}: {error}; valid: a file that holds a QUESTION") from error
+        code: int = sweep.ask(question, arguments)
+        return code
 
 
 def _sentence(name: str) -> str:
@@ -62,61 +63,26 @@ def _sentence(name: str) -> str:
     return text.partition("\n\n")[0].replace("\n", " ")
 
 
-def _ask(kind: str, name: str, arguments: Sequence[str]) -> int:
-    """Answer a question; ConfigurationError names the package that is missing."""
-    module = f"feelahead.lab.questions.{name}"
-    if name.endswith(".py"):
-        path = Path(name)
-        if not path.is_file():
-            raise ConfigurationError(f"{kind} {name}: there is no such file; valid: a question's file")
-        sys.path.insert(0, str(path.absolute().parent))  # a worker process is given the same
-        module = path.stem
-    try:
-        sweep = import_module("feelahead.lab.sweep")
-        question = import_module(module).QUESTION
-    except AttributeError as error:
-        raise ConfigurationError(f"{kind} {name}: {error}; valid: a file that holds a QUESTION") from error
-    except ModuleNotFoundError as error:
-        raise ConfigurationError(
-            f"{kind} {name}: {error.name} is not installed; it is in one of the extras robot, operator, experiments,"
-            " bench"
-        ) from error
-    code: int = sweep.ask(question, arguments)
-    return code
-
-
-_BOTH_SIDES = "pip install 'feelahead[robot,operator]'"
-
 bench = Menu(
     "bench",
-    "benchmark",
-    ("overlap", "felt", "link", "tick"),
     {
-        "error": Entry(
-            "feelahead.benchmarks.error.bench",
-            "bench_error",
-            "run time against error of the error propagation, and of the prediction of the gripper's way",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
-        "coverage": Entry(
-            "feelahead.benchmarks.coverage.bench",
-            "bench_coverage",
-            "how often full stiffness stands in time, and how often without need, for each law",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
+        "overlap": "robot,experiments,bench",
+        "error": "robot,operator,experiments",
+        "coverage": "robot,operator,experiments",
+        "felt": "robot,operator,experiments",
+        "link": "robot,operator",
+        "tick": "robot,operator",
     },
 )
-
 try_out = Menu(
     "try",
-    "experiment",
-    ("demo", "haptics", "latency", "faults", "hostile", "soak"),
     {
-        "approach": Entry(
-            "feelahead.experiments.approach.command",
-            "try_approach",
-            "a finger of constant force pulls the gripper towards things: does it hit them, and how fast",
-            "pip install 'feelahead[robot,operator,bench]'",
-        ),
+        "approach": "robot,operator,experiments",
+        "demo": "robot,operator",
+        "haptics": "robot,operator",
+        "latency": "robot,operator,experiments",
+        "faults": "robot,operator",
+        "hostile": "robot,operator",
+        "soak": "robot,operator",
     },
 )

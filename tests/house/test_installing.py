@@ -106,7 +106,7 @@ def test_what_works_without_extras(base: Path, tmp_path: Path, arguments: list[s
     [
         ("feelahead-robot", "pip install 'feelahead[robot]'"),
         ("feelahead demo --duration 1", "pip install 'feelahead[robot]'"),
-        ("feelahead bench overlap", "pip install 'feelahead[robot,bench]'"),
+        ("feelahead bench overlap", "pip install 'feelahead[robot,experiments,bench]'"),
         ("feelahead try haptics", "pip install 'feelahead[robot,operator]'"),
         ("feelahead-operator --device hid --duration 0.5", "hidapi"),
     ],

@@ -117,6 +117,7 @@ LIBRARIES = {
         "feelahead/lab",
         "feelahead/commands",
         "feelahead/containers",
+        "feelahead/lab",
         "feelahead/benchmarks",
         "feelahead/experiments",
     ),

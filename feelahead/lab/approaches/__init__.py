@@ -1,1 +1,1 @@
-"""A hand that pulls, a gripper that approaches, and whether it hits: what experiments and benchmarks share."""
+"""A hand that pulls and a gripper that approaches: runs, recordings, and their judgement, for several questions."""

@@ -21,6 +21,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import Pull, PullingHands, constant_force
+from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
@@ -29,7 +30,7 @@ from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
 @dataclass(frozen=True)
 class Approach:
-    """What is done; the seed draws the camera's, the encoders' and the link's errors."""
+    """The settings of one approach; the seed draws the camera's, the encoders' and the link's errors."""
 
     model: Path
     force_n: float
@@ -57,7 +58,7 @@ class Approach:
 
 
 class PullRun:
-    """Both sides, their link and a hand that pulls, from the start until whoever runs it has seen enough."""
+    """Both sides, their link and a hand that pulls, run step by step."""
 
     def __init__(
         self,
@@ -67,9 +68,10 @@ class PullRun:
         *,
         lets_go: bool = False,
     ) -> None:
-        """`pull`: instead of the constant force. shift_m (3,): the objects stand so far from where the scene has them.
+        """Build both sides in the scene, with every object moved by shift_m (3,).
 
-        `lets_go`: the hand lets go 0.25 s after it has felt full strength in the zone where its finger is.
+        `pull` replaces the constant force. `lets_go`: the hand lets go 0.25 s after it has felt full strength in the
+        zone of its finger.
         """
         self.approach = approach
         self.onset: ContactOnset | None = None
@@ -105,25 +107,25 @@ class PullRun:
 
     @property
     def tool_position_m(self) -> FloatArray:
-        """The true tool (3,) in the world frame."""
+        """Position (3,) of the true tool in the world frame."""
         position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
         return position
 
     @property
     def disarmed_because(self) -> str | None:
-        """Why the robot side stopped the arm; None while it has not."""
+        """The reason why the robot side stopped the arm; None while it has not."""
         safety = self.loopback.robot.session.safety
         return None if safety.state == "armed" or not safety.stops else safety.stops[-1][1]
 
     def arm(self) -> float:
-        """Go on until the pull begins; when that is. FeelaheadError where the robot is not armed in time."""
+        """Go on until the pull begins, and return that time; FeelaheadError where the robot is not armed in time."""
         began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
         if self.truth.touched:
             raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
         return began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:
-        """Go on until a contact, a stop or `until_s`, with a pause each 10 ms for the caller to look or to leave."""
+        """Go on until a contact, a stop or `until_s`; yield the time every 10 ms."""
         clock = self.loopback.clock
         while self.onset is None and self.disarmed_because is None and clock.now() < until_s:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
@@ -142,15 +144,17 @@ class PullRun:
             hands.let_go_s = now_s + REACTION_S
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
-            self.samples.time_s.append(now_s - hands.pull_began_s)
-            self.samples.speed_m_s.append(self.truth.approach()[1])
-            self.samples.gap_m.append(self.truth.gap_m(run.robot.held))
-            self.samples.travel.append(travel)
-            self.samples.strengths.append(strengths)
+            speed_m_s, gap_m = self.truth.approach()[1], self.truth.gap_m(run.robot.held)
+            self.samples.rows.append((now_s - hands.pull_began_s, speed_m_s, gap_m, travel, strengths))
+
+
+def compile_kernels() -> None:
+    """Compile every kernel that is not compiled yet, so that workers need not do it at the same time."""
+    warm_up(kernels=import_kernels())
 
 
 def robot_settings(approach: Approach) -> RobotSettings:
-    """The robot side of an approach; ConfigurationError for a model or a link that cannot be used."""
+    """Make the robot side's settings; ConfigurationError for a model or a link that cannot be used."""
     return RobotSettings(
         model=approach.model,
         site=approach.site,
@@ -167,7 +171,7 @@ def robot_settings(approach: Approach) -> RobotSettings:
 def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
     """Run it to its contact, or to its end; the same settings give the same outcome.
 
-    `pull`: instead of R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
+    `pull` replaces R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
     used; a robot that is not armed in time, or that touches before the pull, is an outcome that `failed`.
     """
     run = PullRun(approach, pull)
@@ -181,7 +185,7 @@ def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
 
 
 def time_to_goal_s(approach: Approach, pull: Pull, goal_m: float) -> float | None:
-    """How long the pull takes to bring the tool `goal_m` ahead; None where it touches, or is not there in time."""
+    """Measure how long the pull takes to bring the tool `goal_m` ahead; None where it touches or is late."""
     run = PullRun(approach, pull)
     began_s = run.arm()
     axis, start_m = run.truth.approach()[0], run.tool_position_m

@@ -1,4 +1,4 @@
-"""From the start of both sides until the hand pulls."""
+"""Arming: the time from the start of both sides until the hand pulls."""
 
 from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback
@@ -9,7 +9,7 @@ _LOOK_S = 0.01
 
 
 def wait_for_pull(run: Loopback, hands: PullingHands, link: str) -> float:
-    """Let time pass until the pull begins; when that is. FeelaheadError where the robot is not armed in time."""
+    """Run until the pull begins, and return that time; FeelaheadError where the robot is not armed in time."""
     while hands.pull_began_s is None:
         run.run_until(run.clock.now() + _LOOK_S)
         if run.clock.now() > LONGEST_ARMING_S:

@@ -1,11 +1,11 @@
-"""What must not change from one law to the next, lest their figures could not be compared: scenes, forces, limits.
+"""Scenes, forces and limits that must not change, lest the figures of two laws could not be compared.
 
 The scenes lie in tests/data; the forces of the simulated finger and the limits of the arm are those of commit 92ca53a.
 """
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -37,7 +37,7 @@ PASSED: Final = (
     *("wall_beside", "table_1_box", "table_2_boxes", "table_12_tetrahedra", "table_mesh"),
     *("cluttered", "terrain", "empty"),
 )
-"""Scenes in which it does not: what is felt there is a false alarm."""
+"""Scenes in which it does not; any strength there is a false alarm."""
 ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}
 """Scenes that a straight pull passes, and how far the sticks that move across and turn are deflected to end in a
 contact."""
@@ -47,7 +47,7 @@ _HASH_DIGITS = 12
 
 
 def frozen_scene(name: str) -> Path:
-    """The MJCF file of a frozen scene; ConfigurationError where the scenes are not there, as beside a wheel."""
+    """Return the MJCF file of a frozen scene; ConfigurationError where the scenes are not there, as beside a wheel."""
     path = SCENES / f"{name}.xml"
     if not path.is_file():
         names = ", ".join((*AHEAD, *ASIDE, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
@@ -55,8 +55,15 @@ def frozen_scene(name: str) -> Path:
     return path
 
 
+def scene_names(models: Iterable[Path]) -> dict[Path, str]:
+    """Name each scene by its file; by the whole path where several files have that name."""
+    known = list(dict.fromkeys(models))
+    stems = [model.stem for model in known]
+    return {model: model.stem if stems.count(model.stem) == 1 else str(model) for model in known}
+
+
 def frozen_values() -> dict[str, Any]:
-    """The forces of the simulated finger, and the limits of finger and arm, as the code has them now."""
+    """Collect the forces of the simulated finger and the limits of finger and arm, as the code has them now."""
     return {
         "finger": {
             "preload_n": SPRING_PRELOAD_N,
@@ -76,7 +83,7 @@ def frozen_values() -> dict[str, Any]:
 
 
 def frozen_hash(others: Sequence[Path] = ()) -> str:
-    """One hash of all frozen scenes and values; of the `others`, where a model is none of them, too."""
+    """Hash all frozen scenes and values, and those of `others` that are not frozen scenes."""
     digest = hashlib.sha256(json.dumps(frozen_values(), sort_keys=True).encode())
     foreign = sorted(path for path in others if path.parent.resolve() != SCENES)
     for path in [*sorted(SCENES.glob("*.xml")), *foreign]:

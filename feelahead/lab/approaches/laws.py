@@ -6,33 +6,33 @@ from common.protocol.messages import Compensation
 from robot_side.ahead.law import LawName
 
 Law = Literal["swept", "swept_robot", "paper", "margin", "none", "full"]
-"""swept: ways along each trigger, rendered over its travel (docs/feel.md), with the commands under way as the operator
-side knows them. swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the plain law (§4.2),
+"""swept: ways along each trigger, rendered over its travel (docs/feel.md), with the operator side's commands under way.
+swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the plain law (§4.2),
 the total overlap over a fixed share of the enlarged gripper. margin: the ways of swept, felt within a fixed distance at
 every speed. none: no haptics. full: always the strongest effect on both triggers, whatever is ahead."""
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
 
 
 def with_compensation(law: Law, compensation: Compensation) -> Law:
-    """`law`, with the delay reckoned by that side; of all laws only swept leaves the choice."""
+    """Choose the side that compensates the delay; only swept leaves the choice."""
     return "swept_robot" if law == "swept" and compensation == "robot" else law
 
 
 def without_compensation(law: Law) -> str:
-    """What --law calls it."""
+    """Return the name that --law has for it."""
     return "swept" if law == "swept_robot" else law
 
 
 def in_words(law: Law) -> str:
-    """As people are shown it."""
+    """Name the law for people."""
     return "swept, delay by the robot" if law == "swept_robot" else law
 
 
 def compensation_of(law: Law) -> Compensation:
-    """Whose reckoning of the delay is felt."""
+    """Return the side that compensates the delay."""
     return "robot" if law in ("swept_robot", "paper") else "operator"
 
 
 def law_of_robot(law: Law) -> LawName:
-    """What the robot side is set to."""
+    """Return the law that the robot side is set to."""
     return "paper" if law == "paper" else "swept"

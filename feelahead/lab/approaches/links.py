@@ -7,10 +7,15 @@ _LONGEST_LOOP_S = 2.0
 """Beyond this loop age the robot side is never armed (SafetySettings.max_delay_s)."""
 
 
+def mean_loop_s(spec: str, link_model: LinkModel) -> float:
+    """Add up the mean delays of both ways; ConfigurationError for a bad link."""
+    link = LinkSpec.parse(spec, 0, link_model)
+    return sum(link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
+
+
 def require_young_loop(spec: str, link_model: LinkModel) -> None:
     """Raise a ValueError for a link over which the robot side is never armed, ConfigurationError for a bad one."""
-    link = LinkSpec.parse(spec, 0, link_model)
-    loop_s = sum(link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
+    loop_s = mean_loop_s(spec, link_model)
     if loop_s >= _LONGEST_LOOP_S:
         raise ValueError(
             f"--link {spec!r}: a message and its answer take {loop_s:g} s; valid: below {_LONGEST_LOOP_S:g} s, beyond"

@@ -1,6 +1,6 @@
-"""What a hand does with the triggers and sticks over time, whatever it feels: forces in newtons, seeded.
+"""Motions of a hand on triggers and sticks over time: forces in newtons, seeded.
 
-A pull is open loop: the same one again, whatever stands in the way.
+A pull is open loop: it does not depend on the objects in the way.
 """
 
 import math
@@ -23,12 +23,12 @@ _LONGEST_S = 20.0
 
 
 def force_for(travel: float) -> float:
-    """The force in newtons that holds a free trigger at the calibrated `travel`, 0 to 1."""
+    """Return the force in newtons that holds a free trigger at the calibrated `travel`, 0 to 1."""
     return SPRING_PRELOAD_N + SPRING_RISE_N * SENSED_TRAVEL * _TRAVEL.raw(travel) if travel > 0.0 else 0.0
 
 
 def make_pull(kind: PullKind, seed: int) -> Pull:
-    """One pull of its kind, drawn from `seed`.
+    """Draw a pull of this kind from `seed`.
 
     steady: one travel between 0.25 and 1. bell: bell-shaped pulls of 0.7 to 1.4 s (minimum jerk), rests between.
     on_off: pressed for 0.3 to 0.7 s, let go for 0.2 to 0.5 s. random: travel that wanders between 0 and 1.

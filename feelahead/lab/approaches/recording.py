@@ -3,7 +3,9 @@
 The whole loopback runs, so that jitter, loss and the arm's own limits are in it.
 """
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,14 +25,14 @@ from robot_side.simulation.posed_scene import let_through
 from robot_side.simulation.scene import Scene, load_scene
 
 POSE_S = 0.01
-"""The true pose is noted this often."""
+"""The period at which the true pose is noted."""
 TICK_S = 0.001
-"""And what each side has of the other, this often."""
+"""The period at which the newest messages of both sides are noted."""
 
 
 @dataclass(frozen=True)
 class RecordedApproach:
-    """What happened on both sides, on the one virtual clock that both share; the pull begins at `began_s`."""
+    """A pull on both sides, on their one virtual clock; it begins at `began_s`."""
 
     pull: PullKind
     link: str
@@ -62,16 +64,16 @@ class RecordedApproach:
     """(c,) calibrated travel of R2 less that of L2, in that command"""
 
     def pose_row(self, time_s: float) -> int:
-        """The newest row of the poses at `time_s`, the first one before it."""
+        """Find the newest row of the poses at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.pose_time_s, time_s + 1e-9) - 1, 0, len(self.pose_time_s) - 1))
 
     def tick_row(self, time_s: float) -> int:
-        """The newest row of the ticks at `time_s`, the first one before it."""
+        """Find the newest row of the ticks at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.tick_time_s, time_s + 1e-9) - 1, 0, len(self.tick_time_s) - 1))
 
     def arrives_s(self, sent_s: float) -> float:
-        """When a command that was sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
-        # What is newest never gets older but for a gap, in which nothing is followed.
+        """Find when a command sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
+        # The newest command never gets older, but for a gap in which none is followed.
         newest = np.fmax.accumulate(np.where(np.isnan(self.applied_sent_s), -np.inf, self.applied_sent_s))
         row = int(np.searchsorted(newest, sent_s - 1e-9))
         return float(self.tick_time_s[row]) if row < len(newest) else float("inf")
@@ -111,63 +113,41 @@ def record_approach(
 
 
 class _Notes:
-    """What is noted after each turn of the robot side."""
+    """Notes taken after each turn of the robot side: rows by the names of the record's columns."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._poses: list[tuple[float, FloatArray, FloatArray, FloatArray, float]] = []
-        self._ticks: list[tuple[float, float, float, float, float, float]] = []
-        self._commands: list[tuple[float, float]] = []
-        self._applied = (float("nan"), float("nan"))
+        self._poses: list[dict[str, Any]] = []
+        self._ticks: list[dict[str, Any]] = []
+        self._commands: list[dict[str, Any]] = []
+        self._applied = (math.nan, math.nan)
 
     def take(self, run: Loopback, now_s: float) -> None:
-        """One turn."""
+        """Note one turn."""
         data, robot = self._scene.data, self._scene.robot
-        command = run.robot.session.safety.command
+        command, seen = run.robot.session.safety.command, run.operator.stiffness
         if command is None:
-            self._applied = (float("nan"), float("nan"))
+            self._applied = (math.nan, math.nan)
         elif command.header.sent_s != self._applied[0]:
             self._applied = (command.header.sent_s, now_s)
-        seen = run.operator.stiffness
-        seen_sent_s = float("nan") if seen is None else seen.header.sent_s
-        self._ticks.append((now_s, *self._applied, seen_sent_s, *run.device.travel))
-        number = len(self._ticks) - 1
+        number = len(self._ticks)
+        row = {"tick_time_s": now_s, "applied_sent_s": self._applied[0], "applied_at_s": self._applied[1]}
+        row["seen_sent_s"] = math.nan if seen is None else seen.header.sent_s
+        self._ticks.append(row | {"travel": run.device.travel})
         if number % round(MOTION_PERIOD_S / TICK_S) == 0 and (intent := run.operator.intent) is not None:
-            self._commands.append((now_s, intent.r2 - intent.l2))
+            self._commands.append({"command_time_s": now_s, "command": intent.r2 - intent.l2})
         if number % round(POSE_S / TICK_S) == 0:
-            self._poses.append(
-                (
-                    now_s,
-                    data.qpos[robot.arm_positions].copy(),
-                    data.qvel[robot.arm_velocities].copy(),
-                    data.qpos[robot.finger_positions].copy(),
-                    run.robot.loop_age_s(now_s),
-                )
-            )
+            row = {"pose_time_s": now_s, "loop_age_s": run.robot.loop_age_s(now_s)}
+            row["joint_positions_rad"] = data.qpos[robot.arm_positions].copy()
+            row["joint_velocities_rad_s"] = data.qvel[robot.arm_velocities].copy()
+            self._poses.append(row | {"finger_positions": data.qpos[robot.finger_positions].copy()})
 
     def record(self, pull: PullKind, link: str, seed: int, began_s: float) -> RecordedApproach:
-        """All of it from a second before the pull on."""
+        """Return the record from a second before the pull on; of commands also the earlier ones."""
         from_s = began_s - 1.0
-        times, positions, velocities, fingers, ages = zip(
-            *(row for row in self._poses if row[0] >= from_s), strict=True
-        )
-        ticks = np.array([row for row in self._ticks if row[0] >= from_s])
-        commands = np.array(self._commands)
-        return RecordedApproach(
-            pull=pull,
-            link=link,
-            seed=seed,
-            began_s=began_s,
-            pose_time_s=np.array(times),
-            joint_positions_rad=np.array(positions),
-            joint_velocities_rad_s=np.array(velocities),
-            finger_positions=np.array(fingers),
-            loop_age_s=np.array(ages),
-            tick_time_s=ticks[:, 0].copy(),
-            applied_sent_s=ticks[:, 1].copy(),
-            applied_at_s=ticks[:, 2].copy(),
-            seen_sent_s=ticks[:, 3].copy(),
-            travel=ticks[:, 4:6].copy(),
-            command_time_s=commands[:, 0].copy(),
-            command=commands[:, 1].copy(),
-        )
+        poses = [row for row in self._poses if row["pose_time_s"] >= from_s]
+        ticks = [row for row in self._ticks if row["tick_time_s"] >= from_s]
+        columns = {
+            name: np.array([row[name] for row in rows]) for rows in (poses, ticks, self._commands) for name in rows[0]
+        }
+        return RecordedApproach(pull=pull, link=link, seed=seed, began_s=began_s, **columns)

@@ -1,4 +1,4 @@
-"""Controllers that do not do what they are told: spoilt, to see that a figure notices, or always full."""
+"""Controllers that disobey: spoilt, to see that a figure notices, or always full."""
 
 from collections import deque
 from dataclasses import replace
@@ -9,7 +9,7 @@ from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 Spoil = Literal["nothing", "delayed", "swapped"]
-"""delayed: effects come 100 ms late. swapped: what is meant for one trigger is felt on the other."""
+"""delayed: effects come 100 ms late. swapped: each trigger has the other's effect."""
 _FULL = OutputReport(
     l2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT), r2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT)
 )
@@ -17,7 +17,7 @@ SPOILING_DELAY_S = 0.1
 
 
 class DelayedDualSense(SimulatedDualSense):
-    """Does what it is told 100 ms later."""
+    """A controller that follows 100 ms later."""
 
     def __init__(self, strength_step_n: float) -> None:
         super().__init__(strength_step_n=strength_step_n)
@@ -29,7 +29,7 @@ class DelayedDualSense(SimulatedDualSense):
         self._follow(now_s)
 
     def read(self, now_s: float) -> bytes | None:
-        """As any controller."""
+        """Read an input report."""
         self._follow(now_s)
         return super().read(now_s)
 
@@ -39,7 +39,7 @@ class DelayedDualSense(SimulatedDualSense):
 
 
 class SwappedDualSense(SimulatedDualSense):
-    """Feels L2 on R2 and R2 on L2."""
+    """A controller with the triggers' effects exchanged."""
 
     def write(self, output: OutputReport, now_s: float) -> None:
         """Do what it is told with the triggers' effects exchanged."""
@@ -47,7 +47,7 @@ class SwappedDualSense(SimulatedDualSense):
 
 
 class FullDualSense(SimulatedDualSense):
-    """Resists with the strongest effect everywhere, whatever it is told."""
+    """A controller that always resists with the strongest effect."""
 
     def write(self, output: OutputReport, now_s: float) -> None:
         """Do something else than it is told."""
@@ -55,14 +55,14 @@ class FullDualSense(SimulatedDualSense):
         super().write(_FULL, now_s)
 
     def read(self, now_s: float) -> bytes | None:
-        """As any controller; it resists from the first time on."""
+        """Read an input report; it resists from the first time on."""
         if self.released:
             super().write(_FULL, now_s)
         return super().read(now_s)
 
 
 def controller(strength_step_n: float, spoil: Spoil | Literal["full"] = "nothing") -> SimulatedDualSense:
-    """A simulated controller, spoilt as asked."""
+    """Make a simulated controller, spoilt as asked."""
     if spoil == "full":
         return FullDualSense(strength_step_n=strength_step_n)
     if spoil == "delayed":

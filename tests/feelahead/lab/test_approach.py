@@ -1,519 +1,330 @@
-"""Approaches to a wall, whose ends can be worked out by hand; and what is told of any approach."""
+"""`feelahead try approach` from its flags to its sentence, table, summary and figure; most runs are made up."""
 
-import functools
-import math
-from dataclasses import fields, replace
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from feelahead.lab.approaches.approach import Approach, PullRun, robot_settings, run_approach
-from feelahead.lab.approaches.frozen import ASIDE
-from feelahead.lab.approaches.laws import Law
-from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil, controller
-from operator_side.dualsense.effects.official import AnyEffect, MultiPositionFeedback, Off
-from operator_side.dualsense.reports.output_report import OutputReport
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
-from operator_side.simulated_person.pulling_hands import Hands
-from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from tests.helpers.felt import feedback
-from tests.helpers.repository import DATA
-
-pytestmark = pytest.mark.long
-
-approaches = pytest.mark.xdist_group("approaches")
-"""Run by one worker, so that each approach is made once."""
-REPEATABLE = settings(derandomize=True, deadline=None)
-WAY_MM = 320.0
-FAR = "delay 200ms"
-JITTER = "delay 20ms 10ms distribution normal"
-
-
-@functools.cache
-def ended(scene: str = "wall", force_n: float = 3.0, **changes: Any) -> Outcome:
-    return run_approach(Approach(DATA / f"{scene}.xml", force_n, **changes))
-
-
-def free_speed_mm_s(force_n: float) -> float:
-    """Of the trigger's travel against its spring alone, what is sensed, what of that counts, at 250 mm/s when full."""
-    sensed = min((force_n - 0.5) / 4.0 / 0.75, 1.0)
-    return 250.0 * min((sensed - 0.05) / (0.98 - 0.05), 1.0)
-
-
-# Onto a wall
-
-
-@approaches
-@pytest.mark.parametrize("link", ["", FAR])
-@pytest.mark.parametrize(("force_n", "known_mm_s"), [(3.0, 210.0), (2.0, 120.0)])
-def test_without_haptics_a_wall_is_hit_unbraked(force_n: float, known_mm_s: float, link: str) -> None:
-    outcome = ended(force_n=force_n, link=link, law="none")
-    assert (outcome.end, outcome.contact_with) == ("contact", "wall")
-    assert outcome.contact_speed_mm_s == pytest.approx(known_mm_s, abs=3.0)
-    assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(force_n), abs=3.0)
-    assert (outcome.stops_at_mm, outcome.way_left_mm, outcome.reversals) == (None, None, 0)
-
-
-@approaches
-@pytest.mark.parametrize("link", ["", FAR, f"{FAR} 10ms distribution normal"])
-def test_a_light_finger_stops_before_the_wall_whatever_the_delay(link: str) -> None:
-    outcome = ended(force_n=2.0, link=link)
-    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
-    assert outcome.stops_at_mm is not None
-    assert 10.0 < outcome.stops_at_mm < 20.0
-    assert outcome.way_left_mm == pytest.approx(outcome.stops_at_mm, abs=0.01)
-    # It comes to rest where it is nearest, and has slowed down once.
-    assert outcome.least_gap_mm == pytest.approx(outcome.stops_at_mm, abs=0.1)
-    assert outcome.reversals == 1
-    assert 1e3 * outcome.trace.speed_m_s.max() == pytest.approx(free_speed_mm_s(2.0), abs=3.0)
-
-
-@approaches
-@pytest.mark.parametrize("link", ["", FAR])
-def test_a_finger_that_overcomes_the_effect_touches_slowly_whatever_the_delay(link: str) -> None:
-    outcome = ended(link=link)
-    assert (outcome.end, outcome.contact_with) == ("contact", "wall")
-    assert outcome.contact_speed_mm_s is not None
-    assert 0.0 < outcome.contact_speed_mm_s <= 40.0
-    # 1 N is left of its force.
-    assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
-    assert outcome.reversals == 1
-
-
-def standing_off_mm(link: str) -> float:
-    outcome = run_approach(Approach(DATA / "wall.xml", 2.0, link=link))
-    assert outcome.stops_at_mm is not None
-    return outcome.stops_at_mm
-
-
-@approaches
-def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_prediction(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    known = load_prediction_errors(BUILT_IN)
-    as_known_mm = standing_off_mm(FAR)
-    path = tmp_path / "none.toml"
-    row = "loop_age_ms = 4\nmu_mm = 0\nsigma_mm = 0\n"
-    path.write_text(f"[[operator]]\n{row}[[robot]]\n{row}")
-    monkeypatch.setattr(
-        "feelahead.lab.approaches.approach.robot_settings",
-        lambda approach: replace(robot_settings(approach), prediction_errors=path),
-    )
-    near_mm, far_mm = standing_off_mm(""), standing_off_mm(FAR)
-    assert far_mm == pytest.approx(near_mm, abs=0.2)
-
-    def sigma_mm(mean_m: float, sd_m: float) -> float:
-        """D_σ of eq. 9-10, by a camera that errs by 3 mm and an arm that errs by much less."""
-        return 1e3 * (mean_m + NormalDist().inv_cdf(0.99) * math.hypot(0.003, sd_m))
-
-    wider_mm = sigma_mm(*known.at("operator", 0.404, 0.25)) - sigma_mm(0.0, 0.0)
-    assert 1.0 < wider_mm < 2.0
-    assert as_known_mm == pytest.approx(far_mm + wider_mm, abs=0.2)
-
-
-@approaches
-def test_by_the_robot_sides_reckoning_it_stops_as_well_and_farther_off() -> None:
-    at_once, late = (ended(force_n=2.0, link=link, law="swept_robot") for link in ("", FAR))
-    own = ended(force_n=2.0, link=FAR)
-    assert {at_once.end, late.end, own.end} == {"stopped"}
-    assert at_once.stops_at_mm is not None
-    assert late.stops_at_mm is not None
-    assert own.stops_at_mm is not None
-    assert at_once.stops_at_mm < 20.0
-    # What v t_d misses at 200 ms each way is enlarged by.
-    assert late.stops_at_mm > own.stops_at_mm + 20.0
-
-
-@approaches
-def test_a_margin_stops_it_so_far_off() -> None:
-    outcome = ended(force_n=2.0, law="margin", margin_m=0.05)
-    assert outcome.stops_at_mm is not None
-    # Where the ways are so short: D_σ and the ramp before the wall come on top.
-    assert 50.0 < outcome.stops_at_mm < 75.0
-
-
-@approaches
-def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> None:
-    assisted, alone = (ended(force_n=5.0, assist=assist, duration_s=3.5) for assist in ("speed", "none"))
-    assert (assisted.end, assisted.contact_with) == ("stopped", None)
-    assert assisted.least_gap_mm > 5.0
-    assert (alone.end, alone.contact_with) == ("contact", "wall")
-    assert alone.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
-
-
-@approaches
-def test_full_is_full_from_the_first_moment_on() -> None:
-    outcome = ended(law="full", duration_s=0.5)
-    assert outcome.end == "undecided"
-    assert (outcome.trace.strengths == 8).all()
-    assert 1e3 * outcome.trace.speed_m_s[-1] == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
-
-
-@approaches
-def test_a_stronger_effect_stops_the_same_finger_and_one_without_force_does_not_brake_it() -> None:
-    none, strong = (ended(strongest_n=strongest_n) for strongest_n in (0.0, 3.0))
-    assert none.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
-    assert strong.end == "stopped"
-
-
-@approaches
-def test_the_trace_tells_the_way_to_the_wall() -> None:
-    outcome = ended(link=FAR, law="none")
-    trace = outcome.trace
-    rows = len(trace.time_s)
-    assert [getattr(trace, one.name).shape for one in fields(Trace)] == [(rows,)] * 4 + [(rows, 10)]
-    assert trace.time_s[0] == 0.0
-    assert trace.time_s[-1] == outcome.ended_s
-    np.testing.assert_allclose(np.diff(trace.time_s)[:-1], SAMPLE_S, atol=1e-9)
-    # It begins 320 mm before the wall; the speed, added up, has brought it there.
-    assert 1e3 * trace.gap_m[0] == pytest.approx(WAY_MM, abs=0.1)
-    assert 1e3 * np.trapezoid(trace.speed_m_s, trace.time_s) == pytest.approx(WAY_MM, abs=1.0)
-    assert outcome.least_gap_mm == 1e3 * trace.gap_m.min()
-    assert -0.3 < outcome.least_gap_mm <= 0.0
-    # A finger of 3 N, felt by nobody but the spring.
-    assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
-    assert trace.strengths.max() == 0
-
-
-@approaches
-@pytest.mark.parametrize("strongest_n", [2.0, 3.0])
-def test_what_is_felt_is_in_the_trace(strongest_n: float) -> None:
-    trace = ended(strongest_n=strongest_n).trace
-    assert trace.strengths.dtype == np.int64
-    assert trace.strengths[0].max() == 0
-    assert trace.strengths.max() == 8
-    # A finger of 3 N that feels these strengths travels as the trace says, but for what changes within 10 ms; by the
-    # end it has gone back by this much.
-    trigger, travels = SimulatedTrigger(strongest_n / 8), []
-    trigger.set_finger_force(3.0)
-    for strengths in trace.strengths[:-1].tolist():
-        travels.append(trigger.travel)
-        trigger.set_effect(MultiPositionFeedback(tuple(strengths)))
-        trigger.advance(SAMPLE_S)
-    np.testing.assert_allclose(travels, trace.travel[:-1], atol=0.1)
-    assert trace.travel[-1] < (3.0 - 0.5) / 4.0 - 0.1 * strongest_n
-
-
-@approaches
-def test_what_is_gripped_counts_as_gripper() -> None:
-    outcome = ended("place_held", force_n=3.7, grip=True, law="none")
-    assert (outcome.end, outcome.contact_with) == ("contact", "table")
-    assert outcome.contact_speed_mm_s == pytest.approx(250.0, abs=3.0)
-    assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
-
-
-# Onto what a straight pull passes, what goes away, and what rises
-
-
-@approaches
-@pytest.mark.parametrize(
-    ("scene", "thing", "link", "stops_in_s"),
-    [
-        ("edge", "right_block", "", 4.0),
-        ("turn", "right_post", "", 4.5),
-        ("fleeing", "mover", "", 8.0),
-        ("terrain_ahead", "terrain", FAR, 4.5),
-    ],
-)
-def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_effect_touches_slowly(
-    scene: str, thing: str, link: str, stops_in_s: float
-) -> None:
-    stick, turn = ASIDE.get(scene, ((0.0, 0.0), (0.0, 0.0)))
-    light, strong = (
-        ended(scene, force_n, stick=stick, turn=turn, link=link, duration_s=stops_in_s) for force_n in (2.0, 3.0)
-    )
-    assert (light.end, light.contact_with) == ("stopped", None)
-    assert 5.0 < light.least_gap_mm < 25.0
-    assert (strong.end, strong.contact_with) == ("contact", thing)
-    assert strong.contact_speed_mm_s is not None
-    assert strong.contact_speed_mm_s <= 40.0
-
-
-@approaches
-@pytest.mark.parametrize(("stick", "turn", "moved_mm", "turned_rad"), [(1.0, 0.0, 150.0, 0.0), (0.0, 1.0, 0.0, 0.75)])
-def test_a_stick_to_the_right_leads_there_for_a_second_and_a_half(
-    stick: float, turn: float, moved_mm: float, turned_rad: float
-) -> None:
-    run = PullRun(Approach(DATA / "empty.xml", 0.0, stick=(stick, 0.0), turn=(turn, 0.0)))
-    began_s, start_m = run.arm(), run.tool_position_m
-    for _ in run.go_on(began_s + 2.5):
-        pass
-    # Its right is the world's -y, as it looks along x.
-    np.testing.assert_allclose(1e3 * (run.tool_position_m - start_m), [0.0, -moved_mm, 0.0], atol=5.0)
-    ahead = [math.cos(turned_rad), -math.sin(turned_rad), 0.0]
-    np.testing.assert_allclose(run.truth.approach()[0], ahead, atol=0.02)
-
-
-# Not onto it
-
-
-@approaches
-def test_who_does_not_pull_stops_where_they_are() -> None:
-    outcome = ended(force_n=0.0, duration_s=1.2)
-    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
-    assert outcome.stops_at_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.way_left_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.least_gap_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.reversals == 0
-    assert outcome.ended_s == pytest.approx(1.2)
-
-
-@approaches
-def test_who_still_moves_at_the_end_is_undecided() -> None:
-    outcome = ended(force_n=3.7, duration_s=0.5, link=JITTER)
-    assert outcome.end == "undecided"
-    assert (outcome.contact_speed_mm_s, outcome.stops_at_mm, outcome.way_left_mm) == (None, None, None)
-    assert 0.0 < outcome.least_gap_mm < WAY_MM
-
-
-@approaches
-def test_a_pull_of_ones_own_takes_the_place_of_the_force() -> None:
-    approach = Approach(DATA / "wall.xml", 3.7, duration_s=1.6)
-    outcome = run_approach(approach, lambda since_s: Hands(r2_n=2.0 if since_s < 0.2 else 0.0))
-    assert outcome.end == "stopped"
-    assert outcome.trace.travel.max() < (2.0 - 0.5) / 4.0
-    assert outcome.reversals == 1
-    assert outcome.stops_at_mm is not None
-    assert WAY_MM - 40.0 < outcome.stops_at_mm < WAY_MM - 10.0
-
-
-# The same again
-
-
-def numbers(outcome: Outcome) -> dict[str, Any]:
-    plain = {one.name: getattr(outcome, one.name) for one in fields(Outcome) if one.name != "trace"}
-    return plain | {one.name: getattr(outcome.trace, one.name).tolist() for one in fields(Trace)}
-
-
-def short(seed: int) -> dict[str, Any]:
-    return numbers(run_approach(Approach(DATA / "wall.xml", 3.7, duration_s=0.5, link=JITTER, seed=seed)))
-
-
-@approaches
-def test_a_seed_gives_the_same_outcome_and_another_one_another() -> None:
-    first = numbers(ended(force_n=3.7, duration_s=0.5, link=JITTER))
-    assert short(0) == first
-    assert short(1) != first
-
-
-@approaches
-@pytest.mark.parametrize("law", ["none", "swept"])
-def test_an_approach_does_not_depend_on_those_before_it(law: Law) -> None:
-    before = numbers(ended(link=FAR, law=law))
-    again = run_approach(Approach(DATA / "wall.xml", 3.0, link=FAR, law=law))
-    assert numbers(again) == before
-
-
-# What cannot be
-
-
-def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feelahead.lab.approaches.arming.LONGEST_ARMING_S", 3.0)
-    for changes, why in (
-        ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
-        ({"grip": True}, "grip"),
-    ):
-        failed = ended(**changes)
-        assert failed.end == "failed"
-        assert failed.why is not None
-        assert why in failed.why
-        assert failed.contact_speed_mm_s is failed.stops_at_mm is None
-
-
-def test_an_arm_that_safety_stops_has_not_been_stopped_by_the_law() -> None:
-    stopped = ended(link="outage 300ms at 2.3s", duration_s=3.0)
-    assert (stopped.end, stopped.stops_at_mm) == ("disarmed", None)
-    assert stopped.why is not None
-    assert "no command for" in stopped.why
-
-
-def test_a_model_or_a_site_that_is_not_there_is_named() -> None:
-    with pytest.raises(ConfigurationError, match="no_such_scene"):
-        ended("no_such_scene")
-    with pytest.raises(ConfigurationError, match="'pinch'"):
-        ended(site="pinch")
-
-
-# Reversals
-
-SPEEDS = st.lists(st.integers(-300, 300).map(lambda mm_s: mm_s / 1024.0), max_size=60)
-"""In binary fractions, so that adding and taking away is exact."""
-
-
-@pytest.mark.parametrize(
-    ("speeds_mm_s", "count"),
-    [
-        ([], 0),
-        ([100], 0),
-        ([0, 50, 100, 200, 210], 0),  # monotone
-        ([0, 100, 200, 200, 100, 0], 1),  # rises and stops
-        ([0, 200, 100, 200], 2),
-        ([0, 200, 0, 200, 0, 200, 0], 5),
-        ([0, 100, 90, 100, 90, 100, 90], 0),  # noise
-        ([100, 86, 100, 86, 100], 0),
-        ([100, 84, 100, 84, 100], 4),
-        ([0, 100, 95, 90, 85, 80], 1),  # little by little
-        ([200, 0], 1),  # it had risen before
-        ([0, -50], 1),
-        ([0, 100, 84, 98, 84, 98], 1),
-    ],
-)
-def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], count: int) -> None:
-    assert reversals([1e-3 * one for one in speeds_mm_s]) == count
-
-
-def test_a_limit_cycle_has_two_reversals_each_time() -> None:
-    times_s = np.arange(0.0, 4.0, SAMPLE_S)
-    cycle = 0.1 + 0.03 * np.sin(2.0 * math.pi * 2.0 * times_s)
-    assert reversals(cycle.tolist()) == pytest.approx(2 * 2 * 4, abs=1)
-    calm = 0.1 + 0.007 * np.sin(2.0 * math.pi * 2.0 * times_s)
-    assert reversals(calm.tolist()) == 0
-    assert reversals(calm.tolist(), swing_m_s=0.01) == pytest.approx(2 * 2 * 4, abs=1)
-
-
-@given(SPEEDS, st.integers(-1024, 1024))
-@REPEATABLE
-def test_a_constant_speed_on_top_changes_no_count(speeds_m_s: list[float], offset: int) -> None:
-    assert reversals([one + offset / 1024.0 for one in speeds_m_s]) == reversals(speeds_m_s)
-
-
-@given(SPEEDS, st.integers(1, 5))
-@REPEATABLE
-def test_speeds_that_last_longer_change_no_count(speeds_m_s: list[float], times: int) -> None:
-    assert reversals([one for one in speeds_m_s for _ in range(times)]) == reversals(speeds_m_s)
-
-
-@given(SPEEDS, st.integers(0, 60), st.floats(0.0, 1.0))
-@REPEATABLE
-def test_a_speed_between_its_neighbours_changes_no_count(speeds_m_s: list[float], place: int, part: float) -> None:
-    if len(speeds_m_s) < 2:
-        return
-    place = min(place, len(speeds_m_s) - 2)
-    low, high = sorted(speeds_m_s[place : place + 2])
-    between = min(max(low + part * (high - low), low), high)
-    assert reversals([*speeds_m_s[: place + 1], between, *speeds_m_s[place + 1 :]]) == reversals(speeds_m_s)
-
-
-@given(SPEEDS, st.floats(0.001, 0.1), st.floats(0.001, 0.1))
-@REPEATABLE
-def test_a_larger_swing_is_seen_no_more_often(speeds_m_s: list[float], one: float, other: float) -> None:
-    assert reversals(speeds_m_s, max(one, other)) <= reversals(speeds_m_s, min(one, other))
-
-
-@given(SPEEDS)
-@REPEATABLE
-def test_upside_down_there_is_at_most_one_more_or_less(speeds_m_s: list[float]) -> None:
-    assert abs(reversals(speeds_m_s) - reversals([-one for one in speeds_m_s])) <= 1
-
-
-# Standing
-
-
-def trace_of(speeds_m_s: list[float]) -> Trace:
-    rows = len(speeds_m_s)
-    still = np.zeros(rows)
-    return Trace(
-        np.linspace(0.0, SAMPLE_S * (rows - 1), rows),
-        np.array(speeds_m_s),
-        still,
-        still,
-        np.zeros((rows, 10), dtype=np.int64),
+from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, frozen_hash
+from feelahead.lab.approaches.laws import LAWS
+from feelahead.lab.approaches.outcome import End, Outcome, Trace
+from feelahead.lab.figures import LAW_COLOURS
+from feelahead.lab.questions import approach as module
+from feelahead.lab.questions.approach import QUESTION, ApproachSettings, comparison, figures, sentence
+from feelahead.lab.sweep import ask
+from feelahead.lab.table import Table
+from tests.helpers.repository import DATA, ROOT
+
+WALL = str(DATA / "wall.xml")
+SEVERAL = ("swept", "swept_robot", "paper", "none", "full")
+
+
+def outcome(end: End = "contact", figure: float = 150.0, turns: int = 1) -> Outcome:
+    """Make up an outcome: a contact at `figure` mm/s, or a stop `figure` mm off."""
+    hits, stops = end == "contact", end == "stopped"
+    return Outcome(
+        end=end,
+        contact_speed_mm_s=figure if hits else None,
+        contact_with="wall" if hits else None,
+        least_gap_mm=-0.1 if hits else figure,
+        stops_at_mm=figure if stops else None,
+        way_left_mm=figure + 1.0 if stops else None,
+        reversals=turns,
+        ended_s=0.02,
+        trace=Trace(
+            time_s=np.array([0.0, 0.01, 0.02]),
+            speed_m_s=np.array([0.0, 0.1, 0.15]),
+            gap_m=np.array([0.3, 0.2, 0.0]),
+            travel=np.array([0.0, 0.3, 0.5]),
+            strengths=np.tile(np.arange(10) % 9, (3, 1)),
+        ),
     )
 
 
+class MadeUp:
+    """Stands in for the runs, and remembers which ones were asked for."""
+
+    def __init__(self) -> None:
+        self.asked: list[Approach] = []
+        self.ends: dict[float, Outcome] = {}
+        """Outcomes by force; a contact for all others."""
+
+    def run(self, approach: Approach) -> Outcome:
+        self.asked.append(approach)
+        return self.ends.get(approach.force_n, outcome())
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> MadeUp:
+    made_up = MadeUp()
+    monkeypatch.setattr(module, "run_approach", made_up.run)
+    return made_up
+
+
+def tried(*arguments: str) -> int:
+    return ask(QUESTION, ["--workers", "1", *arguments])
+
+
+def row(approach: Approach, ended: Outcome) -> dict[str, Any]:
+    columns = {name: value for name, value in vars(approach).items() if name != "model"}
+    return columns | {"model": str(approach.model)} | figures(approach, ended)
+
+
+# Runs
+
+
+def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
+    arguments = "--force 2.5 --site grip --strongest-effect 3 --link-model stream --law paper --probability 0.9"
+    more = "--duration 4 --seed 7 --grip --spoil swapped --stick 0.5 -0.5 --turn 0 1 --assist speed --camera-mm 1"
+    assert tried("--model", WALL, "--link", "delay 5ms", *arguments.split(), *more.split()) == 0
+    assert runs.asked == [
+        Approach(
+            model=Path(WALL),
+            force_n=2.5,
+            site="grip",
+            strongest_n=3.0,
+            link="delay 5ms",
+            link_model="stream",
+            law="paper",
+            probability=0.9,
+            duration_s=4.0,
+            seed=7,
+            grip=True,
+            spoil="swapped",
+            stick=(0.5, -0.5),
+            turn=(0.0, 1.0),
+            assist="speed",
+            camera_sd_m=0.001,
+        )
+    ]
+
+
 @pytest.mark.parametrize(
-    ("last_m_s", "seconds", "standing"),
+    ("flags", "laws"),
     [
-        (0.0, 1.02, True),
-        (0.00099, 1.02, True),
-        (-0.00099, 1.02, True),
-        (0.0011, 1.02, False),
-        (-0.0011, 1.02, False),
-        (0.0, 0.9, False),  # not for long enough
+        ("", "swept"),
+        ("--compensation operator robot", "swept swept_robot"),
+        # The paper's law has eq. 8 on either side, and without a field there is nothing to compensate.
+        ("--law paper --compensation operator robot", "paper"),
+        ("--law none full --compensation robot", "none full"),
+        ("--law none swept paper --compensation robot operator", "none swept_robot swept paper"),
+        ("--law swept paper --no-haptics", "none"),
     ],
 )
-def test_the_gripper_stands_when_it_has_been_slow_for_a_second(
-    last_m_s: float, seconds: float, *, standing: bool
+def test_compensation_doubles_the_law_that_leaves_the_choice(runs: MadeUp, flags: str, laws: str) -> None:
+    assert tried("--model", WALL, *flags.split()) == 0
+    assert [one.law for one in runs.asked] == laws.split()
+
+
+def test_without_a_model_every_frozen_scene_that_is_ahead_is_tried(runs: MadeUp) -> None:
+    assert tried() == 0
+    assert [one.model.stem for one in runs.asked] == [*AHEAD, *ASIDE]
+    aside = {one.model.stem: (one.stick, one.turn) for one in runs.asked if (one.stick, one.turn) != ((0, 0), (0, 0))}
+    assert aside == ASIDE
+    assert [one.model.stem for one in runs.asked if one.grip] == ["place_held"]
+
+
+def test_values_are_combined_and_seeds_counted(runs: MadeUp) -> None:
+    many = "--force 2 3 --law swept none --strongest-effect 1.5 2 --seeds 3 --seed 4"
+    assert tried("--model", WALL, str(DATA / "plate.xml"), "--link", "", "delay 5ms", *many.split()) == 0
+    assert len(runs.asked) == len(set(runs.asked)) == 2**5 * 3
+    assert {one.seed for one in runs.asked} == {4, 5, 6}
+
+
+# Results
+
+
+def test_one_run_is_a_sentence_and_its_own_summary(
+    runs: MadeUp, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert stands(trace_of([0.2] * 100 + [last_m_s] * round(seconds / SAMPLE_S))) is standing
+    path = tmp_path / "summary.json"
+    assert tried("--model", WALL, "--force", "3", "--link", "delay 200ms", "--no-haptics", "--summary", str(path)) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "3 N in wall, law none: touches wall at 150 mm/s after 0.02 s; least gap -0.1 mm, reversals 1" in said
+    summary: dict[str, Any] = json.loads(path.read_text())
+    contact = {"end": "contact", "contact_speed_mm_s": 150.0, "contact_with": "wall", "least_gap_mm": -0.1}
+    known = contact | {
+        "model": WALL,
+        "site": "tool",
+        "force_n": 3.0,
+        "strongest_n": 2.0,
+        "link": "delay 200ms",
+        "link_model": "datagram",
+        "law": "none",
+        "haptics": False,
+        "compensation": "operator",
+        "probability": 0.99,
+        "duration_s": 8.0,
+        "seed": 0,
+        "grip": False,
+        "spoil": "nothing",
+        "stops_at_mm": None,
+        "way_left_mm": None,
+        "reversals": 1,
+        "ended_s": 0.02,
+        "frozen": frozen_hash(),
+    }
+    assert {key: summary.get(key) for key in known} == known
+    assert summary["trace"].keys() == {"time_s", "speed_m_s", "gap_m", "travel", "strengths"}
+    assert summary["trace"]["speed_m_s"] == [0.0, 0.1, 0.15]
+    assert [len(strengths) for strengths in summary["trace"]["strengths"]] == [10, 10, 10]
+    assert len(runs.asked) == 1
 
 
-def test_one_twitch_within_the_last_second_is_no_standing() -> None:
-    for ago_s, standing in ((0.02, False), (0.95, False), (1.05, True)):
-        speeds = [0.0] * 300
-        speeds[-1 - round(ago_s / SAMPLE_S)] = 0.002
-        assert stands(trace_of(speeds)) is standing
+def test_several_runs_are_a_table_a_list_and_a_figure(
+    runs: MadeUp, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, picture = tmp_path / "summary.json", tmp_path / "picture.svg"
+    runs.ends[2.0] = outcome("stopped", 5.0)
+    laws = "--law swept paper none full --compensation operator robot --force 2 3 --link"
+    files = ("--summary", str(path), "--picture", str(picture))
+    assert tried("--model", WALL, *laws.split(), "", "delay 50ms", *files) == 0
+    summary = json.loads(path.read_text())
+    assert summary.keys() == {"runs", "frozen"}
+    stops = [5.0 if one.force_n == 2.0 else None for one in runs.asked]
+    assert [one["stops_at_mm"] for one in summary["runs"]] == stops
+    said = {(one["law"], one["compensation"], one["haptics"]) for one in summary["runs"]}
+    assert {("swept", "operator", True), ("swept", "robot", True), ("none", "operator", False)} < said
+    text = capsys.readouterr().out
+    assert "150 mm/s" in text
+    assert frozen_hash() in text
+    drawn = picture.read_text()
+    assert all(LAW_COLOURS[law] in drawn for law in SEVERAL)
+    assert len({LAW_COLOURS[law] for law in LAWS}) == len(LAWS)
 
 
-def test_a_run_of_less_than_a_second_stands_never() -> None:
-    assert not stands(trace_of([0.0] * 50))
-    assert stands(trace_of([0.0] * 101))
+@pytest.mark.parametrize("end", ["undecided", "failed", "disarmed"])
+def test_an_end_that_says_nothing_of_the_law_fails_and_is_drawn_as_well(runs: MadeUp, tmp_path: Path, end: End) -> None:
+    runs.ends[2.0] = outcome(end, 80.0)
+    for forces in (("2",), ("2", "3")):
+        picture = tmp_path / f"{len(forces)}.png"
+        assert tried("--model", WALL, "--force", *forces, "--picture", str(picture)) == 1
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    assert tried("--model", WALL, "--force", "3") == 0
 
 
-# Controllers
+@pytest.mark.usefixtures("runs")
+def test_the_hash_covers_a_model_of_ones_own(tmp_path: Path) -> None:
+    mine, path = tmp_path / "mine.xml", tmp_path / "summary.json"
+    mine.write_text("<mujoco/>")
+    assert tried("--model", str(mine), "--summary", str(path)) == 0
+    assert json.loads(path.read_text())["frozen"] == frozen_hash([mine]) != frozen_hash()
 
 
-def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
-    return device.effects
+def test_each_end_has_its_sentence_and_names_are_printed_as_they_are() -> None:
+    approach = Approach(Path("some/wall.xml"), 3.0, law="none")
+    assert "stops 5.0 mm off (6.0 mm along the approach)" in sentence(row(approach, outcome("stopped", 5.0)))
+    assert "undecided" in sentence(row(approach, outcome("undecided")))
+    [shown] = module.show(ApproachSettings(), Table([row(approach, outcome()) | {"contact_with": "[red]wall"}]))
+    assert "touches [red]wall at" in str(shown)
 
 
-def pressed(device: SimulatedDualSense, force_n: float, now_s: float) -> tuple[float, float]:
-    """The travels of both triggers, long after both are pressed."""
-    device.set_finger_force(force_n, force_n)
-    device.read(now_s)
-    return device.travel
+def test_the_table_counts_how_runs_ended() -> None:
+    ends = [outcome(figure=140.0), outcome(figure=150.0), outcome("stopped", 5.0), outcome("undecided", turns=9)]
+    paths = [Path(folder, "wall.xml") for folder in ("near", "far")]
+    shown = comparison(Table(row(Approach(path, 3.0), end) for path in paths for end in ends))
+    assert [column.header for column in shown.columns] == ["scene", "link", "N", "swept"]
+    # Scenes of one name in two folders are two rows.
+    assert [str(text) for text in shown.columns[0].cells] == ["near/wall.xml", "far/wall.xml"]
+    counted = "2/4 at 145 [140 to 150] mm/s, 1/4 stop 5.0 mm off, 1/4 ?, R 9"
+    assert [str(text) for text in shown.columns[-1].cells] == [counted, counted]
 
 
-@pytest.mark.parametrize("spoil", ["nothing", "delayed", "swapped"])
-@pytest.mark.parametrize("strongest_n", [0.0, 1.0, 2.0])
-def test_the_strongest_effect_is_what_the_trigger_resists(strongest_n: float, spoil: Spoil) -> None:
-    device = controller(strongest_n / 8, spoil)
-    device.read(0.0)
-    for effect, resisted_n in ((feedback(0, 8), strongest_n), (feedback(0, 4), strongest_n / 2), (Off(), 0.0)):
-        now_s = device.write_count + 1.0
-        device.write(OutputReport(l2=effect, r2=effect), now_s)
-        pressed(device, 3.0, now_s + 0.2)
-        travels = pressed(device, 3.0, now_s + 0.9)
-        assert travels == pytest.approx([(3.0 - 0.5 - resisted_n) / 4.0] * 2, abs=1e-3)
+@pytest.mark.parametrize(
+    ("arguments", "named", "valid"),
+    [
+        (["--force", "3", "inf"], "force[1] = inf", "0 to 20"),
+        (["--force=-1"], "force[0] = -1", "0 to 20"),
+        (["--strongest-effect", "nan"], "strongest_effect[0] = nan", "0 to 20"),
+        (["--force"], "--force", "one value or more"),
+        (["--link", "dealy 5ms"], "dealy", "delay"),
+        (["--link", "to_robot: delay 1500ms; to_operator: delay 600ms"], "2.1 s", "below 2 s"),
+        (["--law", "swept_robot"], "swept_robot", "swept"),
+        (["--probability", "1"], "probability = 1", "above 0 and below 1"),
+        (["--duration", "0"], "duration = 0", "0.05 to 1000"),
+        (["--stick", "1", "0.1"], "--stick (1.0, 0.1)", "at most 1 long"),
+        (["--turn", "nan", "0"], "--turn (nan, 0.0)", "at most 1 long"),
+        (["--picture", "out.xyz"], "out.xyz", "png"),
+        (["--model", WALL, "no_such.xml"], "no_such.xml: there is no such file", "MJCF"),
+    ],
+)
+def test_bad_input_is_one_line_before_anything_runs(runs: MadeUp, arguments: list[str], named: str, valid: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        tried(*arguments, *(() if "--model" in arguments else ("--model", WALL)))
+    text = str(refused.value)
+    assert "\n" not in text
+    assert "Settings" not in text
+    assert named in text
+    assert valid in text
+    assert runs.asked == []
 
 
-def test_an_unspoilt_controller_does_at_once_what_it_is_told() -> None:
-    device = controller(0.25)
-    device.read(0.0)
-    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
-    assert felt(device) == (Off(), feedback(3, 6))
+# Whole sweeps, in other processes
+
+SCENES = ("--model", WALL, str(DATA / "post.xml"))
+GRID = (*SCENES, "--force", "2", "3", "--link", "", "delay 20ms 5ms", "--duration", "0.1")
+WAIT_S = 600.0
 
 
-def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
-    device = controller(0.25, "delayed")
-    device.read(0.0)
-    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
-    device.write(OutputReport(r2=feedback(2, 1), l2=feedback(1, 1)), 0.05)
-    after_ms = {}
-    for milliseconds in range(51, 200):
-        device.read(1e-3 * milliseconds)
-        after_ms[milliseconds] = felt(device)
-    assert SPOILING_DELAY_S == 0.1
-    assert after_ms[109] == (Off(), Off())
-    assert after_ms[111] == after_ms[149] == (Off(), feedback(3, 6))
-    assert after_ms[151] == after_ms[199] == (feedback(1, 1), feedback(2, 1))
+def started(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-P", "-m", "feelahead.main", "try", "approach", *GRID, *arguments]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
-def test_a_swapped_controller_does_it_on_the_other_trigger() -> None:
-    device = controller(0.25, "swapped")
-    device.read(0.0)
-    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
-    assert felt(device) == (feedback(3, 6), Off())
-    device.write(OutputReport(l2=feedback(1, 1), r2=Off()), 0.02)
-    assert felt(device) == (Off(), feedback(1, 1))
-    # Telling one of them leaves the other as it is.
-    device.write(OutputReport(r2=feedback(5, 5)), 0.03)
-    assert felt(device) == (feedback(5, 5), feedback(1, 1))
+def workers_of(driver: subprocess.Popen[str]) -> list[int]:
+    children = Path(f"/proc/{driver.pid}/task/{driver.pid}/children").read_text().split()
+    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def wait_for_rows(journal: Path, least: int, driver: subprocess.Popen[str]) -> None:
+    until_s = time.monotonic() + WAIT_S
+    while not journal.exists() or journal.read_bytes().count(b"\n") <= least:
+        assert driver.poll() is None, driver.communicate()[0]
+        assert time.monotonic() < until_s
+        time.sleep(0.02)
+
+
+def is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.processes
+@pytest.mark.long
+def test_workers_and_kills_change_no_byte_of_the_table(tmp_path: Path) -> None:
+    one, several, journal = tmp_path / "one.csv", tmp_path / "several.csv", tmp_path / "journal.jsonl"
+    assert tried(*GRID, "--csv", str(one)) == 1  # nothing is decided after 0.1 s
+    assert len(one.read_text().splitlines()) == 1 + 2**3
+
+    again = ("--workers", "2", "--resume", str(journal), "--csv", str(several))
+    driver = started(*again)
+    wait_for_rows(journal, 1, driver)
+    os.kill(workers_of(driver)[0], signal.SIGKILL)  # the driver starts another pool
+    wait_for_rows(journal, 4, driver)
+    orphans = workers_of(driver)
+    driver.kill()
+    driver.communicate()
+    assert not several.exists()
+    before = journal.read_bytes().splitlines()
+
+    resumed = started(*again)
+    said, _ = resumed.communicate(timeout=WAIT_S)
+    assert resumed.returncode == 1, said
+    assert several.read_bytes() == one.read_bytes()
+    lines = journal.read_bytes().splitlines()
+    assert lines[: len(before) - 1] == before[:-1]
+    keys = [json.loads(line)["key"] for line in lines[1:]]
+    assert len(keys) == len(set(keys)) == 2**3
+    assert not any(map(is_alive, orphans))

@@ -30,33 +30,6 @@ def recorded() -> RecordedApproach:
 
 
 @recordings
-def test_every_array_is_as_long_as_said() -> None:
-    one = recorded()
-    assert (one.pull, one.link, one.seed) == ("steady", "delay 50ms", SEED)
-    poses, ticks = round((1.0 + DURATION_S) / POSE_S), round((1.0 + DURATION_S) / TICK_S)
-    assert len(one.pose_time_s) == pytest.approx(poses, abs=2)
-    assert len(one.tick_time_s) == pytest.approx(ticks, abs=2)
-    for name, columns in (("joint_positions_rad", 6), ("joint_velocities_rad_s", 6), ("finger_positions", 2)):
-        assert getattr(one, name).shape == (len(one.pose_time_s), columns)
-    assert one.loop_age_s.shape == one.pose_time_s.shape
-    for name in ("applied_sent_s", "applied_at_s", "seen_sent_s"):
-        assert getattr(one, name).shape == one.tick_time_s.shape
-    assert one.travel.shape == (len(one.tick_time_s), 2)
-    assert one.command.shape == one.command_time_s.shape
-
-
-@recordings
-def test_times_are_even_and_from_a_second_before_the_pull() -> None:
-    one = recorded()
-    np.testing.assert_allclose(np.diff(one.pose_time_s), POSE_S, atol=1e-9)
-    np.testing.assert_allclose(np.diff(one.tick_time_s), TICK_S, atol=1e-9)
-    np.testing.assert_allclose(np.diff(one.command_time_s), 0.004, atol=1e-9)
-    for times_s in (one.pose_time_s, one.tick_time_s):
-        assert times_s[0] == pytest.approx(one.began_s - 1.0, abs=POSE_S)
-        assert times_s[-1] == pytest.approx(one.began_s + DURATION_S, abs=POSE_S)
-
-
-@recordings
 def test_what_was_sent_arrives_one_delay_later() -> None:
     one = recorded()
     applied = ~np.isnan(one.applied_sent_s)
@@ -90,19 +63,6 @@ def test_a_command_reaches_the_arm_after_the_delay_and_later_ones_no_sooner() ->
 
 
 @recordings
-def test_rows_are_the_newest_at_a_time() -> None:
-    one = recorded()
-    assert [one.pose_row(float(one.pose_time_s[row])) for row in (0, 7, 100)] == [0, 7, 100]
-    assert one.pose_row(float(one.pose_time_s[7]) + 0.0099) == 7
-    assert one.pose_row(float(one.pose_time_s[7]) - 0.0001) == 6
-    assert one.tick_row(float(one.tick_time_s[70]) + 0.0009) == 70
-    assert one.tick_row(float(one.tick_time_s[70])) == 70
-    for row_of, times_s in ((one.pose_row, one.pose_time_s), (one.tick_row, one.tick_time_s)):
-        assert row_of(0.0) == 0
-        assert row_of(1e6) == len(times_s) - 1
-
-
-@recordings
 def test_the_hand_pulls_as_the_pull_says_and_the_command_follows_it() -> None:
     one = recorded()
     before, settled = one.tick_time_s < one.began_s - 0.004, one.tick_time_s > one.began_s + 0.5
@@ -114,17 +74,6 @@ def test_the_hand_pulls_as_the_pull_says_and_the_command_follows_it() -> None:
     commanded = one.command[one.command_time_s > one.began_s + 0.5]
     np.testing.assert_allclose(commanded, (sensed - 0.05) / (0.98 - 0.05), atol=0.005)
     assert one.command[one.command_time_s < one.began_s].max() == 0.0
-
-
-@recordings
-def test_each_command_is_the_hands_at_the_time_that_is_said() -> None:
-    """Sensed by the controller every 4 ms, and sent in the same instant."""
-    one = recorded()
-    rising = (one.command > 0.05) & (one.command < 0.6)
-    rows = [one.tick_row(float(time_s)) for time_s in one.command_time_s[rising]]
-    assert len(rows) >= 5
-    sensed = one.travel[rows, 1] / 0.75
-    np.testing.assert_allclose(one.command[rising], (sensed - 0.05) / (0.98 - 0.05), atol=0.005)
 
 
 @recordings
@@ -148,13 +97,6 @@ def test_the_recorded_pose_moves_on_through_the_wall() -> None:
         posed.put(positions, one.finger_positions[0], np.array([5.0, 0.0, 0.0]))
         places.append(5.0 - posed.gap_m(9.0))
     np.testing.assert_allclose(np.diff(places) / POSE_S, speed_m_s, rtol=0.03)
-
-
-@recordings
-def test_velocities_are_those_of_the_positions() -> None:
-    one = recorded()
-    means = 0.5 * (one.joint_velocities_rad_s[1:] + one.joint_velocities_rad_s[:-1])
-    np.testing.assert_allclose(np.diff(one.joint_positions_rad, axis=0) / POSE_S, means, atol=0.02)
 
 
 @recordings

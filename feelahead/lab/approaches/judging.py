@@ -1,4 +1,4 @@
-"""Whether full strength stood in time, and whether strength stood that nothing called for."""
+"""Criteria of coverage: full strength in time, its lateness, and false alarms."""
 
 import math
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S, REACTION_S
-from feelahead.benchmarks.coverage.collisions import shifted
-from feelahead.benchmarks.coverage.laws import Draw, FieldLaw
-from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.felt_by import Draw, FieldLaw
+from feelahead.lab.approaches.meeting import shifted
+from feelahead.lab.approaches.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import zone_of
@@ -22,23 +22,23 @@ from robot_side.simulation.posed_scene import PosedScene
 
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
-"""So much farther off than D_σ nothing calls for strength."""
+"""The clearance beyond D_σ from which on strength is a false alarm."""
 ALARM_STEP_S: Final = 0.02
 _LATE_STEP_S: Final = 0.01
 _R2 = 1
 _ASIDE = 1e-3
-"""Less than this, in metres and radians, is no motion aside."""
+"""Motion aside below this, in metres and radians, counts as none."""
 _TRAVEL = TriggerTravel()
 
 
 @dataclass(frozen=True)
 class Stood:
-    """What one law did for one draw."""
+    """The strength of one law for one draw."""
 
     covered: bool
     """Full strength stood in the zone that the finger reaches, 0.25 s before the last moment to let go."""
     strength: int
-    """What stood there then, 0 to 8."""
+    """The strength there then, 0 to 8."""
 
 
 def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
@@ -50,9 +50,9 @@ def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
 
 
 def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float) -> float:
-    """How much later than it is due full strength first stands in the zone under the finger; infinite for never.
+    """Measure how late full strength first stands in the zone under the finger; infinite for never.
 
-    Looked for every 10 ms, from 0.25 s before the last moment to let go until the touch.
+    Every 10 ms is looked at, from 0.25 s before the last moment to let go until the touch.
     """
     due_s = last_release_s - REACTION_S
     times = np.arange(due_s, touch_s, _LATE_STEP_S)
@@ -63,27 +63,27 @@ def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float)
 
 
 def reached_zone(replay: Replay, from_s: float, to_s: float) -> int:
-    """The deepest of the ten zones that R2 reaches between two moments."""
+    """Find the deepest of the ten zones that R2 reaches between two moments."""
     record = replay.record
     rows = slice(record.tick_row(from_s), record.tick_row(to_s) + 1)
     return zone_of(float(record.travel[rows, _R2].max()))
 
 
 def zone_speed_m_s(zone: int) -> float:
-    """What the middle of a zone commands: the calibrated travel there times the full speed."""
+    """Work out the speed that a zone's middle commands: the calibrated travel there times the full speed."""
     raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
     return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
 
 
 @dataclass(frozen=True)
 class Alarms:
-    """Strength of 4 or more under the finger that nothing called for."""
+    """Strength of 4 or more under the finger without a cause."""
 
     count: int
-    """Stretches of it."""
+    """Number of unbroken stretches."""
     alarm_s: float
     judged_s: float
-    """The pull's time in which R2 was pulled at all."""
+    """Time in which R2 was pulled."""
 
 
 def false_alarms(
@@ -118,7 +118,7 @@ def false_alarms(
 
 
 def _stays_clear(draw: Draw, posed: PosedScene, time_s: float, zone: int, margin_m: float) -> bool:
-    """Whether all stopping paths do, from where `posed` stands."""
+    """Tell whether all stopping paths from the pose in `posed` stay clear."""
     replay = draw.replay
     ahead_m = stopping_path_m(replay, time_s, zone)
     speed = zone_speed_m_s(zone)
@@ -132,14 +132,14 @@ def _stays_clear(draw: Draw, posed: PosedScene, time_s: float, zone: int, margin
 
 
 def stopping_path_m(replay: Replay, time_s: float, zone: int) -> float:
-    """How far the gripper goes if the finger stays in `zone` for 0.3 s more and then lets go."""
+    """Work out how far the gripper goes if the finger stays in `zone` for 0.3 s and then lets go."""
     speed = zone_speed_m_s(zone)
     braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(time_s))
     return max(0.0, replay.under_way_m(time_s)) + speed * HORIZON_S + braking_m
 
 
 def statistical_distance_m(draw: Draw, time_s: float, probability: float) -> float:
-    """D_σ(P) = max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)) (eq. 9-10 without the delay), the largest of the gripper's spheres."""
+    """Compute D_σ(P) = max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)) (eq. 9-10 without the delay), the largest of all spheres."""
     replay = draw.replay
     pose = replay.estimated[replay.record.pose_row(time_s)]
     covariances = position_covariance(pose.sphere_jacobians, replay.encoder_sigma_rad)

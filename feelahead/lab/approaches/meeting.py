@@ -1,22 +1,22 @@
-"""Where things are put so that a recorded approach meets them, and the last moment at which letting go avoids that."""
+"""Places of the objects in which a recorded approach meets them, and the last moment at which a release avoids that."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.benchmarks.coverage.replay import Replay
+from feelahead.lab.approaches.replay import Replay
 from robot_side.simulation.posed_scene import PosedScene
 
 _FASTEST_M_S = 0.45
-"""No part of the gripper is faster: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""
+"""Upper bound on the speed of any part of the gripper: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""
 _LEAST_STEP_S = 0.002
 _LEAST_START_GAP_M = 0.015
 _ACROSS_M = 0.01
-"""Things are put up to so far from where the scene has them, to each side and up or down."""
+"""The farthest that objects are moved across the approach, to each side and up or down."""
 _FARTHEST_M = 1.0
 _ALONG_M = 0.1
-"""And so far along the approach, where nothing is straight ahead."""
+"""The farthest that they are moved along the approach, where nothing is straight ahead."""
 _TRIES = 40
 
 
@@ -27,19 +27,13 @@ class Collision:
     shift_m: FloatArray
     """(3,) from where the scene has them, when the pull begins"""
     touch_s: float
-    """When the true gripper would touch, if the pull went on"""
+    """Time at which the true gripper would touch, if the pull went on"""
     last_release_s: float | None
-    """The last moment, on the operator side, at which letting go avoids it; None where no release does."""
-    speed_m_s: float = 0.0
-    """Of the objects, along the approach axis as the pull begins: below 0 they come nearer."""
-
-    def shift_at(self, replay: Replay, time_s: float) -> FloatArray:
-        """Where the objects stand (3,) at `time_s`, from where the scene has them."""
-        return shifted(self.shift_m, replay, self.speed_m_s, time_s)
+    """The last moment, on the operator side, at which a release avoids it; None where no release does."""
 
 
 def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float) -> FloatArray:
-    """`shift_m` (3,), and what objects of that speed have covered since the pull began."""
+    """Add to `shift_m` (3,) the way of objects of that speed since the pull began."""
     moved: FloatArray = shift_m + speed_m_s * max(time_s - replay.record.began_s, 0.0) * replay.axis
     return moved
 
@@ -49,8 +43,8 @@ def place(
 ) -> Collision | None:
     """Draw a place of the objects in which the approach collides, at an even chance for each part of the way.
 
-    The place lies where the tool gets, which drift and turning take aside. speed_m_s: see Collision.
-    None where that was not found after 40 draws, or the approach goes nowhere.
+    The place lies on the tool's way, drift and turning included. speed_m_s: of the objects, along the approach axis
+    as the pull begins; below 0 they come nearer. None where 40 draws found none, or the approach goes nowhere.
     """
     record = replay.record
     posed.put(*_pose(replay, record.began_s), np.zeros(3))
@@ -73,12 +67,12 @@ def place(
         touch_s = first_touch_s(replay, posed, shift_m, speed_m_s)
         if touch_s is not None:
             last_s = last_release_s(replay, posed, shift_m, touch_s, speed_m_s)
-            return Collision(shift_m, touch_s, last_s, speed_m_s)
+            return Collision(shift_m, touch_s, last_s)
     return None
 
 
 def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_m_s: float = 0.0) -> float | None:
-    """When the true gripper first touches the objects moved by `shift_m` (3,); None within the record."""
+    """Find when the true gripper first touches the objects moved by `shift_m` (3,); None within the record."""
     time_s = replay.record.began_s
     while time_s <= replay.end_s:
         posed.put(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
@@ -92,9 +86,9 @@ def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_
 def last_release_s(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, speed_m_s: float = 0.0
 ) -> float | None:
-    """The last moment at which letting go avoids the contact, to 2 ms; None where no release since the pull began does.
+    """Find the last moment, to 2 ms, at which a release avoids the contact; None where none since the pull began does.
 
-    How far a released arm gets never falls with the moment of release, as no pull here moves back.
+    Bisection: a later release never stops the arm earlier, as no pull here moves back.
     """
     early_s, late_s = replay.record.began_s, touch_s
     if not avoids(replay, posed, shift_m, touch_s, early_s, speed_m_s):
@@ -111,7 +105,7 @@ def last_release_s(
 def avoids(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float, speed_m_s: float = 0.0
 ) -> bool:
-    """Whether letting go at `released_s` leaves a gap when the arm rests."""
+    """Tell whether a release at `released_s` leaves a gap when the arm rests."""
     stopped = replay.stopped_joints(released_s)
     if stopped is None or stopped[0] >= touch_s:
         return False

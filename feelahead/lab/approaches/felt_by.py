@@ -1,4 +1,4 @@
-"""What each law puts on the triggers' zones at given moments of a recorded approach."""
+"""Strengths that each law puts on the triggers' zones at given moments of a recorded approach."""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,9 +9,9 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import Header, StiffnessUpdate
-from feelahead.benchmarks.coverage.replay import Replay
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.margin_law import MarginLaw
+from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
@@ -33,18 +33,18 @@ _FRAME_S: Final = 1.0 / 30.0
 
 @dataclass(frozen=True)
 class Draw:
-    """One approach to objects, as a camera with one draw of its error perceives them."""
+    """One approach to objects, perceived with one draw of the camera's error."""
 
     replay: Replay
     objects: PerceivedObjects
-    """When the pull begins"""
+    """The objects when the pull begins"""
     camera_sd_m: float
-    """What the robot side believes of the camera, which is the truth here."""
+    """The camera's deviation that the robot side assumes, which is the true one here."""
     speed_m_s: float = 0.0
-    """Of the objects, along the approach axis as the pull begins"""
+    """Speed of the objects, along the approach axis as the pull begins"""
 
     def objects_at(self, time_s: float) -> PerceivedObjects:
-        """The newest frame of a camera at `time_s`; the same one for objects that stand still."""
+        """Return the newest frame of a camera at `time_s`; the same one for objects that stand still."""
         if self.speed_m_s == 0.0:
             return self.objects
         since_s = math.floor(max(time_s - self.replay.record.began_s, 0.0) / _FRAME_S) * _FRAME_S
@@ -52,7 +52,7 @@ class Draw:
 
 
 def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
-    """All objects with this velocity (3,), which the camera knows, and where it has brought them."""
+    """Move all objects with this velocity (3,), which the camera knows."""
     way_m = velocity_m_s * after_s
     return replace(
         objects,
@@ -69,27 +69,27 @@ class FieldLaw(Protocol):
     """One law at one P."""
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at the operator side's moments times_s (t,), rising."""
+        """Compute strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at rising times (t,) of the operator side."""
         ...
 
 
 @dataclass(frozen=True)
 class Constant:
-    """The same strength in every zone, whatever happens: 0 for no haptics, 8 for always full."""
+    """A constant strength in every zone: 0 for no haptics, 8 for always full."""
 
     strength: int
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """As any law's."""
+        """Return the constant strength."""
         del draw
         return np.full((len(times_s), 2, ZONE_COUNT), self.strength, dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The shipped pipeline: the field by the pose before the message left, the zones by when they are felt.
+    """The shipped pipeline: the field by the pose before the message left, the zones by the time they are felt.
 
-    Between the moments asked for nothing is rendered, so that a strength falls as from one moment to the next.
+    Nothing is rendered between these times, so that a strength falls as from one to the next.
     """
 
     law: Law
@@ -99,7 +99,7 @@ class Pipeline:
     spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """As any law's."""
+        """Sense and render at each of these times."""
         record = draw.replay.record
         law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
         strengths = np.zeros((len(times_s), 2, ZONE_COUNT), dtype=np.int64)
@@ -142,7 +142,7 @@ class Pipeline:
         )
 
     def _under_way(self, replay: Replay, sensed: Sensed, row: int, now_s: float) -> Displacement | None:
-        """δ and w by the commands under way since the pose in `row`; None where the robot side's are felt."""
+        """Work out δ and w of the commands under way since the pose in `row`; None for the robot side's."""
         if compensation_of(self.law) == "robot":
             return None
         record, then_s = replay.record, float(replay.record.pose_time_s[row])
@@ -175,7 +175,7 @@ def _message(sensed: Sensed, row: int) -> StiffnessUpdate:
 
 
 def make_law(law: Law, probability: float, margin_m: float | None = None, spoil: Spoil = "nothing") -> FieldLaw:
-    """`law` at P. margin_m: the distance of `margin`, which the other laws do not look at."""
+    """Make `law` at P; margin_m is the distance of the law `margin` alone."""
     if law in ("none", "full"):
         return Constant(MAX_STRENGTH if law == "full" else 0)
     return Pipeline(law, probability, margin_m if law == "margin" else None, spoil)

@@ -1,4 +1,4 @@
-"""A recorded approach as both sides saw it: true motion, estimated poses, and when a release would have stopped it."""
+"""A recorded approach as both sides saw it: true motion, estimated poses, and where a release would have stopped it."""
 
 import math
 from functools import cached_property
@@ -23,23 +23,23 @@ from robot_side.simulation.scene import Scene
 
 _SLOW_M_S = 0.01
 _WHOLE_S = 1000.0
-"""Longer than any record."""
+"""A window longer than any record."""
 _ASKED_M_S = 0.05
 _STALLED_ROWS = 25
-"""An arm at half of what it is told for a quarter of a second is not just getting there."""
+"""An arm below half of the commanded speed for longer than this, 0.25 s, has reached its limits."""
 _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
-"""In the finger's time constants: from full travel to the dead zone it takes 3."""
+"""Upper bound in the finger's time constants; from full travel to the dead zone it takes 3."""
 _COASTING_STEPS = 100
 _LOOKED_S = 0.03
-"""Within this every place aside has been looked from: each is at least every 20 ms."""
+"""Time within which ways from every place aside are computed: each at least every 20 ms."""
 
 
 class Replay:
-    """One record with the encoders' errors drawn anew; times are those of the one virtual clock."""
+    """One record with new errors of the encoders; times are those of the one virtual clock."""
 
     def __init__(self, record: RecordedApproach, scene: Scene, encoder: EncoderSettings, seed: int) -> None:
-        """`scene`: any with the arm that was recorded, for its kinematics."""
+        """Take the kinematics from `scene`, any with the arm that was recorded."""
         self.record = record
         self.encoder = encoder
         self._kinematics = MujocoKinematics(scene)
@@ -51,9 +51,9 @@ class Replay:
         self.axis = axis
         """(3,) the approach axis when the pull begins, in the world frame"""
         self.moved_m: FloatArray = np.array([pose.tool_position_m - start_m for pose in true])
-        """(k, 3) where the true tool has got since the pull began, in the world frame"""
+        """(k, 3) displacement of the true tool since the pull began, in the world frame"""
         self.along_m: FloatArray = self.moved_m @ axis
-        """(k,) how far along that axis"""
+        """(k,) the same along that axis"""
         self.approach_speed_m_s: FloatArray = np.array(
             [
                 pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ record.joint_velocities_rad_s[row])
@@ -64,16 +64,16 @@ class Replay:
         self._jacobians = [pose.tool_jacobian for pose in true]
         self._axes = [pose.tool_rotation[:, 2] for pose in true]
         self.end_s = self._end_s()
-        """When the record ends, or the arm no longer does what it is told: at the edge of its reach."""
+        """The end of the record, or the time at which the arm reaches the edge of its reach."""
 
     @property
     def joints(self) -> int:
-        """How many joints the arm has."""
+        """Number of the arm's joints."""
         return len(self.record.joint_positions_rad[0])
 
     @cached_property
     def commands(self) -> CommandsUnderWay:
-        """All commands of the record, as their sender remembers them."""
+        """All commands of the record, in the operator side's memory."""
         commands = CommandsUnderWay(window_s=_WHOLE_S)
         for time_s, travel in zip(self.record.command_time_s, self.record.command, strict=True):
             commands.sent(float(time_s), float(travel))
@@ -81,13 +81,13 @@ class Replay:
 
     @cached_property
     def encoder_sigma_rad(self) -> FloatArray:
-        """(n,) what the robot side takes the encoders' errors for (eq. 3)"""
+        """(n,) standard deviations of the encoders that the robot side assumes (eq. 3)"""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad)
         return np.full(self.record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
-        """The gripper where noisy encoders, read every millisecond, put it, for each row of the poses."""
+        """The gripper estimated from noisy encoders that are read every millisecond, for each row of the poses."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
         estimate, found = JointEstimate(), []
         for row, until_s in enumerate(self.record.pose_time_s.tolist()):
@@ -114,7 +114,7 @@ class Replay:
         )
 
     def joints_at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """True joint positions and velocities (n,) at `time_s`, between the rows of the poses."""
+        """Interpolate the true joint positions and velocities (n,) at `time_s`."""
         record = self.record
         row = min(record.pose_row(time_s), len(record.pose_time_s) - 2)
         step_s = record.pose_time_s[row + 1] - record.pose_time_s[row]
@@ -126,10 +126,10 @@ class Replay:
         )
 
     def stopped_joints(self, released_s: float) -> tuple[float, float, FloatArray] | None:
-        """When a release at `released_s` on the operator side reaches the arm; when, and with which joints, that rests.
+        """Work out how the arm stops after a release at `released_s` on the operator side.
 
-        None where that is beyond the record. All joints slow down in proportion (`JointReference`), so that the arm
-        goes on along its present joint velocity.
+        Returns the time at which the release reaches the arm, the time at which it rests and the joints (n,) there;
+        None beyond the record. All joints slow down in proportion (`JointReference`), along their present velocity.
         """
         arrives_s = self.record.arrives_s(released_s)
         if arrives_s > self.end_s:
@@ -141,20 +141,20 @@ class Replay:
         return arrives_s, rests_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
 
     def aside(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """The true tool's velocity (3,) across its approach axis, and its turning (3,), at `time_s`; world frame."""
+        """Return the true tool's velocity (3,) across its approach axis and its turning (3,); world frame."""
         row = self.record.pose_row(time_s)
         twist = self._jacobians[row] @ self.record.joint_velocities_rad_s[row]
         axis = self._axes[row]
         return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
 
     def knows_aside(self, time_s: float) -> bool:
-        """Whether the operator side's newest report at `time_s` is of a tool that does move aside, if it ever does."""
+        """Tell whether the operator side's newest report at `time_s` knows of a motion aside, if there is one."""
         seen_s = float(self.record.seen_sent_s[self.record.tick_row(time_s)])
         return seen_s >= self._aside_seen_s
 
     @cached_property
     def _aside_seen_s(self) -> float:
-        """When the tool first went aside at half of what full sticks ask, and all places were looked from."""
+        """Time at which the tool first went aside at half of full sticks' speed, and all places were covered."""
         motion = self.motion
         for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
             across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))
@@ -163,13 +163,13 @@ class Replay:
         return -math.inf
 
     def under_way_m(self, time_s: float) -> float:
-        """How far the true tool still goes along the axis until the command that is sent at `time_s` arrives."""
+        """Measure how far the true tool goes along the axis until the command sent at `time_s` arrives."""
         arrives_s = min(self.record.arrives_s(time_s), self.end_s)
         times = self.record.pose_time_s
         return float(np.interp(arrives_s, times, self.along_m) - np.interp(time_s, times, self.along_m))
 
     def deceleration_m_s2(self, time_s: float) -> float:
-        """What the joints' limit gives along the approach axis in the pose at `time_s`."""
+        """Work out the deceleration along the approach axis that the joints' limits give in the pose at `time_s`."""
         row = self.record.pose_row(time_s)
         along = np.concatenate([_SLOW_M_S * self._axes[row], np.zeros(3)])
         unlimited = np.full(self._jacobians[row].shape[1], np.inf)
@@ -192,10 +192,10 @@ class Replay:
 
 
 def coasting_s(braking_s: float, travel: float, finger_s: float = FINGER_TIME_CONSTANT_S) -> float:
-    """For how long, at its present speed, an arm goes on as a finger that has let go comes back from `travel`, 0 to 1.
+    """Work out how long, at its present speed, an arm goes on after a finger at `travel`, 0 to 1, has let go.
 
-    The mechanical travel falls as exp(-t / finger_s), and what it commands ends with the dead zone. The arm's speed
-    falls by no more than 1 / braking_s of the present one in a second, so that it is the greater of the two.
+    The mechanical travel falls as exp(-t / finger_s), and its command ends with the dead zone. The arm's speed falls
+    by at most 1 / braking_s of the present one in a second, and is the greater of the two.
     """
     times = np.linspace(0.0, max(braking_s, _LONGEST_RETURN * finger_s), _COASTING_STEPS)
     commanded = np.array([_TRAVEL.travel(min(travel * math.exp(-t / finger_s) / SENSED_TRAVEL, 1.0)) for t in times])

@@ -1,1 +1,0 @@
-"""`feelahead bench error`: what the error propagation and the prediction of the commands under way miss."""

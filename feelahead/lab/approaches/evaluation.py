@@ -1,0 +1,275 @@
+"""Coverage and false alarms of one motion: approaches are recorded once, and judged for every cell, law and P.
+
+Covered: 0.25 s before the last moment to let go, full strength stood in the zone that the finger reaches until then.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Final
+
+import numpy as np
+from scipy.stats import bootstrap
+
+from common.arrays import FloatArray
+from common.reaction import HORIZON_S, REACTION_S
+from feelahead.lab.approaches.felt_by import Draw, FieldLaw, make_law
+from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
+from feelahead.lab.approaches.judging import false_alarms, lateness_s, stood
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.meeting import Collision, first_touch_s, place
+from feelahead.lab.approaches.pulls import PullKind
+from feelahead.lab.approaches.recording import record_approach
+from feelahead.lab.approaches.replay import Replay
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.table import Row
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.camera import CameraError
+from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.scene import Scene, load_scene
+
+LINKS: Final = {
+    "0 ms": "",
+    "50 ms": "delay 50ms 10ms distribution normal",
+    "100 ms": "delay 100ms 10ms distribution normal",
+    "200 ms": "delay 200ms 10ms distribution normal",
+    "400 ms": "delay 400ms 10ms distribution normal",
+    "200 ms, 5 % lost": "delay 200ms 10ms distribution normal loss 5%",
+}
+"""Each way."""
+_ALARM_APPROACHES: Final = 10
+"""False alarms are looked for in this many approaches where a contact is ahead, in all where none is."""
+_MOVING_M_S: Final = 0.01
+_RESAMPLED: Final = 2000
+_LEAST_APPROACHES: Final = 10
+"""A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One cell: a scene, and how its objects and the arm are drawn."""
+
+    scene: str
+    camera_mm: float = 3.0
+    encoder_factor: float = 1.0
+    """The encoders' errors, over those of the settings."""
+    speed_m_s: float = 0.0
+    """Speed of the objects, along the approach: below 0 they come nearer."""
+
+    @property
+    def shown(self) -> str:
+        """The scene, and how it moves."""
+        if self.speed_m_s == 0.0:
+            return self.scene
+        return f"{self.scene} {'fleeing' if self.speed_m_s > 0.0 else 'coming'} {1e3 * abs(self.speed_m_s):g} mm/s"
+
+    def key(self, pull: str, link: str) -> str:
+        """Name the cell, for --only."""
+        drawn = f"camera {self.camera_mm:g} mm", f"encoders x{self.encoder_factor:g}"
+        return "/".join((self.shown, pull, link, *drawn))
+
+
+@dataclass(frozen=True)
+class Pulls:
+    """One motion, recorded several times, with its cells."""
+
+    pull: PullKind
+    link: str
+    """A key of LINKS."""
+    home: str
+    """The scene whose home pose the approaches start from."""
+    cells: tuple[Placed, ...]
+    sizes: tuple[int, int]
+    """Number of approaches, and of places of the objects for each."""
+    probabilities: tuple[float, ...]
+    laws: tuple[Law, ...]
+    spoil: Spoil = "nothing"
+
+
+@dataclass
+class _Counts:
+    """Counts of one law at one P; `hits` and `draws` have an entry for each approach."""
+
+    hits: list[int] = field(default_factory=list)
+    draws: list[int] = field(default_factory=list)
+    reported: int = 0
+    reported_hits: int = 0
+    strength: int = 0
+    late_s: list[float] = field(default_factory=list)
+    alarms: int = 0
+    alarm_s: float = 0.0
+    judged_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Staged:
+    """One approach among the objects of one cell, in every place."""
+
+    replay: Replay
+    posed: PosedScene
+    collisions: tuple[Collision, ...]
+    """Empty where nothing collides: the objects then stand where the scene has them."""
+    sought: int
+    """Number of places that were looked for."""
+
+    @property
+    def avoidable(self) -> tuple[tuple[Collision, float], ...]:
+        """Collisions that some release avoids, with the last moment for it."""
+        return tuple((one, one.last_release_s) for one in self.collisions if one.last_release_s is not None)
+
+    def draw(self, shift_m: FloatArray, cell: Placed, number: int) -> Draw:
+        """Move the objects by shift_m (3,), seen with the camera's `number`-th error."""
+        record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
+        sd_m = 1e-3 * cell.camera_mm
+        errors_m = CameraError(names, 0.0, sd_m, 0.0, seed_of(record.seed, number)).next_frame()
+        self.posed.put(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
+        return Draw(self.replay, self.posed.perceived(errors_m), sd_m, cell.speed_m_s)
+
+
+def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
+    """Make a row for each cell, law and P; the same seed gives the same rows."""
+    approaches, places = pulls.sizes
+    records = [
+        record_approach(pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home)
+        for number in range(approaches)
+    ]
+    for cell in pulls.cells:
+        scene = _scene(cell.scene)
+        encoder = EncoderSettings(sigma_rad=cell.encoder_factor * EncoderSettings().sigma_rad)
+        staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
+        margin_m = mean_way_m([one.replay for one in staged]) if "margin" in pulls.laws else None
+        for probability in pulls.probabilities:
+            for name in pulls.laws:
+                counts, law = _Counts(), make_law(name, probability, margin_m, pulls.spoil)
+                _count_covered(counts, law, cell, staged, probability)
+                _count_alarms(counts, law, cell, staged, probability)
+                row: Row = {"kind": "cell", "cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
+                row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
+                row |= {"law": name, "probability": probability} | _figures(counts, staged, probability)
+                yield row | {"margin_mm": None if margin_m is None else 1e3 * margin_m}
+
+
+@cache
+def _scene(name: str) -> Scene:
+    return load_scene(frozen_scene(name), SITE)
+
+
+def seed_of(*numbers: int) -> int:
+    """Derive one seed from several numbers."""
+    return int(np.random.SeedSequence(numbers).generate_state(1)[0] >> 1)
+
+
+def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
+    posed = PosedScene(_scene(cell.scene))
+    if cell.scene in PASSED:
+        return _Staged(replay, posed, (), 0)
+    generator = np.random.default_rng([replay.record.seed, 0x71ACE])
+    found = [place(replay, posed, generator, cell.speed_m_s) for _ in range(places)]
+    return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
+
+
+def _count_covered(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+    """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
+    useful = [one for one in staged if one.avoidable]
+    least = math.ceil(draws_needed(probability) / max(1, len(useful)))
+    for one in useful:
+        # Every place as often as any other, at each P.
+        each = len(one.avoidable) * math.ceil(least / len(one.avoidable))
+        hits = 0
+        for number in range(each):
+            collision, last_release_s = one.avoidable[number % len(one.avoidable)]
+            draw = one.draw(collision.shift_m, cell, number)
+            judged = stood(law, draw, last_release_s)
+            hits += judged.covered
+            if one.replay.knows_aside(last_release_s - REACTION_S):
+                counts.reported += 1
+                counts.reported_hits += judged.covered
+            counts.strength += judged.strength
+            if number < len(one.avoidable):
+                late_s = 0.0 if judged.covered else lateness_s(law, draw, last_release_s, collision.touch_s)
+                counts.late_s.append(late_s)
+        counts.hits.append(hits)
+        counts.draws.append(each)
+
+
+def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+    passed = cell.scene in PASSED
+    for one in staged if passed else staged[:_ALARM_APPROACHES]:
+        places = [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
+        if passed:
+            # A drift or a turn may touch what a straight approach passes.
+            touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
+            places = [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
+        for shift_m, until_s in places:
+            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s, probability)
+            counts.alarms += alarms.count
+            counts.alarm_s += alarms.alarm_s
+            counts.judged_s += alarms.judged_s
+
+
+def mean_way_m(replays: Sequence[Replay]) -> float:
+    """Average the distance at which the law swept is felt while the tool moves: v (t_d + h) + v²/2a."""
+    found = []
+    for replay in replays:
+        record = replay.record
+        for row in range(0, len(record.pose_time_s), 5):
+            speed = abs(replay.approach_speed_m_s[row])
+            if speed > _MOVING_M_S:
+                braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(float(record.pose_time_s[row])))
+                found.append(speed * (float(record.loop_age_s[row]) + HORIZON_S) + braking_m)
+    return float(np.mean(found)) if found else 0.0
+
+
+def draws_needed(probability: float) -> int:
+    """Return n >= 10 / (1 - P), which lets ten failures be expected."""
+    return int(np.ceil(10.0 / (1.0 - probability) - 1e-9))
+
+
+def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
+    """Bootstrap the share of `draws` that are `hits` over the approaches, at 95 %: draws of one are not independent."""
+    counts = np.asarray(hits, dtype=np.float64), np.asarray(draws, dtype=np.float64)
+    if len(hits) < 2:
+        return hits[0] / draws[0], hits[0] / draws[0]
+
+    def share(hit: FloatArray, drawn: FloatArray, axis: int = -1) -> FloatArray:
+        found: FloatArray = hit.sum(axis) / drawn.sum(axis)
+        return found
+
+    rng = np.random.default_rng([0, 0xB007])
+    found = bootstrap(counts, share, paired=True, n_resamples=_RESAMPLED, method="percentile", rng=rng)
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> Row:
+    """Turn counts into figures; None for a coverage where nothing collides, or no release avoids it.
+
+    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more. late_ms: the median over
+    the places in which full strength stands before the touch; never: the share of the others. reported: draws in which
+    the operator side has a report of the drift or turn, if any, 0.25 s before the last moment; reported_coverage is of
+    these alone. mean_strength: in the zone that the finger reaches, at that time. unavoidable: places in which no
+    release avoids the contact. alarm_share: of the time in which R2 was pulled, judged_s.
+    """
+    draws, covered = sum(counts.draws), len(counts.hits) > 0
+    low, high = interval(counts.hits, counts.draws) if covered else (None, None)
+    came = [late_s for late_s in counts.late_s if late_s < math.inf]
+    enough = len(counts.hits) >= _LEAST_APPROACHES
+    return {
+        "coverage": sum(counts.hits) / draws if covered else None,
+        "low": low,
+        "high": high,
+        "draws": draws,
+        "approaches": len(counts.hits),
+        "holds": None if low is None else enough and low >= probability - 0.1 * (1.0 - probability),
+        "late_ms": 1e3 * float(np.median(came)) if came else None,
+        "never": 1.0 - len(came) / len(counts.late_s) if counts.late_s else None,
+        "reported": counts.reported,
+        "reported_coverage": counts.reported_hits / counts.reported if counts.reported else None,
+        "mean_strength": counts.strength / draws if draws else None,
+        "places": sum(len(one.collisions) for one in staged),
+        "not_found": sum(one.sought - len(one.collisions) for one in staged),
+        "unavoidable": sum(len(one.collisions) - len(one.avoidable) for one in staged),
+        "alarms_per_min": 60.0 * counts.alarms / counts.judged_s if counts.judged_s else None,
+        "alarm_share": counts.alarm_s / counts.judged_s if counts.judged_s else None,
+        "judged_s": counts.judged_s,
+    }

@@ -1,0 +1,261 @@
+"""The gripper's way until a command takes effect, as predicted and in truth (eq. 8 and the commands under way)."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from feelahead.lab.approaches.recording import RecordedApproach
+from feelahead.lab.table import Row, Table
+from operator_side.feel.commands_under_way import CommandsUnderWay
+from robot_side.arm.ability import along_approach
+from robot_side.arm.port import GripperPose
+from robot_side.simulation.joint_reference import MotionLimits
+
+Compensation = Literal["operator", "robot", "momentary"]
+COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
+"""operator: the commands under way, as their sender knows them. robot: v t_d, t_d the robot's high quantile of the
+loop age (eq. 8). momentary: v times the loop age of this very moment."""
+_STEP_S: Final = 0.01
+_LEAST_SPEED: Final = 1e-9
+AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
+"""Approaches are pooled in these bins, by the median of their loop age. The single moment's does not choose:
+where it is short by chance the command sent now takes longer than the last one heard of, which would pass for an
+error."""
+PoseAt = Callable[[FloatArray], GripperPose]
+"""The gripper with its joints (n,) there."""
+
+
+class ToolPath:
+    """The tool's point over time, between the recorded poses, in the world frame."""
+
+    def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> None:
+        """Follow `record` by the true joints; `limits` and v_max decide on reach."""
+        poses = [pose_at(joints) for joints in record.joint_positions_rad]
+        able = [along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s) for pose in poses]
+        self.time_s = record.pose_time_s
+        self._positions_m = np.array([pose.tool_position_m for pose in poses])
+        self._axes = np.array([pose.tool_rotation[:, 2] for pose in poses])
+        self._velocities_m_s = np.array(
+            [pose.tool_jacobian[:3] @ rates for pose, rates in zip(poses, record.joint_velocities_rad_s, strict=True)]
+        )
+        self._speeds_m_s: FloatArray = np.einsum("ki,ki->k", self._velocities_m_s, self._axes)
+        self._full_speeds_m_s = np.array([one.full_speed_m_s for one in able])
+        self._acceleration_m_s2 = np.array([one.acceleration_m_s2 for one in able])
+        self._within_reach: BoolArray = np.array([one.within_reach for one in able])
+
+    def speeds_m_s(self, times_s: FloatArray) -> FloatArray:
+        """Interpolate speeds (k,) along the approach axis."""
+        speeds: FloatArray = np.interp(times_s, self.time_s, self._speeds_m_s)
+        return speeds
+
+    def full_speeds_m_s(self, times_s: FloatArray) -> FloatArray:
+        """Interpolate v_max (k,) of the arm in its pose at these times."""
+        speeds: FloatArray = np.interp(times_s, self.time_s, self._full_speeds_m_s)
+        return speeds
+
+    def accelerations_m_s2(self, times_s: FloatArray) -> FloatArray:
+        """Interpolate a (k,), the least that the joints give along the approach axis."""
+        accelerations: FloatArray = np.interp(times_s, self.time_s, self._acceleration_m_s2)
+        return accelerations
+
+    def within_reach(self, from_s: FloatArray, to_s: FloatArray) -> BoolArray:
+        """Tell (k,) whether full speed was within the arm's reach throughout each of these times."""
+        outside = np.concatenate([[0], np.cumsum(~self._within_reach)])
+        first = np.maximum(np.searchsorted(self.time_s, from_s, side="right") - 1, 0)
+        behind = np.minimum(np.searchsorted(self.time_s, to_s, side="left") + 1, len(self.time_s))
+        clear: BoolArray = outside[behind] == outside[first]
+        return clear
+
+    def ways_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
+        """Measure ways (k,) of the tool along the axis that it had at the beginning."""
+        row, part = self._place(from_s)
+        axes = (1.0 - part) * self._axes[row] + part * self._axes[row + 1]
+        axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), _LEAST_SPEED)
+        moved = self._positions_at(to_s) - self._positions_at(from_s)
+        ways: FloatArray = np.einsum("ki,ki->k", moved, axes)
+        return ways
+
+    def _place(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Find the row before each time, and the part (k, 1) of the step to the next one."""
+        row: IntArray = np.searchsorted(self.time_s, times_s, side="right").astype(np.int64) - 1
+        row = np.clip(row, 0, len(self.time_s) - 2)
+        return row, ((times_s - self.time_s[row]) / (self.time_s[row + 1] - self.time_s[row]))[:, None]
+
+    def _positions_at(self, times_s: FloatArray) -> FloatArray:
+        """Interpolate positions (k, 3) by cubic Hermite splines."""
+        row, u = self._place(times_s)
+        step_s = (self.time_s[row + 1] - self.time_s[row])[:, None]
+        here, there = self._positions_m[row], self._positions_m[row + 1]
+        leaving, arriving = step_s * self._velocities_m_s[row], step_s * self._velocities_m_s[row + 1]
+        cubic: FloatArray = (
+            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * here
+            + u * (1.0 - u) ** 2 * leaving
+            + u * u * (3.0 - 2.0 * u) * there
+            + u * u * (u - 1.0) * arriving
+        )
+        return cubic
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Knowledge of the operator side at moments of one approach, and the arrivals."""
+
+    now_s: FloatArray
+    """(k,) when a command was sent, for which the prediction is made"""
+    reported_s: FloatArray
+    """(k,) T: when the robot sent the newest stiffness that the operator side had"""
+    arrives_s: FloatArray
+    """(k,) when the arm began to follow the command that was sent at `now_s`, or a newer one"""
+    echo_sent_s: FloatArray
+    """(k,) when the command was sent that the arm followed at T"""
+    echo_held_s: FloatArray
+    """(k,) the time for which it had, at T"""
+    loop_age_quantile_s: FloatArray
+    """(k,) t_d at the robot, at T"""
+
+    def __len__(self) -> int:
+        return len(self.now_s)
+
+    @property
+    def loop_age_s(self) -> FloatArray:
+        """(k,) age of the newest command that the report knew of."""
+        return self.now_s - self.echo_sent_s
+
+
+def moments(record: RecordedApproach) -> Moments:
+    """Take the newest command every 10 ms of the pull, where the robot was heard and the command arrived."""
+    rows = []
+    # Times beyond the recorded poses cannot be compared.
+    last_s = min(record.tick_time_s[-1], record.pose_time_s[-1])
+    for number in range(max(0, int((last_s - record.began_s) / _STEP_S + 1e-6))):
+        sent = int(np.searchsorted(record.command_time_s, record.began_s + number * _STEP_S + 1e-9)) - 1
+        now_s = float(record.command_time_s[sent]) if sent >= 0 else -np.inf
+        if now_s < record.tick_time_s[0]:
+            continue
+        reported_s = float(record.seen_sent_s[record.tick_row(now_s)])
+        arrives_s = record.arrives_s(now_s)
+        if not (reported_s >= record.pose_time_s[0] and arrives_s <= last_s):  # NaN, infinite
+            continue
+        report = record.tick_row(reported_s)
+        echo_sent_s = float(record.applied_sent_s[report])
+        if np.isnan(echo_sent_s):
+            continue
+        held_s = reported_s - float(record.applied_at_s[report])
+        quantile_s = float(record.loop_age_s[record.pose_row(reported_s)])
+        rows.append((now_s, reported_s, arrives_s, echo_sent_s, held_s, quantile_s))
+    return Moments(*np.array(rows, dtype=np.float64).reshape(-1, 6).T.copy())
+
+
+def predicted(
+    record: RecordedApproach,
+    at: Moments,
+    speeds_m_s: FloatArray,
+    full_speeds_m_s: FloatArray,
+    accelerations_m_s2: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Predict δ and w (k,) by the operator side's commands, from v, v_max and a (k,) in the reports; NaN for none."""
+    commands, sent = CommandsUnderWay(), 0
+    ways_m, speeds = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    for row, now_s in enumerate(at.now_s):
+        while sent < len(record.command_time_s) and record.command_time_s[sent] <= now_s:
+            commands.sent(float(record.command_time_s[sent]), float(record.command[sent]))
+            sent += 1
+        found = commands.displacement(
+            float(now_s),
+            float(at.echo_sent_s[row]),
+            float(at.echo_held_s[row]),
+            float(speeds_m_s[row]),
+            float(full_speeds_m_s[row]),
+            float(accelerations_m_s2[row]),
+        )
+        if found is not None:
+            ways_m[row], speeds[row] = found
+    return ways_m, speeds
+
+
+def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> Row:
+    """Compare every prediction with the arm's true way; full_speed_m_s is v_max as it is set.
+
+    Lists (k,) with an entry for each moment: `loop_age_s`, `within_reach` (False: at the edge of its reach the arm
+    cannot do as commanded), `way_m` (true, along the direction in which R2 advances), and truth less prediction
+    by COMPENSATIONS; NaN where there is no prediction.
+    """
+    path = ToolPath(record, pose_at, limits, full_speed_m_s)
+    at = moments(record)
+    way_m = path.ways_m(at.reported_s, at.arrives_s)
+    speed_m_s = path.speeds_m_s(at.reported_s)
+    full_m_s, here_m_s2 = path.full_speeds_m_s(at.reported_s), path.accelerations_m_s2(at.reported_s)
+    own_m, own_m_s = predicted(record, at, speed_m_s, full_m_s, here_m_s2)
+    errors = {
+        "operator": way_m - own_m,
+        "robot": way_m - speed_m_s * at.loop_age_quantile_s,
+        "momentary": way_m - speed_m_s * at.loop_age_s,
+        "speed at the end": path.speeds_m_s(at.arrives_s) - own_m_s,
+    }
+    within = path.within_reach(at.reported_s, at.arrives_s)
+    known = {"loop_age_s": at.loop_age_s, "way_m": way_m, "within_reach": within}
+    return {name: values.tolist() for name, values in (known | errors).items()}
+
+
+class Spread(NamedTuple):
+    """The distribution of errors; 99 % and greatest are of the magnitudes."""
+
+    moments: int
+    loop_age_ms: float
+    mean_mm: float
+    sd_mm: float
+    p99_mm: float
+    max_mm: float
+
+
+def over(judged: Table, name: str, ages_s: tuple[float, float] = (0.0, np.inf), *, within_reach: bool = True) -> Spread:
+    """Pool the errors called `name` of approaches with loop ages from the first to below the second.
+
+    within_reach: take the moments in which the arm could do as commanded; else the others.
+    """
+    errors_mm, ages_ms = [np.empty(0)], [np.empty(0)]
+    for row in judged:
+        if row["loop_age_s"] and ages_s[0] <= float(np.median(row["loop_age_s"])) < ages_s[1]:
+            error_mm, age_ms = 1e3 * np.array(row[name], dtype=float), 1e3 * np.array(row["loop_age_s"])
+            wanted = (np.array(row["within_reach"]) == within_reach) & ~np.isnan(error_mm)
+            errors_mm.append(error_mm[wanted])
+            ages_ms.append(age_ms[wanted])
+    all_mm, all_ms = np.concatenate(errors_mm), np.concatenate(ages_ms)
+    if not all_mm.size:
+        return Spread(0, *[math.nan] * 5)
+    magnitudes = np.abs(all_mm)
+    figures = all_ms.mean(), all_mm.mean(), all_mm.std(), np.quantile(magnitudes, 0.99), magnitudes.max()
+    return Spread(int(all_mm.size), *map(float, figures))
+
+
+def error_table(judged: Table, arm: str, frozen: str, full_speed_m_s: float) -> str:
+    """Write μ_δ and σ_δ of eq. 10 over loop age and kind of compensation as TOML; empty bins are left out.
+
+    arm: the fingerprint of the one that they were measured on.
+    """
+    pulls, links = (", ".join(f'"{name}"' for name in dict.fromkeys(judged.values(key))) for key in ("pull", "link"))
+    lines = [
+        "# How wrong the predicted displacement is: truth less prediction along the direction in which R2 advances, so",
+        "# that mu_mm above 0 is a gripper farther ahead than predicted. p99_mm is of the magnitude.",
+        "# [[operator]]: by the commands under way, as their sender knows them. [[robot]]: v t_d, t_d the robot's high",
+        "# quantile of the loop age (eq. 8). [[momentary]]: v times the present loop age. Moments at the edge of the",
+        "# arm's reach, where it cannot do what it is told, are not in it.",
+        f'arm = "{arm}"',
+        f'frozen = "{frozen}"',
+        f"full_speed_m_s = {full_speed_m_s:g}",
+        f"pulls = [{pulls}]",
+        f"links = [{links}]",
+        f"seeds = {sorted(set(judged.values('seed')))}",
+    ]
+    for kind in COMPENSATIONS:
+        for ages_s in AGE_BINS_S:
+            found = over(judged, kind, ages_s)
+            if found.moments:
+                lines += ["", f"[[{kind}]]", f"loop_age_ms = {found.loop_age_ms:.1f}", f"mu_mm = {found.mean_mm:.4f}"]
+                lines += [f"sigma_mm = {found.sd_mm:.4f}", f"p99_mm = {found.p99_mm:.4f}", f"n = {found.moments}"]
+    return "\n".join(lines) + "\n"

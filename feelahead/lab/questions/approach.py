@@ -1,0 +1,298 @@
+"""Does a finger of constant force hit what is ahead, and how fast; or where does the gripper stop?
+
+feelahead try approach --model tests/data/wall.xml --force 2 3 --law swept none --link "" "delay 200ms"
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from statistics import median
+from typing import Annotated, Any, Final, Literal
+
+import tyro
+from msgspec import Meta
+from rich.console import RenderableType
+from rich.table import Table as Shown
+from rich.text import Text
+
+from common.emulation.clauses import LinkModel
+from common.files.input_file import require_input_file
+from common.protocol.messages import Compensation, Vector2
+from feelahead.lab.approaches.approach import Approach, compile_kernels, run_approach
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_hash, frozen_scene, scene_names
+from feelahead.lab.approaches.laws import Law, compensation_of, in_words, with_compensation, without_compensation
+from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
+from feelahead.lab.approaches.outcome import Outcome
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.table import Row, Table
+from robot_side.settings import Assist
+
+_QUICK: Final = ("wall", "edge")
+_FARTHEST_MM: Final = 1000.0
+"""Distances beyond this are not measured."""
+_APART_MS: Final = 6.0
+"""Between the laws in the figure, so that no line hides another."""
+_MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
+_Force = Annotated[float, Meta(ge=0.0, le=20.0)]
+
+
+@dataclass(frozen=True)
+class ApproachSettings(Sweep):
+    """A finger that presses R2 with a constant force, until the gripper touches something or comes to rest.
+
+    Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
+    frozen scene of tests/data that ends in a contact is tried; with --quick two of them. Options that take several
+    values are combined with each other; with one of each, the summary is that run's own.
+    """
+
+    model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
+    """MJCF scenes with an arm; it may hit the objects ahead of the tool."""
+    site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
+    """The site between the fingertips, z along the approach."""
+    force: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
+    """Newtons on R2, 0 to 20: 2 is a light pull, 3.7 a normal one."""
+    strongest_effect: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
+    """Newtons that the strongest effect adds (nobody has measured it): 1.5, 2 and 3 span what is likely."""
+    link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("",)
+    """Emulated links, both ways, in netem's words: "delay 200ms 10ms distribution normal"."""
+    link_model: LinkModel = "datagram"
+    """datagram lets jitter reorder messages, stream keeps them in order."""
+    law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
+    """The law that is felt: the objects ahead along the trigger, the paper's plain law, nothing, or always the
+    strongest effect. Several are set side by side."""
+    compensation: tuple[Compensation, ...] = ("operator",)
+    """The side that compensates the delay: the operator side by the commands under way, or the robot side by v t_d
+    (eq. 8). The paper's law has eq. 8."""
+    haptics: bool = True
+    """--no-haptics: the same as --law none."""
+    probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
+    """The laws' own P (eq. 10)."""
+    duration: Annotated[float, Meta(ge=0.05, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
+    """From the beginning of the pull, in virtual time; a contact ends the run."""
+    grip: bool = False
+    """Close the gripper on what stands between its fingers first."""
+    stick: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
+    """Deflection, at most 1 long, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
+    turn: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
+    """Deflection, at most 1 long, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
+    assist: Assist = "none"
+    """speed: the robot side caps the speed along the triggers itself."""
+    camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
+    """Standard deviation of the camera's error, which the law knows."""
+    spoil: Spoil = "nothing"
+    """Spoil what is felt, to see that the figures notice: 100 ms late, or on the other trigger."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("force", "strongest_effect", "link", "law", "compensation"):
+            if not getattr(self, name):
+                raise ValueError(f"--{name.replace('_', '-')}: valid: one value or more")
+        for name in ("stick", "turn"):
+            if not math.hypot(*getattr(self, name)) <= 1.0 + 1e-9:  # false for NaN, too
+                raise ValueError(f"--{name} {getattr(self, name)}: valid: two numbers, together at most 1 long")
+        for spec in self.link:
+            require_young_loop(spec, self.link_model)
+        for model in self.model:
+            require_input_file("--model", model, "an MJCF file")
+
+    def models(self) -> tuple[Path, ...]:
+        """Find the scenes to try; ConfigurationError where the frozen ones are not there."""
+        return self.model or tuple(frozen_scene(name) for name in (_QUICK if self.quick else (*AHEAD, *ASIDE)))
+
+    def laws(self) -> tuple[Law, ...]:
+        """List the laws that are set side by side, each once."""
+        if not self.haptics:
+            return ("none",)
+        return tuple(dict.fromkeys(with_compensation(law, side) for law in self.law for side in self.compensation))
+
+
+def cells(settings: ApproachSettings) -> Iterator[Approach]:
+    """Combine all values; frozen scenes that a straight pull passes have their sticks deflected."""
+    for model, link, force_n, strongest_n, law in product(
+        settings.models(), settings.link, settings.force, settings.strongest_effect, settings.laws()
+    ):
+        frozen, asked = model.parent.resolve() == SCENES, (settings.stick, settings.turn)
+        at_rest: tuple[Vector2, Vector2] = ((0.0, 0.0), (0.0, 0.0))
+        stick, turn = ASIDE.get(model.stem, asked) if frozen and asked == at_rest else asked
+        yield Approach(
+            model=model,
+            force_n=force_n,
+            site=settings.site,
+            strongest_n=strongest_n,
+            link=link,
+            link_model=settings.link_model,
+            law=law,
+            probability=settings.probability,
+            duration_s=settings.duration,
+            grip=settings.grip or (frozen and model.stem in GRIPPED),
+            spoil=settings.spoil,
+            stick=stick,
+            turn=turn,
+            assist=settings.assist,
+            camera_sd_m=1e-3 * settings.camera_mm,
+        )
+
+
+def run(cell: Approach, seed: int) -> Iterator[Row]:
+    """Run one approach, and name its law as the flags do."""
+    yield figures(cell, run_approach(replace(cell, seed=seed)))
+
+
+def figures(approach: Approach, outcome: Outcome) -> Row:
+    """Turn an outcome into a row; the trace goes to --summary alone."""
+    gap_mm = outcome.least_gap_mm
+    return {
+        "law": without_compensation(approach.law),
+        "compensation": compensation_of(approach.law),
+        "haptics": approach.law != "none",
+        "stick": approach.stick,
+        "turn": approach.turn,
+        **vars(outcome),
+        "least_gap_mm": None if math.isnan(gap_mm) else gap_mm,
+        "trace": {name: values.tolist() for name, values in vars(outcome.trace).items()},
+    }
+
+
+def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
+    """Show one run as a sentence, several as a table."""
+    yield Text(sentence(table.rows[0])) if len(table) == 1 else comparison(table)
+
+
+def sentence(row: Row) -> str:
+    """Say in a line or two how one run ended."""
+    what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(_law(row))}: "
+    if row["why"] is not None:
+        return f"{what}{row['end']}: {row['why']}"
+    if row["contact_speed_mm_s"] is not None:
+        speed = round(row["contact_speed_mm_s"])
+        what += f"touches {row['contact_with']} at {speed} mm/s after {row['ended_s']:.2f} s"
+    elif row["stops_at_mm"] is not None:
+        what += f"stops {_gap(row['stops_at_mm'])} off ({_gap(row['way_left_mm'])} along the approach)"
+    else:
+        what += f"undecided after {row['ended_s']:.1f} s: it still moves"
+    return f"{what}; least gap {_gap(row['least_gap_mm'])}, reversals {row['reversals']}"
+
+
+def comparison(table: Table) -> Shown:
+    """Make a row for each scene, link and force, and a column for each law; each entry is over the seeds."""
+    laws = list(dict.fromkeys(_law(row) for row in table))
+    several_effects = len(set(table.values("strongest_n"))) > 1
+    names = scene_names(map(Path, table.values("model")))
+    shown = Shown(
+        title="contacts of runs, median contact speed; else where it stopped",
+        caption=Text("mm/s, or mm off, [least to greatest] over the seeds; ? undecided; R the most reversals"),
+    )
+    for heading in ("scene", "link", "N", *(("effect, N",) if several_effects else ())):
+        shown.add_column(heading, overflow="fold")
+    for law in laws:
+        shown.add_column(in_words(law))
+    for (model, link, force_n, strongest_n), rows in table.groups("model", "link", "force_n", "strongest_n"):
+        effect = (f"{strongest_n:g}",) if several_effects else ()
+        ends = (_ends([row for row in rows if _law(row) == law]) for law in laws)
+        shown.add_row(*map(Text, (names[Path(model)], link or "none", f"{force_n:g}", *effect, *ends)))
+    return shown
+
+
+def draw(settings: ApproachSettings, table: Table, path: Path) -> None:
+    """Draw zones, travel, speed and gap over time (one run), or contact speed against delay (several)."""
+    (_draw_run if len(table) == 1 else _draw_comparison)(table, frozen_hash(settings.models()), path)
+
+
+def _draw_run(table: Table, frozen: str, path: Path) -> None:
+    row = table.rows[0]
+    trace = row["trace"]
+    end_s = max(trace["time_s"][-1], 0.01) if trace["time_s"] else 0.01
+    link = row["link"] or "no delay"
+    title = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(_law(row))}, {link} (frozen {frozen})"
+    with figure(path, 2, 1, title, figsize=(8.0, 5.6), sharex=True) as (drawn, (zones, motion)):
+        shades: dict[str, Any] = {"cmap": "Greys", "vmin": 0, "vmax": 8, "interpolation": "nearest"}
+        strengths = list(zip(*trace["strengths"], strict=True)) or [(0,)]
+        shown = zones.imshow(strengths, aspect="auto", origin="lower", extent=(0.0, end_s, 0.0, 1.0), **shades)
+        zones.plot(trace["time_s"], trace["travel"], color="#d55e00", label="the finger")
+        zones.set(ylabel="travel of R2", ylim=(0.0, 1.0))
+        zones.legend(loc="upper left")
+        drawn.colorbar(shown, ax=zones, label="strength, 0 to 8")
+        speeds_mm_s, gaps_mm = ([1e3 * value for value in trace[name]] for name in ("speed_m_s", "gap_m"))
+        motion.plot(trace["time_s"], speeds_mm_s, color="#0072b2", label="speed, mm/s")
+        motion.plot(trace["time_s"], gaps_mm, color="#009e73", linestyle="--", label="true gap, mm")
+        motion.axhline(0.0, color="black", linewidth=0.6)
+        if row["contact_speed_mm_s"] is not None:
+            motion.plot(row["ended_s"], row["contact_speed_mm_s"], "x", color="black", label="contact")
+        motion.set(xlabel="seconds since the pull began", xlim=(0.0, end_s))
+        motion.legend()
+
+
+def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
+    """Make a panel for each force, with a line for each law and scene.
+
+    A run that stops before the contact counts as 0 mm/s; one that ends otherwise is left out.
+    """
+    forces = sorted(set(table.values("force_n")))
+    names = scene_names(map(Path, table.values("model")))
+    laws = list(dict.fromkeys(_law(row) for row in table))
+    options: dict[str, Any] = {"figsize": (4.2 * len(forces) + 1.6, 4.2), "sharey": True, "squeeze": False}
+    with figure(path, 1, len(forces), f"frozen {frozen}", **options) as (drawn, panels):
+        for panel, force_n in zip(panels[0], forces, strict=True):
+            for (place, law), (number, scene) in product(enumerate(laws), enumerate(names)):
+                points: dict[float, list[float]] = {}
+                for row in table.where(force_n=force_n, model=str(scene)):
+                    if row["end"] in ("contact", "stopped") and _law(row) == law:
+                        points.setdefault(500.0 * mean_loop_s(row["link"], row["link_model"]), []).append(
+                            row["contact_speed_mm_s"] or 0.0
+                        )
+                panel.plot(
+                    [delay + _APART_MS * place for delay in sorted(points)],
+                    [median(points[delay]) for delay in sorted(points)],
+                    marker=_MARKS[number % len(_MARKS)],
+                    color=LAW_COLOURS[law],
+                    alpha=0.7,
+                    label=f"{in_words(law)}, {names[scene]}" if force_n == forces[0] else None,
+                )
+            panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms (beside each other: the laws)")
+            panel.grid(alpha=0.3)
+        panels[0][0].set_ylim(bottom=-5.0)
+        panels[0][0].set_ylabel("speed at contact, mm/s (0: none)")
+        drawn.legend(loc="outside right upper", fontsize=7)
+
+
+def _law(row: Row) -> Law:
+    return with_compensation(row["law"], row["compensation"])
+
+
+def _gap(gap_mm: float) -> str:
+    return f"{gap_mm:.1f} mm" if gap_mm < _FARTHEST_MM else f"more than {_FARTHEST_MM:g} mm"
+
+
+def _ends(rows: Sequence[Row]) -> str:
+    """Say in a few words how runs of one kind ended."""
+    if not rows:
+        return ""
+    speeds, stops = Table(rows).values("contact_speed_mm_s"), Table(rows).values("stops_at_mm")
+    parts = [f"{len(speeds)}/{len(rows)} at {_spread(speeds, 0)} mm/s"] if speeds else []
+    parts += [f"{len(stops)}/{len(rows)} stop {_spread(stops, 1)} mm off"] if stops else []
+    for end, said in (("undecided", "?"), ("disarmed", "disarmed"), ("failed", "failed")):
+        if count := sum(row["end"] == end for row in rows):
+            parts.append(f"{count}/{len(rows)} {said}")
+    return ", ".join(parts) + f", R {max(row['reversals'] for row in rows)}"
+
+
+def _spread(values: Sequence[float], digits: int) -> str:
+    low, middle, high = (f"{value:.{digits}f}" for value in (min(values), median(values), max(values)))
+    return middle if low == high else f"{middle} [{low} to {high}]"
+
+
+QUESTION = Question(
+    "try approach",
+    ApproachSettings,
+    cells,
+    run,
+    show,
+    draw=draw,
+    frozen=lambda settings: frozen_hash(settings.models()),
+    failed=lambda row: row["end"] not in ("contact", "stopped"),
+    prepare=compile_kernels,
+)

@@ -1,0 +1,310 @@
+"""When a release still avoids a contact, what a false alarm is, and what `bench coverage` makes of them."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import ConfigurationError
+from common.reaction import HORIZON_S
+from feelahead.lab.approaches.approach import Approach, PullRun
+from feelahead.lab.approaches.closed_loop import KINDS, check, perceived_by
+from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, draws_needed, evaluate, interval
+from feelahead.lab.approaches.felt_by import Draw, make_law
+from feelahead.lab.approaches.frozen import AHEAD, ASIDE, PASSED, SITE, frozen_scene
+from feelahead.lab.approaches.judging import (
+    false_alarms,
+    lateness_s,
+    statistical_distance_m,
+    stood,
+    stopping_path_m,
+    zone_speed_m_s,
+)
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.meeting import first_touch_s, last_release_s
+from feelahead.lab.approaches.pulls import PullKind, make_pull
+from feelahead.lab.approaches.recording import RecordedApproach, record_approach
+from feelahead.lab.approaches.replay import Replay, coasting_s
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.questions.coverage import QUESTION, CoverageSettings
+from feelahead.lab.sweep import ask
+from feelahead.lab.table import Row
+from robot_side.settings import EncoderSettings
+from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.scene import load_scene
+
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("coverage")]
+
+SEED = 1
+"""Its steady pull reaches 0.24 m/s."""
+
+
+@cache
+def recorded(link: str = "", pull: PullKind = "steady") -> RecordedApproach:
+    return record_approach(pull, link, SEED, duration_s=2.0)
+
+
+def staged(
+    scene_name: str, link: str = "", ahead_m: float = 0.0, pull: PullKind = "steady"
+) -> tuple[Replay, PosedScene, Draw]:
+    scene = load_scene(frozen_scene(scene_name), SITE)
+    posed, replay = PosedScene(scene), Replay(recorded(link, pull), scene, EncoderSettings(), SEED)
+    posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], ahead_m * replay.axis)
+    errors_m = np.zeros((len(scene.objects), 3))
+    return replay, posed, Draw(replay, posed.perceived(errors_m), 0.003)
+
+
+@cache
+def approaching(link: str = "0 ms", ahead_m: float = 0.0) -> tuple[Draw, float, float]:
+    """Put a wall ahead; return the draw, the time of the touch and the last moment to let go."""
+    replay, posed, draw = staged("wall", LINKS[link], ahead_m)
+    touch_s = first_touch_s(replay, posed, ahead_m * replay.axis)
+    assert touch_s is not None
+    last_s = last_release_s(replay, posed, ahead_m * replay.axis, touch_s)
+    assert last_s is not None
+    return draw, touch_s, last_s
+
+
+# The last moment
+
+
+@given(st.floats(0.0, 0.3), st.floats(0.1, 1.0))
+def test_an_arm_coasts_at_least_as_its_brakes_and_as_the_finger_alone_would(braking_s: float, travel: float) -> None:
+    coasting = coasting_s(braking_s, travel)
+    assert coasting >= 0.5 * braking_s - 1e-3
+    assert coasting_s(0.0, travel) - 1e-3 <= coasting <= coasting_s(0.0, travel) + 0.5 * braking_s + 1e-3
+
+
+def test_a_release_at_the_last_moment_leaves_a_gap_and_a_later_one_none() -> None:
+    draw, touch_s, last_s = approaching()
+    replay = draw.replay
+    assert np.interp(touch_s, replay.record.pose_time_s, replay.along_m) == pytest.approx(0.320, abs=0.001)
+    speed = replay.approach_speed_m_s[replay.record.pose_row(touch_s)]
+    # 8 rad/s² of the fastest joint, and the finger's own return.
+    assert 0.03 < touch_s - last_s < 0.04 + speed / 3.0
+    # 30 mm from the start, a command that takes 200 ms has to be taken back before it arrives.
+    far, _, last_s = approaching("200 ms", -0.29)
+    assert far.replay.record.began_s <= last_s < far.replay.record.began_s + 0.15
+
+
+@pytest.mark.parametrize("speed_m_s", [-0.06, 0.05])
+def test_moving_objects_are_touched_where_they_are_by_then(speed_m_s: float) -> None:
+    replay, posed, draw = staged("wall", ahead_m=-0.1)
+    shift_m = -0.1 * replay.axis
+    still_s, touch_s = (first_touch_s(replay, posed, shift_m, speed) for speed in (0.0, speed_m_s))
+    assert still_s is not None
+    assert touch_s is not None
+    assert (touch_s < still_s) is (speed_m_s < 0.0)
+    since_s = touch_s - replay.record.began_s
+    along_m = np.interp(touch_s, replay.record.pose_time_s, replay.along_m)
+    assert along_m == pytest.approx(0.22 + speed_m_s * since_s, abs=0.001)
+    then = replace(draw, speed_m_s=speed_m_s).objects_at(replay.record.began_s + 1.0)
+    moved_m = then.box_centers_m - draw.objects.box_centers_m
+    np.testing.assert_allclose(moved_m, [speed_m_s * replay.axis], atol=0.034 * abs(speed_m_s))
+    assert then.velocities_m_s is not None
+    np.testing.assert_allclose(then.velocities_m_s, [speed_m_s * replay.axis])
+
+
+# Covered, late, alarmed
+
+
+def covered(law: Law, spoil: Spoil = "nothing", link: str = "0 ms", ahead_m: float = 0.0) -> tuple[bool, int]:
+    draw, _, last_s = approaching(link, ahead_m)
+    judged = stood(make_law(law, 0.99, 0.02, spoil), draw, last_s)
+    return judged.covered, judged.strength
+
+
+@pytest.mark.parametrize(("link", "ahead_m"), [("0 ms", 0.0), ("200 ms", -0.15)])
+def test_a_steady_pull_is_covered_by_either_compensation_and_not_by_a_short_margin(link: str, ahead_m: float) -> None:
+    laws: tuple[Law, ...] = ("full", "swept", "swept_robot", "margin", "paper", "none")
+    found = {law: covered(law, link=link, ahead_m=ahead_m) for law in laws}
+    assert found["full"] == found["swept"] == found["swept_robot"] == (True, 8)
+    assert not any(found[law][0] for law in ("margin", "paper", "none"))
+    assert covered("swept", "swapped", link, ahead_m) == (False, 0)
+
+
+def test_lateness_is_zero_in_time_grows_with_a_delay_and_is_infinite_on_the_other_trigger() -> None:
+    draw, touch_s, last_s = approaching()
+
+    def lateness(law: Law, spoil: Spoil = "nothing") -> float:
+        return lateness_s(make_law(law, 0.99, 0.02, spoil), draw, last_s, touch_s)
+
+    assert lateness("full") == lateness("swept") == 0.0
+    assert lateness("none") == lateness("swept", "swapped") == lateness("margin", "swapped") == math.inf
+    late_s = lateness("margin")
+    # Between the moment at which it is due and the touch, 0.25 s and the braking later.
+    assert 0.1 < late_s < 0.4
+    assert lateness("margin", "delayed") in (pytest.approx(late_s + 0.1, abs=0.011), math.inf)
+
+
+def test_spoilt_laws_show() -> None:
+    draw, touch_s, _ = approaching()
+    times = np.array([touch_s - 0.4, touch_s - 0.3])
+    spoils: tuple[Spoil, ...] = ("nothing", "delayed", "swapped")
+    whole, delayed, swapped = (make_law("swept", 0.99, spoil=spoil).felt(draw, times) for spoil in spoils)
+    # Farther zones are stiff earlier, on R2 alone.
+    assert 0 < np.count_nonzero(whole[0, 1]) < np.count_nonzero(whole[1, 1]) < 10
+    assert whole[1, 1].max() == 8
+    assert whole[:, 0].max() == 0
+    assert (delayed[1] == whole[0]).all()
+    assert (swapped == whole[:, ::-1]).all()
+
+
+def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
+    replay, posed, draw = staged("empty")
+    began_s = replay.record.began_s
+    full = false_alarms(make_law("full", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    assert full.count == 1
+    assert full.alarm_s == pytest.approx(full.judged_s)
+    assert full.judged_s == pytest.approx(replay.end_s - began_s, abs=0.1)
+    none = false_alarms(make_law("none", 0.99), draw, posed, np.zeros(3), replay.end_s, 0.99)
+    assert (none.count, none.alarm_s) == (0, 0.0)
+    # With a wall so near that any zone's stopping path meets it, nothing is a false alarm.
+    replay, posed, draw = staged("wall", ahead_m=-0.30)
+    near = false_alarms(make_law("full", 0.99), draw, posed, -0.30 * replay.axis, began_s + 0.1, 0.99)
+    assert near.count == 0
+
+
+def test_a_stopping_path_is_the_way_under_way_the_horizon_and_the_braking() -> None:
+    speeds = [zone_speed_m_s(zone) for zone in range(10)]
+    assert speeds == sorted(speeds)
+    # The sensor ends at three quarters of the travel.
+    assert speeds[7] == speeds[9] == pytest.approx(0.25)
+    assert speeds[0] == pytest.approx(0.25 * (0.05 / 0.75 - 0.05) / 0.93)
+    replay, _, draw = staged("wall", LINKS["200 ms"])
+    time_s = replay.record.began_s + 1.0
+    rest_m = stopping_path_m(replay, time_s, 5) - replay.under_way_m(time_s) - speeds[5] * HORIZON_S
+    assert rest_m == pytest.approx(speeds[5] ** 2 / (2.0 * replay.deceleration_m_s2(time_s)))
+    # A command takes 200 ms to the arm, which goes at 0.24 m/s meanwhile.
+    assert replay.under_way_m(time_s) == pytest.approx(0.2 * 0.24, abs=0.006)
+    assert statistical_distance_m(draw, time_s, 0.5) == pytest.approx(0.0, abs=1e-9)
+    assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
+
+
+def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
+    drifting = staged("wall", LINKS["50 ms"], pull="drift")[0]
+    times = drifting.record.began_s + np.arange(0.0, 0.8, 0.01)
+    known = np.array([drifting.knows_aside(float(time_s)) for time_s in times])
+    # There and back, with jitter, and 30 ms to look from all places; and the arm has to start.
+    assert 0.1 < times[int(np.argmax(known))] - drifting.record.began_s < 0.3
+    assert known[int(np.argmax(known)) :].all()
+    steady = staged("wall")[0]
+    assert steady.knows_aside(steady.record.began_s)
+
+
+# The pipeline that is judged is the one that is shipped
+
+
+@pytest.mark.parametrize("law", ["swept", "swept_robot", "paper", "margin"])
+def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
+    link, margin_m = LINKS["200 ms"], 0.05
+    approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=link, law=law, seed=SEED, margin_m=margin_m)
+    run = PullRun(approach, make_pull("steady", SEED))
+    began_s = run.arm()
+    for _ in run.go_on(began_s + 2.0):
+        pass
+    assert run.onset is not None
+    trace = run.samples.trace()
+
+    replay, posed, _ = staged("wall", link)
+    draw = Draw(replay, perceived_by(posed, replay, np.zeros(3), SEED), 0.003)
+    felt = make_law(law, 0.99, margin_m).felt(draw, began_s + trace.time_s)[:, 1]
+    # Its poses are 10 ms apart and its encoders draw other errors: by so much it may be off for a moment.
+    differs = felt - trace.strengths
+    assert np.count_nonzero(differs) < 0.04 * differs.size
+    assert abs(differs.mean()) < 0.05
+    assert trace.strengths.max() > 0
+
+
+# Shares, cells, and the whole question
+
+
+def test_intervals_are_over_approaches() -> None:
+    assert [draws_needed(p) for p in (0.5, 0.9, 0.99, 0.999)] == [20, 100, 1000, 10000]
+    assert interval([10, 10], [10, 10]) == (1.0, 1.0)
+    # Two approaches are all the evidence, however many draws each has.
+    assert interval([10, 0], [10, 10]) == (0.0, 1.0)
+    assert interval([9], [10]) == (0.9, 0.9)
+    low, high = interval([9, 10, 8, 10, 9, 7, 10, 9, 10, 10], [10] * 10)
+    assert 0.8 < low < 0.92 < high < 1.0
+
+
+@cache
+def judged(spoil: Spoil = "nothing") -> list[Row]:
+    both = (Placed("wall"), Placed("wall_beside"))
+    return list(evaluate(Pulls("bell", "200 ms", "empty", both, (1, 2), (0.5,), ("swept", "none", "full"), spoil), 1))
+
+
+def test_a_cell_has_what_it_takes_to_judge_it() -> None:
+    wall = {row["law"]: row for row in judged() if row["scene"] == "wall"}
+    assert {(row["places"], row["unavoidable"], row["draws"]) for row in wall.values()} == {(2, 0, 20)}
+    assert wall["full"]["coverage"] == wall["full"]["low"] == wall["swept"]["coverage"] == 1.0
+    # One approach is too few to say so.
+    assert wall["full"]["holds"] is False
+    assert wall["none"]["coverage"] == wall["none"]["high"] == wall["none"]["alarms_per_min"] == 0.0
+    assert wall["full"]["alarms_per_min"]
+    beside = {row["law"]: row for row in judged() if row["scene"] == "wall_beside"}
+    assert beside["full"]["coverage"] is beside["full"]["holds"] is None
+    assert beside["full"]["alarm_share"] > 0.5
+    assert beside["swept"]["alarms_per_min"] == 0.0
+    spoilt = {row["law"]: row for row in judged("swapped") if row["scene"] == "wall"}
+    assert (spoilt["swept"]["coverage"], spoilt["swept"]["mean_strength"]) == (0.0, 0.0)
+    assert wall["swept"]["mean_strength"] > 6.0
+
+
+def test_physics_does_as_reckoned() -> None:
+    checks = list(check(0, 3, 0))
+    assert [one.kind_of_check for one in checks] == list(KINDS)
+    assert all(one.contact == one.expected_contact for one in checks[:2])
+
+
+def test_the_plans() -> None:
+    full = CoverageSettings().pulls()
+    cells = [(pulls.pull, pulls.link, cell) for pulls in full for cell in pulls.cells]
+    assert len({cell.key(pull, link) for pull, link, cell in cells}) == len(cells) == 179
+    names = {cell.scene for _, _, cell in cells}
+    assert names == {*AHEAD, *ASIDE, *PASSED} - {"moving", "fleeing", "place_held", "terrain_ahead"}
+    assert {link for _, link, _ in cells} == set(LINKS)
+    quick = CoverageSettings(quick=True, only=("wall/bell",)).pulls()
+    assert [(pulls.pull, pulls.link, pulls.cells) for pulls in quick] == [("bell", "200 ms", (Placed("wall"),))]
+    assert set(quick[0].cells) < {cell for _, _, cell in cells}
+
+
+@pytest.mark.parametrize(
+    ("flags", "named"),
+    [
+        (["--probabilities", "0.9", "1"], r"probabilities\[1\] = 1.*above 0 and at most 0.9999"),
+        (["--checked", "-1"], "checked = -1.*at least 0"),
+        (["--laws"], "--laws.*one or more of swept"),
+        (["--laws", "swept", "swept"], "--laws swept swept.*each once"),
+        (["--only", "no such cell"], "--only no such cell.*wall/bell/200 ms"),
+    ],
+)
+def test_bad_settings_are_named(flags: list[str], named: str) -> None:
+    with pytest.raises(ConfigurationError, match=named):
+        ask(QUESTION, flags)
+
+
+def test_the_question_is_answered_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("feelahead.lab.questions.coverage.RACED", ("empty",))
+    monkeypatch.setattr("feelahead.lab.questions.coverage.QUICK_SIZES", (1, 2))
+    flags = ["--quick", "--workers", "1", "--laws", "swept", "none", "--only", "wall/bell"]
+    flags += ["--probabilities", "0.5", "--checked", "1", "--raced", "1"]
+    table, picture = tmp_path / "out.csv", tmp_path / "out.png"
+    assert ask(QUESTION, [*flags, "--csv", str(table), "--picture", str(picture)]) == 0
+    shown = capsys.readouterr().out
+    assert "covered: full strength stood in time" in shown
+    assert "| bell | 200 ms |" in shown
+    assert "of 1 as reckoned" in shown
+    assert "1.00 (1/1)" in shown
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    kinds = [line.split(",") for line in table.read_text().splitlines()]
+    assert [kinds[0].count(name) for name in ("kind", "cell", "law", "coverage", "ratio")] == [1] * 5
+    assert len(kinds) == 1 + 2 + 2 + 1

@@ -1,0 +1,381 @@
+"""The propagation's truth is exact, and predictions are compared with the right piece of the way."""
+
+import math
+import tomllib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from feelahead.lab.approaches.prediction import (
+    AGE_BINS_S,
+    COMPENSATIONS,
+    ToolPath,
+    error_table,
+    judge,
+    moments,
+    over,
+)
+from feelahead.lab.approaches.recording import RecordedApproach
+from feelahead.lab.propagation import (
+    BATCHES,
+    NOISE_RAD,
+    SINGULAR,
+    Chain,
+    PosedGripper,
+    failures,
+    largest_variance,
+    linear,
+    measure,
+    monte_carlo,
+    once,
+    places,
+    unscented,
+)
+from feelahead.lab.questions import error as module
+from feelahead.lab.questions.error import DELAYS_MS, QUESTION, link_spec
+from feelahead.lab.sweep import ask
+from feelahead.lab.table import Row, Table
+from robot_side.arm.port import GripperPose
+from robot_side.enlargement.prediction_errors import load_prediction_errors
+from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.simulation.scene import load_scene
+
+X = np.array([1.0, 0.0, 0.0])
+FULL_M_S = 0.25
+LIMITS = MotionLimits()
+TICK_S = 0.001
+BEGAN_S, END_S = 2.0, 6.0
+
+
+# Propagation
+
+
+@cache
+def gripper() -> PosedGripper:
+    return PosedGripper(load_scene())
+
+
+@cache
+def propagated() -> Table:
+    return Table(row for number in range(4) for row in measure(gripper(), number, 2, 500 * BATCHES, 0))
+
+
+def crank(radius_m: float) -> Chain:
+    """Make one hinge about z at the origin, whose point stands on x."""
+    jacobian = np.array([[0.0], [radius_m], [0.0], [0.0], [0.0], [1.0]])
+    return Chain(jacobian, radius_m * X, radius_m * X)
+
+
+@given(st.integers(0, 1000))
+def test_the_chain_is_the_kinematics_for_every_point_however_far(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    here, change = generator.uniform(-3.0, 3.0, 6), generator.normal(0.0, 1.0, 6)
+    pose, there = gripper().at(here), gripper().at(here + change)
+    for sphere in (0, len(pose.sphere_centers_m) - 1):
+        chain = Chain(pose.tool_jacobian, pose.tool_position_m, pose.sphere_centers_m[sphere])
+        moved = pose.sphere_centers_m[sphere] + chain.displacements(change[None])[0]
+        np.testing.assert_allclose(moved, there.sphere_centers_m[sphere], rtol=0.0, atol=1e-12)
+
+
+def test_small_changes_keep_their_digits_and_slides_turn_with_the_joints_before_them() -> None:
+    changes = np.array([[1e-9], [-1e-12]])
+    moved = crank(1.0).displacements(changes)
+    np.testing.assert_allclose(moved[:, 1], changes[:, 0], rtol=1e-14)
+    np.testing.assert_allclose(moved[:, 0], -0.5 * changes[:, 0] ** 2, rtol=1e-12)
+    # A hinge about z, and beyond it a slide along the present x.
+    jacobian = np.array([[0.0, 1.0], [0.5, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
+    at = np.array([0.5, 0.0, 0.0])
+    slid = Chain(jacobian, at, at).displacements(np.array([[math.pi / 2.0, 0.25]]))
+    np.testing.assert_allclose(at + slid[0], [0.0, 0.75, 0.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("noise_rad", NOISE_RAD)
+def test_one_joint_gives_the_known_distribution(noise_rad: float) -> None:
+    chain, radius_m, across = crank(0.8), 0.8, np.array([0.0, 1.0, 0.0])
+    eq_5 = linear(np.array([[0.0], [radius_m], [0.0]]), noise_rad, across)
+    assert eq_5.mean_m == 0.0
+    assert eq_5.sd_m == pytest.approx(radius_m * noise_rad)
+    # E cos δ = exp(-σ²/2), Var sin δ = (1 - exp(-2σ²)) / 2.
+    mean_m = radius_m * math.expm1(-0.5 * noise_rad**2)
+    sd_m = radius_m * math.sqrt(-0.5 * math.expm1(-2.0 * noise_rad**2))
+    assert unscented(chain.displacements, 1, noise_rad, X).mean_m == pytest.approx(mean_m, rel=1e-3 * noise_rad)
+    assert unscented(chain.displacements, 1, noise_rad, across).sd_m == pytest.approx(sd_m, rel=noise_rad**2)
+    draws = noise_rad * np.random.default_rng(1).standard_normal((1000 * BATCHES, 1))
+    truth = monte_carlo(chain.displacements, draws, across)
+    assert abs(truth.sd_m - sd_m) < 5.0 * truth.sd_error_m
+    assert abs(truth.true_quantile_m - radius_m * math.sin(2.3263 * noise_rad)) < 5.0 * truth.quantile_error_m
+    assert truth.sd_error_m == pytest.approx(sd_m / math.sqrt(2.0 * 1000 * BATCHES), rel=0.6)
+
+
+def test_once_is_the_same_everywhere_and_never_below_a_sampled_sphere() -> None:
+    largest = largest_variance(gripper(), 0)
+    estimate = once(largest, 1e-3)
+    np.testing.assert_allclose(estimate.covariance_m2, 1e-6 * largest * np.eye(3))
+    far = propagated().where(point="far sphere")
+    assert all(row["once_sd_error_percent"] >= row["linear_sd_error_percent"] for row in far)
+
+
+def test_little_noise_is_linear_within_the_truths_own_error() -> None:
+    rows = [row for row in propagated() if row["noise_rad"] <= 1e-3]
+    assert len(rows) == 4 * 2 * 3
+    for row in rows:
+        assert abs(row["linear_sd_error_percent"]) < 5.0 * row["sd_uncertainty_percent"]
+        assert abs(row["linear_quantile_error_mm"]) < 5.0 * row["quantile_uncertainty_mm"]
+        assert row["linear_covariance_error_percent"] < 5.0
+        assert row["unscented_sd_error_percent"] == pytest.approx(row["linear_sd_error_percent"], abs=0.1)
+
+
+def test_the_singular_place_errs_least_along_the_approach() -> None:
+    def share(place: FloatArray) -> float:
+        pose = gripper().at(place)
+        estimate = linear(pose.tool_jacobian[:3], 1.0, pose.tool_rotation[:, 2])
+        return estimate.sd_m**2 / float(np.trace(estimate.covariance_m2))
+
+    found = places(gripper(), 3, 0)
+    assert min(found, key=lambda name: share(found[name])) == SINGULAR
+
+
+def test_failures_name_the_least_noise_of_more_than_five_per_cent() -> None:
+    def row(place: str, noise_rad: float, sd_percent: float, quantile_percent: float) -> Row:
+        return {"place": place, "noise_rad": noise_rad, "quantile_mm": 2.0, "linear_sd_error_percent": sd_percent} | {
+            "linear_quantile_error_mm": 0.02 * quantile_percent
+        }
+
+    made = [row("home", noise_rad, -1000.0 * noise_rad, 1.0) for noise_rad in NOISE_RAD]
+    made += [row("random 1", noise_rad, 4.0, -14.0) for noise_rad in NOISE_RAD]
+    sd, quantile = failures(Table(made))
+    assert "standard deviation: off by more than 5 % at home from 0.01 rad on" in sd
+    assert "in the random configurations not up to 0.1 rad" in sd
+    assert "at home not up to 0.1 rad, in the random configurations from 1e-05 rad on" in quantile
+
+
+# Prediction
+
+
+def pose_at(joints: FloatArray) -> GripperPose:
+    """Pose an arm of one joint that slides along x, its approach axis."""
+    jacobian = np.zeros((6, 1))
+    jacobian[0] = 1.0
+    return GripperPose(
+        tool_position_m=np.array([joints[0], 0.0, 0.0]),
+        tool_rotation=np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        tool_jacobian=jacobian,
+        sphere_centers_m=np.zeros((0, 3)),
+        sphere_radii_m=np.zeros(0),
+        sphere_on_finger=np.zeros(0, dtype=bool),
+    )
+
+
+def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float = 0.5) -> RecordedApproach:
+    """Make up an arm that follows to the letter over a steady link: `travels`, one every 4 ms, times full speed.
+
+    Its speed changes by at most 8 m/s², in whole steps of a millisecond.
+    """
+    ticks = np.round(np.arange(0.0, END_S, TICK_S), 3)
+    sent_s = np.round(0.004 * np.arange(len(travels)), 3)
+    # A command sent at s is followed from s + there_ms on; a speed changes in the milliseconds after that.
+    newest = (np.arange(len(ticks)) - there_ms) // 4
+    followed = np.where(newest >= 0, sent_s[np.clip(newest, 0, None)], np.nan)
+    way_m, speed, ways_m, speeds = 0.0, 0.0, [], []
+    for index in newest:
+        ways_m.append(way_m)
+        speeds.append(speed)
+        target = FULL_M_S * travels[index] if index >= 0 else 0.0
+        most = LIMITS.acceleration_rad_s2 * TICK_S
+        after = speed + min(max(target - speed, -most), most)
+        way_m += 0.5 * (speed + after) * TICK_S
+        speed = after
+    poses = slice(0, None, 10)
+    count = len(ticks[poses])
+    return RecordedApproach(
+        pull="bell",
+        link="",
+        seed=0,
+        began_s=BEGAN_S,
+        pose_time_s=ticks[poses],
+        joint_positions_rad=np.array(ways_m)[poses, None],
+        joint_velocities_rad_s=np.array(speeds)[poses, None],
+        finger_positions=np.zeros((count, 0)),
+        loop_age_s=np.full(count, quantile_s),
+        tick_time_s=ticks,
+        applied_sent_s=followed,
+        applied_at_s=np.round(followed + 1e-3 * there_ms, 3),
+        seen_sent_s=np.where(ticks >= 1e-3 * back_ms, np.round(ticks - 1e-3 * back_ms, 3), np.nan),
+        travel=np.zeros((len(ticks), 2)),
+        command_time_s=sent_s,
+        command=travels,
+    )
+
+
+def bells() -> FloatArray:
+    time_s = 0.004 * np.arange(round(END_S / 0.004))
+    return np.where(time_s < BEGAN_S, 0.0, 0.5 - 0.5 * np.cos(2.0 * math.pi * (time_s - BEGAN_S)))
+
+
+def greatest_m(row: Row, name: str) -> float:
+    return float(np.abs(row[name]).max())
+
+
+@pytest.mark.parametrize(("there_ms", "back_ms"), [(0, 0), (20, 100), (400, 400)])
+def test_the_commands_under_way_predict_an_obedient_arm(there_ms: int, back_ms: int) -> None:
+    judged = judge(recorded(bells(), there_ms, back_ms), pose_at, LIMITS, FULL_M_S)
+    assert len(judged["way_m"]) > 300
+    assert all(judged["within_reach"])
+    # Poses are 10 ms apart, and speeds between them are interpolated: by so much they are off.
+    assert greatest_m(judged, "operator") < 0.15e-3
+    assert greatest_m(judged, "speed at the end") < 2e-3
+    loop_s = 1e-3 * (there_ms + back_ms)
+    assert loop_s - 1e-9 <= min(judged["loop_age_s"]) <= max(judged["loop_age_s"]) <= loop_s + 0.005
+    if loop_s >= 0.4:
+        assert greatest_m(judged, "momentary") > 0.02
+        assert greatest_m(judged, "robot") > 0.02
+
+
+def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far() -> None:
+    record = recorded(np.full(1500, 0.8), 100, 100, quantile_s=0.25)
+    judged, at, speed_m_s = judge(record, pose_at, LIMITS, FULL_M_S), moments(record), 0.8 * FULL_M_S
+    np.testing.assert_allclose(at.arrives_s - at.reported_s, 0.2, atol=1e-9)
+    np.testing.assert_allclose(judged["way_m"], speed_m_s * 0.2, atol=1e-9)
+    np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
+    # The age of the newest command that the report knew of has up to a period in it for which it was held.
+    np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
+
+
+def test_the_prediction_follows_a_hand_that_lets_go() -> None:
+    travels = np.where(np.arange(1500) * 0.004 < 4.0, 1.0, 0.0)
+    judged = judge(recorded(travels, 200, 200), pose_at, LIMITS, FULL_M_S)
+    # An arm of infinite acceleration would be v²/2a = 3.9 mm off.
+    assert greatest_m(judged, "operator") < 0.6e-3
+
+
+def test_moments_are_those_that_can_be_compared() -> None:
+    record = recorded(bells(), 200, 100)
+    at = moments(record)
+    # Every 10 ms, the newest command of each; the last ones have not arrived within the record.
+    assert len(at) == pytest.approx((END_S - BEGAN_S - 0.2) / 0.01, abs=2)
+    np.testing.assert_allclose(at.reported_s, at.now_s - 0.1)
+    np.testing.assert_allclose(at.arrives_s, at.now_s + 0.2)
+    assert (at.arrives_s <= record.pose_time_s[-1]).all()
+    deaf = replace(record, seen_sent_s=np.full_like(record.seen_sent_s, np.nan))
+    assert judge(deaf, pose_at, LIMITS, FULL_M_S)["way_m"] == []
+    gap = record.applied_sent_s.copy()
+    gap[(record.tick_time_s > 3.0) & (record.tick_time_s < 3.5)] = np.nan
+    assert len(at) - len(moments(replace(record, applied_sent_s=gap))) == pytest.approx(50, abs=2)
+
+
+def test_ways_are_along_the_axis_at_their_beginning_and_reach_has_an_edge() -> None:
+    record = recorded(np.full(1500, 1.0), 0, 0)
+
+    def oblique(joints: FloatArray) -> GripperPose:
+        pose = pose_at(joints)
+        return replace(pose, tool_rotation=np.array([[1.0, 0.0, 0.6], [0.0, 1.0, 0.8], [0.0, 0.0, 0.0]]))
+
+    way_m = ToolPath(record, oblique, LIMITS, FULL_M_S).ways_m(np.array([3.0]), np.array([3.4]))
+    assert way_m[0] == pytest.approx(0.6 * 0.4 * FULL_M_S)
+
+    def far(joints: FloatArray) -> GripperPose:
+        pose = pose_at(joints)
+        return replace(pose, tool_jacobian=pose.tool_jacobian * (1.0 if joints[0] < 0.2 else 0.05))
+
+    crossed_s = float(np.interp(0.2, record.joint_positions_rad[:, 0], record.pose_time_s))
+    from_s = crossed_s + np.array([-0.7, -0.2, 0.2])
+    within = ToolPath(record, far, LIMITS, FULL_M_S).within_reach(from_s, from_s + 0.3)
+    assert within.tolist() == [True, False, False]
+
+
+def made_up(errors_mm: list[float], age_s: float = 0.4, link: str = "") -> dict[str, Any]:
+    errors_m, count = 1e-3 * np.array(errors_mm), len(errors_mm)
+    row = {"kind": "prediction", "pull": "bell", "link": link, "seed": 3, "loop_age_s": [age_s] * count}
+    row |= {"within_reach": [False] + [True] * (count - 1), "way_m": [0.0] * count}
+    return row | {"operator": errors_m.tolist(), "robot": (10.0 * errors_m).tolist(), "momentary": errors_m.tolist()}
+
+
+def test_spreads_pool_the_moments_within_reach_by_the_loop_age_of_their_link() -> None:
+    judged = Table([made_up([100.0, 1.0, -3.0, math.nan, 2.0]), made_up([150.0, 5.0], age_s=0.8)])
+    found = over(judged, "operator", (0.28, 0.58))
+    assert (found.moments, found.loop_age_ms, found.max_mm) == (3, 400.0, 3.0)
+    assert found.mean_mm == pytest.approx(0.0)
+    assert found.sd_mm == pytest.approx(math.sqrt(14.0 / 3.0))
+    assert over(judged, "robot", within_reach=False).mean_mm == pytest.approx(1250.0)
+    assert over(judged, "operator", (0.0, 0.02)).moments == 0
+    short_by_chance = made_up([100.0, 1.0, 3.0]) | {"loop_age_s": [0.4, 0.01, 0.4]}
+    assert over(Table([short_by_chance]), "operator", (0.28, 0.58)).moments == 2
+    # Both ways, less the gain of the fastest messages, and the command's period: each link has a bin.
+    for loop_s, (low_s, high_s) in zip((0.004, 0.044, 0.084, 0.184, 0.384, 0.784), AGE_BINS_S, strict=True):
+        assert low_s <= loop_s < high_s
+
+
+def test_the_robot_side_reads_the_table(tmp_path: Path) -> None:
+    judged = Table([made_up([100.0, 1.0, 3.0]), made_up([200.0, 5.0], age_s=0.8, link="delay 400ms")])
+    path = tmp_path / "table.toml"
+    path.write_text(error_table(judged, "f1a9", "abc123", FULL_M_S), encoding="utf-8")
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    known = {"arm": "f1a9", "frozen": "abc123", "full_speed_m_s": FULL_M_S, "pulls": ["bell"], "seeds": [3]}
+    assert {key: table[key] for key in known} == known
+    assert table["links"] == ["", "delay 400ms"]
+    assert table["operator"][0] == {"loop_age_ms": 400.0, "mu_mm": 2.0, "sigma_mm": 1.0, "p99_mm": 2.98, "n": 2}
+    assert all([row["loop_age_ms"] for row in table[kind]] == [400.0, 800.0] for kind in COMPENSATIONS)
+    found = load_prediction_errors(path)
+    assert found.arm == "f1a9"
+    assert found.at("operator", 0.4, FULL_M_S) == pytest.approx((0.002, 0.001))
+    assert found.at("robot", 0.8, FULL_M_S) == pytest.approx((0.05, 0.0))
+    # Between two loop ages, interpolated.
+    assert found.at("operator", 0.6, FULL_M_S) == pytest.approx((0.0035, 0.0005))
+
+
+# The question
+
+
+@pytest.mark.long
+def test_the_question_is_answered_whole_and_the_same_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "QUICK_DELAYS_MS", (200,))
+    monkeypatch.setattr(module, "QUICK_PULLS", ("bell",))
+    monkeypatch.setattr(module, "QUICK_ROUNDS", 1)
+    tables = [tmp_path / "one.toml", tmp_path / "two.toml"]
+    picture = tmp_path / "out.png"
+    arguments = ["--quick", "--draws", str(100 * BATCHES)]
+    assert ask(QUESTION, [*arguments, "--table", str(tables[0]), "--picture", str(picture)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "linear, quantile at 0.99: off by more than 5 %" in shown
+    assert "own commands under way" in shown
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    [own], [eq_8] = (load_prediction_errors(tables[0]).rows[kind] for kind in ("operator", "robot"))
+    assert own[2] < 0.002 < 0.15 * eq_8[2]
+    assert tomllib.loads(tables[0].read_text())["arm"] == load_scene().robot.fingerprint
+    assert ask(QUESTION, [*arguments, "--table", str(tables[1])]) == 0
+    assert tables[1].read_text() == tables[0].read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--draws", "100001"], "--draws 100001: valid: a multiple of 20"),
+        (["--draws", "20"], "draws = 20; valid: 2000 to 10000000"),
+        (["--seeds", "0"], "seeds = 0; valid: 1 to 10000"),
+        (["--table", "/"], "--table /: is a folder"),
+        (["--workers", "2"], "--workers 2: bench error measures time"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: list[str], complaint: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        ask(QUESTION, arguments)
+    assert complaint in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_links_jitter_where_their_delay_permits() -> None:
+    assert [link_spec(delay_ms) for delay_ms in DELAYS_MS][:3] == [
+        "",
+        "delay 25ms 6ms distribution normal",
+        "delay 50ms 10ms distribution normal",
+    ]

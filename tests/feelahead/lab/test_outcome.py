@@ -1,0 +1,402 @@
+"""Approaches whose ends can be worked out by hand, and the definitions of an outcome."""
+
+import functools
+import math
+from dataclasses import fields, replace
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from feelahead.lab.approaches.approach import Approach, robot_settings, run_approach
+from feelahead.lab.approaches.frozen import ASIDE
+from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
+from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, controller
+from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off
+from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
+from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from tests.helpers.repository import DATA
+
+pytestmark = pytest.mark.long
+
+approaches = pytest.mark.xdist_group("approaches")
+"""Run by one worker, so that each approach is made once."""
+REPEATABLE = settings(derandomize=True, deadline=None)
+WAY_MM = 320.0
+FAR = "delay 200ms"
+JITTER = "delay 20ms 10ms distribution normal"
+
+
+@functools.cache
+def ended(scene: str = "wall", force_n: float = 3.0, **changes: Any) -> Outcome:
+    return run_approach(Approach(DATA / f"{scene}.xml", force_n, **changes))
+
+
+def free_speed_mm_s(force_n: float) -> float:
+    """Of the trigger's travel against its spring alone, what is sensed, what of that counts, at 250 mm/s when full."""
+    sensed = min((force_n - 0.5) / 4.0 / 0.75, 1.0)
+    return 250.0 * min((sensed - 0.05) / (0.98 - 0.05), 1.0)
+
+
+# Onto a wall
+
+
+@approaches
+@pytest.mark.parametrize(("force_n", "known_mm_s", "link"), [(3.0, 210.0, ""), (3.0, 210.0, FAR), (2.0, 120.0, FAR)])
+def test_without_haptics_a_wall_is_hit_unbraked(force_n: float, known_mm_s: float, link: str) -> None:
+    outcome = ended(force_n=force_n, link=link, law="none")
+    assert (outcome.end, outcome.contact_with) == ("contact", "wall")
+    assert outcome.contact_speed_mm_s == pytest.approx(known_mm_s, abs=3.0)
+    assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(force_n), abs=3.0)
+    assert (outcome.stops_at_mm, outcome.way_left_mm, outcome.reversals) == (None, None, 0)
+
+
+@approaches
+@pytest.mark.parametrize("link", ["", f"{FAR} 10ms distribution normal"])
+def test_a_light_finger_stops_before_the_wall_whatever_the_delay(link: str) -> None:
+    outcome = ended(force_n=2.0, link=link)
+    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
+    assert outcome.stops_at_mm is not None
+    assert 10.0 < outcome.stops_at_mm < 20.0
+    assert outcome.way_left_mm == pytest.approx(outcome.stops_at_mm, abs=0.01)
+    # It comes to rest where it is nearest, and has slowed down once.
+    assert outcome.least_gap_mm == pytest.approx(outcome.stops_at_mm, abs=0.1)
+    assert outcome.reversals == 1
+    assert 1e3 * outcome.trace.speed_m_s.max() == pytest.approx(free_speed_mm_s(2.0), abs=3.0)
+
+
+@approaches
+@pytest.mark.parametrize("link", ["", FAR])
+def test_a_finger_that_overcomes_the_effect_touches_slowly_whatever_the_delay(link: str) -> None:
+    outcome = ended(link=link)
+    assert (outcome.end, outcome.contact_with) == ("contact", "wall")
+    assert outcome.contact_speed_mm_s is not None
+    assert 0.0 < outcome.contact_speed_mm_s <= 40.0
+    # 1 N is left of its force.
+    assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
+    assert outcome.reversals == 1
+
+
+def standing_off_mm(link: str) -> float:
+    outcome = run_approach(Approach(DATA / "wall.xml", 2.0, link=link))
+    assert outcome.stops_at_mm is not None
+    return outcome.stops_at_mm
+
+
+@approaches
+def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_prediction(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = load_prediction_errors(BUILT_IN)
+    as_known_mm = standing_off_mm(FAR)
+    path = tmp_path / "none.toml"
+    row = "loop_age_ms = 4\nmu_mm = 0\nsigma_mm = 0\n"
+    path.write_text(f"[[operator]]\n{row}[[robot]]\n{row}")
+    monkeypatch.setattr(
+        "feelahead.lab.approaches.approach.robot_settings",
+        lambda approach: replace(robot_settings(approach), prediction_errors=path),
+    )
+    near_mm, far_mm = standing_off_mm(""), standing_off_mm(FAR)
+    assert far_mm == pytest.approx(near_mm, abs=0.2)
+
+    def sigma_mm(mean_m: float, sd_m: float) -> float:
+        """D_σ of eq. 9-10, by a camera that errs by 3 mm and an arm that errs by much less."""
+        return 1e3 * (mean_m + NormalDist().inv_cdf(0.99) * math.hypot(0.003, sd_m))
+
+    wider_mm = sigma_mm(*known.at("operator", 0.404, 0.25)) - sigma_mm(0.0, 0.0)
+    assert 1.0 < wider_mm < 2.0
+    assert as_known_mm == pytest.approx(far_mm + wider_mm, abs=0.2)
+
+
+@approaches
+def test_by_the_robot_sides_reckoning_it_stops_as_well_and_farther_off() -> None:
+    at_once, late = (ended(force_n=2.0, link=link, law="swept_robot") for link in ("", FAR))
+    own = ended(force_n=2.0, link=FAR)
+    assert {at_once.end, late.end, own.end} == {"stopped"}
+    assert at_once.stops_at_mm is not None
+    assert late.stops_at_mm is not None
+    assert own.stops_at_mm is not None
+    assert at_once.stops_at_mm < 20.0
+    # What v t_d misses at 200 ms each way is enlarged by.
+    assert late.stops_at_mm > own.stops_at_mm + 20.0
+
+
+@approaches
+def test_a_margin_stops_it_so_far_off() -> None:
+    outcome = ended(force_n=2.0, law="margin", margin_m=0.05)
+    assert outcome.stops_at_mm is not None
+    # Where the ways are so short: D_σ and the ramp before the wall come on top.
+    assert 50.0 < outcome.stops_at_mm < 75.0
+
+
+@approaches
+def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> None:
+    assisted, alone = (ended(force_n=5.0, assist=assist, duration_s=3.5) for assist in ("speed", "none"))
+    assert (assisted.end, assisted.contact_with) == ("stopped", None)
+    assert assisted.least_gap_mm > 5.0
+    assert (alone.end, alone.contact_with) == ("contact", "wall")
+    assert alone.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
+
+
+@approaches
+def test_full_is_full_from_the_first_moment_on() -> None:
+    outcome = ended(law="full", duration_s=0.5)
+    assert outcome.end == "undecided"
+    assert (outcome.trace.strengths == 8).all()
+    assert 1e3 * outcome.trace.speed_m_s[-1] == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
+
+
+@approaches
+def test_the_trace_tells_the_way_to_the_wall() -> None:
+    outcome = ended(link=FAR, law="none")
+    trace = outcome.trace
+    rows = len(trace.time_s)
+    assert [getattr(trace, one.name).shape for one in fields(Trace)] == [(rows,)] * 4 + [(rows, 10)]
+    assert trace.time_s[0] == 0.0
+    assert trace.time_s[-1] == outcome.ended_s
+    np.testing.assert_allclose(np.diff(trace.time_s)[:-1], SAMPLE_S, atol=1e-9)
+    # It begins 320 mm before the wall; the speed, added up, has brought it there.
+    assert 1e3 * trace.gap_m[0] == pytest.approx(WAY_MM, abs=0.1)
+    assert 1e3 * np.trapezoid(trace.speed_m_s, trace.time_s) == pytest.approx(WAY_MM, abs=1.0)
+    assert outcome.least_gap_mm == 1e3 * trace.gap_m.min()
+    assert -0.3 < outcome.least_gap_mm <= 0.0
+    # A finger of 3 N, felt by nobody but the spring.
+    assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
+    assert trace.strengths.max() == 0
+
+
+@approaches
+def test_what_is_felt_is_in_the_trace() -> None:
+    trace, strongest_n = ended().trace, 2.0
+    assert trace.strengths.dtype == np.int64
+    assert trace.strengths[0].max() == 0
+    assert trace.strengths.max() == 8
+    # A finger of 3 N that feels these strengths travels as the trace says, but for what changes within 10 ms; by the
+    # end it has gone back by this much.
+    trigger, travels = SimulatedTrigger(strongest_n / 8), []
+    trigger.set_finger_force(3.0)
+    for strengths in trace.strengths[:-1].tolist():
+        travels.append(trigger.travel)
+        trigger.set_effect(MultiPositionFeedback(tuple(strengths)))
+        trigger.advance(SAMPLE_S)
+    np.testing.assert_allclose(travels, trace.travel[:-1], atol=0.1)
+    assert trace.travel[-1] < (3.0 - 0.5) / 4.0 - 0.1 * strongest_n
+
+
+@approaches
+def test_what_is_gripped_counts_as_gripper() -> None:
+    outcome = ended("place_held", force_n=3.7, grip=True, law="none")
+    assert (outcome.end, outcome.contact_with) == ("contact", "table")
+    assert outcome.contact_speed_mm_s == pytest.approx(250.0, abs=3.0)
+    assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
+
+
+# Onto what a straight pull passes, what goes away, and what rises
+
+
+@approaches
+@pytest.mark.parametrize(
+    ("scene", "thing", "link", "stops_in_s"),
+    [
+        ("edge", "right_block", "", 4.0),
+        ("turn", "right_post", "", 4.5),
+        ("fleeing", "mover", "", 8.0),
+        ("terrain_ahead", "terrain", FAR, 4.5),
+    ],
+)
+def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_effect_touches_slowly(
+    scene: str, thing: str, link: str, stops_in_s: float
+) -> None:
+    stick, turn = ASIDE.get(scene, ((0.0, 0.0), (0.0, 0.0)))
+    light, strong = (
+        ended(scene, force_n, stick=stick, turn=turn, link=link, duration_s=stops_in_s) for force_n in (2.0, 3.0)
+    )
+    assert (light.end, light.contact_with) == ("stopped", None)
+    assert 5.0 < light.least_gap_mm < 25.0
+    assert (strong.end, strong.contact_with) == ("contact", thing)
+    assert strong.contact_speed_mm_s is not None
+    assert strong.contact_speed_mm_s <= 40.0
+
+
+# Not onto it
+
+
+@approaches
+def test_who_does_not_pull_stops_where_they_are() -> None:
+    outcome = ended(force_n=0.0, duration_s=1.2)
+    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
+    assert outcome.stops_at_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.way_left_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.least_gap_mm == pytest.approx(WAY_MM, abs=0.1)
+    assert outcome.reversals == 0
+    assert outcome.ended_s == pytest.approx(1.2)
+
+
+@approaches
+def test_who_still_moves_at_the_end_is_undecided() -> None:
+    outcome = ended(force_n=3.7, duration_s=0.5, link=JITTER)
+    assert outcome.end == "undecided"
+    assert (outcome.contact_speed_mm_s, outcome.stops_at_mm, outcome.way_left_mm) == (None, None, None)
+    assert 0.0 < outcome.least_gap_mm < WAY_MM
+
+
+# The same again
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    plain = {one.name: getattr(outcome, one.name) for one in fields(Outcome) if one.name != "trace"}
+    return plain | {one.name: getattr(outcome.trace, one.name).tolist() for one in fields(Trace)}
+
+
+@approaches
+def test_a_seed_gives_the_same_outcome_whatever_ran_before_and_another_one_another() -> None:
+    asked = Approach(DATA / "wall.xml", 3.7, duration_s=0.5, link=JITTER)
+    first = numbers(run_approach(asked))
+    assert numbers(run_approach(replace(asked, seed=1))) != first
+    assert numbers(run_approach(asked)) == first
+
+
+# What cannot be
+
+
+def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("feelahead.lab.approaches.arming.LONGEST_ARMING_S", 3.0)
+    for changes, why in (
+        ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
+        ({"grip": True}, "grip"),
+    ):
+        failed = ended(**changes)
+        assert failed.end == "failed"
+        assert failed.why is not None
+        assert why in failed.why
+        assert failed.contact_speed_mm_s is failed.stops_at_mm is None
+
+
+def test_an_arm_that_safety_stops_has_not_been_stopped_by_the_law() -> None:
+    stopped = ended(link="outage 300ms at 2.3s", duration_s=3.0)
+    assert (stopped.end, stopped.stops_at_mm) == ("disarmed", None)
+    assert stopped.why is not None
+    assert "no command for" in stopped.why
+
+
+# Reversals
+
+SPEEDS = st.lists(st.integers(-300, 300).map(lambda mm_s: mm_s / 1024.0), max_size=60)
+"""In binary fractions, so that adding and taking away is exact."""
+
+
+@pytest.mark.parametrize(
+    ("speeds_mm_s", "count"),
+    [
+        ([], 0),
+        ([100], 0),
+        ([0, 50, 100, 200, 210], 0),  # monotone
+        ([0, 100, 200, 200, 100, 0], 1),  # rises and stops
+        ([0, 200, 100, 200], 2),
+        ([0, 200, 0, 200, 0, 200, 0], 5),
+        ([0, 100, 90, 100, 90, 100, 90], 0),  # noise
+        ([100, 86, 100, 86, 100], 0),
+        ([100, 84, 100, 84, 100], 4),
+        ([0, 100, 95, 90, 85, 80], 1),  # little by little
+        ([200, 0], 1),  # it had risen before
+        ([0, -50], 1),
+        ([0, 100, 84, 98, 84, 98], 1),
+    ],
+)
+def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], count: int) -> None:
+    assert reversals([1e-3 * one for one in speeds_mm_s]) == count
+
+
+@given(SPEEDS, st.integers(-1024, 1024))
+@REPEATABLE
+def test_a_constant_speed_on_top_changes_no_count(speeds_m_s: list[float], offset: int) -> None:
+    assert reversals([one + offset / 1024.0 for one in speeds_m_s]) == reversals(speeds_m_s)
+
+
+@given(SPEEDS, st.integers(1, 5))
+@REPEATABLE
+def test_speeds_that_last_longer_change_no_count(speeds_m_s: list[float], times: int) -> None:
+    assert reversals([one for one in speeds_m_s for _ in range(times)]) == reversals(speeds_m_s)
+
+
+# Standing
+
+
+def trace_of(speeds_m_s: list[float]) -> Trace:
+    rows = len(speeds_m_s)
+    still = np.zeros(rows)
+    return Trace(
+        np.linspace(0.0, SAMPLE_S * (rows - 1), rows),
+        np.array(speeds_m_s),
+        still,
+        still,
+        np.zeros((rows, 10), dtype=np.int64),
+    )
+
+
+@pytest.mark.parametrize(
+    ("last_m_s", "seconds", "standing"),
+    [
+        (0.0, 1.02, True),
+        (0.00099, 1.02, True),
+        (-0.00099, 1.02, True),
+        (0.0011, 1.02, False),
+        (-0.0011, 1.02, False),
+        (0.0, 0.9, False),  # not for long enough
+    ],
+)
+def test_the_gripper_stands_when_it_has_been_slow_for_a_second(
+    last_m_s: float, seconds: float, *, standing: bool
+) -> None:
+    assert stands(trace_of([0.2] * 100 + [last_m_s] * round(seconds / SAMPLE_S))) is standing
+
+
+def test_one_twitch_within_the_last_second_is_no_standing() -> None:
+    for ago_s, standing in ((0.02, False), (0.95, False), (1.05, True)):
+        speeds = [0.0] * 300
+        speeds[-1 - round(ago_s / SAMPLE_S)] = 0.002
+        assert stands(trace_of(speeds)) is standing
+
+
+# Controllers
+
+
+def told(l2: AnyEffect | None = None, r2: AnyEffect | None = None) -> bytes:
+    return build_output_report(OutputReport(l2=l2, r2=r2))
+
+
+def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
+    return device.effects
+
+
+def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
+    device = controller(0.25, "delayed")
+    device.read(0.0)
+    device.write(told(r2=Feedback(3, 6)), 0.01)
+    device.write(told(r2=Feedback(2, 1), l2=Feedback(1, 1)), 0.05)
+    after_ms = {}
+    for milliseconds in range(51, 200):
+        device.read(1e-3 * milliseconds)
+        after_ms[milliseconds] = felt(device)
+    assert SPOILING_DELAY_S == 0.1
+    assert after_ms[109] == (Off(), Off())
+    assert after_ms[111] == after_ms[149] == (Off(), Feedback(3, 6))
+    assert after_ms[151] == after_ms[199] == (Feedback(1, 1), Feedback(2, 1))
+
+
+def test_a_swapped_controller_does_it_on_the_other_trigger() -> None:
+    device = controller(0.25, "swapped")
+    device.read(0.0)
+    device.write(told(r2=Feedback(3, 6)), 0.01)
+    assert felt(device) == (Feedback(3, 6), Off())
+    device.write(told(l2=Feedback(1, 1), r2=Off()), 0.02)
+    assert felt(device) == (Off(), Feedback(1, 1))
+    # Telling one of them leaves the other as it is.
+    device.write(told(r2=Feedback(5, 5)), 0.03)
+    assert felt(device) == (Feedback(5, 5), Feedback(1, 1))
