@@ -108,17 +108,8 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
     words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "4", "--media", "virtual", "--compose"]
     # Others' trials, and what older ones left, are not ours to judge.
     before = compose.existing(f"name={TRIALS}")
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "feelahead",
-        "try",
-        "latency",
-        *words,
-        "--summary",
-        str(tmp_path / "latency.json"),
-    ]
+    summary = tmp_path / "latency.json"
+    command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, f"--summary={summary}"]
     environment = {**compose.engine.environment, **compose.settings}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr

@@ -86,12 +86,8 @@ ARROWS = """
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
-    feelahead/benchmarks: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
-        feelahead/documents
-    feelahead/experiments: common/* robot_side/* operator_side/* feelahead/lab/* feelahead/both_sides
-    feelahead/recordings: common/* robot_side/* operator_side/*
-    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/lab/* feelahead/both_sides
-        feelahead/benchmarks/* feelahead/experiments/* feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/lab feelahead/both_sides
+        feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of
@@ -118,8 +114,6 @@ LIBRARIES = {
         "feelahead/commands",
         "feelahead/containers",
         "feelahead/lab",
-        "feelahead/benchmarks",
-        "feelahead/experiments",
     ),
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
@@ -132,8 +126,6 @@ LIBRARIES = {
         "feelahead/lab",
         "feelahead/both_sides",
         "feelahead/commands",
-        "feelahead/benchmarks",
-        "feelahead/experiments",
     ),
 }
 """Each library (or clock) with the rooms and files that may import it."""

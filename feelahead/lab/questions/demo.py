@@ -23,7 +23,7 @@ from robot_side.simulation.built_in_scenes import SceneName
 
 
 @dataclass(frozen=True)
-class DemoSweep(Sweep):
+class DemoSettings(Sweep):
     """The demo, seed by seed: the same two sides and the same person in virtual time, and what is true of the end."""
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 10
@@ -48,7 +48,7 @@ class DemoSweep(Sweep):
             require_young_loop(spec, self.link_model)
 
 
-def cells(settings: DemoSweep) -> Iterator[Trial]:
+def cells(settings: DemoSettings) -> Iterator[Trial]:
     """Lay out one cell for each link."""
     for link in settings.link[: 1 if settings.quick else None]:
         yield Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
@@ -59,7 +59,7 @@ def run(cell: Trial, seed: int) -> Iterator[Row]:
     yield asdict(run_trial(cell, seed))
 
 
-def show(_: DemoSweep, table: Table) -> Iterator[Shown]:
+def show(_: DemoSettings, table: Table) -> Iterator[Shown]:
     """Make a table for each link: a row for each seed, and how many of them did it."""
     for (link,), runs in table.groups("link"):
         shown = Shown(title=Text(f"link: {link or 'none'}"), box=MARKDOWN)
@@ -102,4 +102,4 @@ def _number(value: Any, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-QUESTION = Question("try demo", DemoSweep, cells, run, show)
+QUESTION = Question("try demo", DemoSettings, cells, run, show)

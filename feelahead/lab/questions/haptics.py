@@ -32,7 +32,7 @@ _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
 
 
 @dataclass(frozen=True)
-class HapticsSweep(Sweep):
+class HapticsSettings(Sweep):
     """Trials of a person who sees distances wrongly and no obstacle: without haptics, with, and with and noticing.
 
     They reach for the target in single moves, grasp it, lift it and set it down again. Trials with the same seed differ
@@ -79,7 +79,7 @@ class Cell:
     trial: Trial
 
 
-def cells(settings: HapticsSweep) -> Iterator[Cell]:
+def cells(settings: HapticsSettings) -> Iterator[Cell]:
     """Lay out scenes by delays by arms."""
     few = 1 if settings.quick else None
     for scene, delay_ms, arm in product(settings.scenes[:few], settings.delays[:few], _ARMS):
@@ -105,7 +105,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
     yield asdict(run_trial(cell.trial, seed))
 
 
-def show(settings: HapticsSweep, table: Table) -> Iterator[Shown]:
+def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
     """Make a table for each scene and delay, with a row for each arm."""
     for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
         # As Markdown, for docs/measurements.md.
@@ -156,4 +156,4 @@ def restricted(times_s: Sequence[float | None], limit_s: float) -> list[float]:
     return [limit_s if time_s is None else min(time_s, limit_s) for time_s in times_s]
 
 
-QUESTION = Question("try haptics", HapticsSweep, cells, run, show)
+QUESTION = Question("try haptics", HapticsSettings, cells, run, show)

@@ -47,7 +47,7 @@ _WIDE: Final = 0.7
 
 
 @dataclass(frozen=True)
-class LatencySweep(Sweep):
+class LatencySettings(Sweep):
     """A finger that pulls R2 with a constant force towards a wall, over links as they are: what the delay does.
 
     Each link with and without haptics, over the same seeds, and in several media: virtual time, two processes whose
@@ -92,7 +92,7 @@ class Cell:
     trial: Trial
 
 
-def cells(settings: LatencySweep) -> Iterator[Cell]:
+def cells(settings: LatencySettings) -> Iterator[Cell]:
     """Lay out links by haptics by media."""
     containers: tuple[Medium, ...] = ("containers",) if settings.compose else ()
     links = settings.links[: 1 if settings.quick else None]
@@ -166,7 +166,7 @@ def _containers() -> Callable[[Trial], TrialFigures]:
     return opened
 
 
-def show(_: LatencySweep, table: Table) -> Iterator[Shown]:
+def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
     """Make a table of figures, and one of how far the media agree."""
     shown = Shown(title="latency: a constant finger towards a wall", box=MARKDOWN)
     for heading in (
@@ -249,7 +249,7 @@ def verdict(first: list[float], second: list[float], margin: float, unit: str) -
     return f"{said} [{low:+.2f}, {high:+.2f}] {unit}"
 
 
-def draw(_: LatencySweep, table: Table, path: Path) -> None:
+def draw(_: LatencySettings, table: Table, path: Path) -> None:
     """Draw the delay in each direction, a dot a seed with mean and 95 %, and contact speeds."""
     links, media = (list(dict.fromkeys(row[name] for row in table)) for name in ("link", "medium"))
     with figure(path, 1, 3, figsize=(13.0, 4.2)) as (_, panels):
@@ -278,4 +278,4 @@ def draw(_: LatencySweep, table: Table, path: Path) -> None:
             panel.set_xticks(range(len(links)), links, rotation=20, ha="right")
 
 
-QUESTION = Question("try latency", LatencySweep, cells, run, show, draw, timed=True)
+QUESTION = Question("try latency", LatencySettings, cells, run, show, draw, timed=True)

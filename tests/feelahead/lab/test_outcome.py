@@ -16,11 +16,12 @@ from feelahead.lab.approaches.approach import Approach, robot_settings, run_appr
 from feelahead.lab.approaches.frozen import ASIDE
 from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, controller
-from operator_side.dualsense.effects.official import AnyEffect, Feedback, MultiPositionFeedback, Off
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.effects.official import AnyEffect, MultiPositionFeedback, Off
+from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from tests.helpers.felt import feedback
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
@@ -367,10 +368,6 @@ def test_one_twitch_within_the_last_second_is_no_standing() -> None:
 # Controllers
 
 
-def told(l2: AnyEffect | None = None, r2: AnyEffect | None = None) -> bytes:
-    return build_output_report(OutputReport(l2=l2, r2=r2))
-
-
 def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
     return device.effects
 
@@ -378,25 +375,25 @@ def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
 def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
     device = controller(0.25, "delayed")
     device.read(0.0)
-    device.write(told(r2=Feedback(3, 6)), 0.01)
-    device.write(told(r2=Feedback(2, 1), l2=Feedback(1, 1)), 0.05)
+    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
+    device.write(OutputReport(r2=feedback(2, 1), l2=feedback(1, 1)), 0.05)
     after_ms = {}
     for milliseconds in range(51, 200):
         device.read(1e-3 * milliseconds)
         after_ms[milliseconds] = felt(device)
     assert SPOILING_DELAY_S == 0.1
     assert after_ms[109] == (Off(), Off())
-    assert after_ms[111] == after_ms[149] == (Off(), Feedback(3, 6))
-    assert after_ms[151] == after_ms[199] == (Feedback(1, 1), Feedback(2, 1))
+    assert after_ms[111] == after_ms[149] == (Off(), feedback(3, 6))
+    assert after_ms[151] == after_ms[199] == (feedback(1, 1), feedback(2, 1))
 
 
 def test_a_swapped_controller_does_it_on_the_other_trigger() -> None:
     device = controller(0.25, "swapped")
     device.read(0.0)
-    device.write(told(r2=Feedback(3, 6)), 0.01)
-    assert felt(device) == (Feedback(3, 6), Off())
-    device.write(told(l2=Feedback(1, 1), r2=Off()), 0.02)
-    assert felt(device) == (Off(), Feedback(1, 1))
+    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
+    assert felt(device) == (feedback(3, 6), Off())
+    device.write(OutputReport(l2=feedback(1, 1), r2=Off()), 0.02)
+    assert felt(device) == (Off(), feedback(1, 1))
     # Telling one of them leaves the other as it is.
-    device.write(told(r2=Feedback(5, 5)), 0.03)
-    assert felt(device) == (Feedback(5, 5), Feedback(1, 1))
+    device.write(OutputReport(r2=feedback(5, 5)), 0.03)
+    assert felt(device) == (feedback(5, 5), feedback(1, 1))

@@ -12,11 +12,11 @@ __all__ = ["Machine", "two_machines"]
 
 
 @contextlib.contextmanager
-def two_machines() -> Iterator[tuple[Machine, Machine]]:
+def two_machines(*addresses: str) -> Iterator[tuple[Machine, Machine]]:
     """Yield the robot's and the operator's machine; skip the test where they cannot be had."""
     with contextlib.ExitStack() as stack:
         try:
-            machines = stack.enter_context(cable.two_machines())
+            machines = stack.enter_context(cable.two_machines(*addresses))
         except NotPermittedError as error:
             pytest.skip(str(error))
         yield machines
