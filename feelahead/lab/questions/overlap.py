@@ -290,9 +290,10 @@ def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
 
 def draw(_: OverlapSweep, table: Table, path: Path) -> None:
     """Draw run time against error, and what a mesh query costs by its triangles."""
-    with figure(path, 1, 2, figsize=(12.0, 4.6)) as (_, (left, right)):
-        for (method,), rows in table.where(part="tradeoff").groups("method"):
-            left.scatter(rows.values("ns"), np.maximum(rows.values("volume"), 1e-18), 16, label=method)
+    with figure(path, 1, 2, figsize=(13.0, 4.6)) as (_, (left, right)):
+        for number, ((method,), rows) in enumerate(table.where(part="tradeoff").groups("method")):
+            errors = np.maximum(rows.values("volume"), 1e-18)
+            left.scatter(rows.values("ns"), errors, 16, label=method, marker="ox^"[number // 5], color=f"C{number % 5}")
         left.axhline(1e-15, color="black", linewidth=0.6, linestyle=":")
         left.set(xscale="log", yscale="log", xlabel="time, ns a pair", ylabel="worst error / sphere volume")
         meshes = table.where(part="mesh")
@@ -301,7 +302,7 @@ def draw(_: OverlapSweep, table: Table, path: Path) -> None:
         right.set(xscale="symlog", yscale="log", xlabel="triangles evaluated", ylabel="ns a query")
         for axes in (left, right):
             axes.grid(alpha=0.3)
-            axes.legend(fontsize=7)
+            axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 QUESTION = Question("bench overlap", OverlapSweep, cells, run, show, draw, goals, timed=True)
