@@ -20,14 +20,14 @@ from robot_side.settings import RobotSettings
         ("model = 3", "model = 3; valid: a path, as a text"),
         ('link_model = "x"', 'link_model = "x"; valid: "datagram" or "stream"'),
         ("camera = 3", "camera = 3; valid: a table with frame_sd_m, mean_m, sd_m"),
-        ('[camera]\nsd_m = "wide"', 'camera.sd_m = "wide"; valid: a number'),
+        ('[camera]\nsd_m = "wide"', 'camera.sd_m = "wide"; valid: 0 to 1'),
         (
             "kinematic_mean_m = [1, 2]",
             "kinematic_mean_m = [1, 2]; valid: [a number, a number, a number]",
         ),
         ("seed = " + "[" * 3 + '"' + "a" * 500 + '"' + "]" * 3, "aaa...; valid: a whole number"),
         ('[roles]\ntin = "box"', 'valid: a table of NAME = "obstacle" or "target" or "support" or "ignored"'),
-        ("[camera]\nsd_m = 7.0", "camera: sd_m = 7.0; valid: 0.0 to 1.0"),
+        ("[camera]\nsd_m = 7.0", "camera.sd_m = 7.0; valid: 0 to 1"),
     ],
 )
 def test_the_line_names_a_way_out(tmp_path: Path, content: str, expected: str) -> None:

@@ -97,7 +97,6 @@ def test_nothing_asked_for_is_no_delay() -> None:
         ("delay 10ms outage 1s at 2s", "outage"),
         ("to_operator.telemetry: delay 5ms", "streams"),
         ("to_robot: outage 1s at 2s", "to_robot: outage"),
-        ("slot distribution uniform 20ms 5ms", "slot"),
     ],
 )
 def test_what_netem_cannot_do_is_left_to_the_sides(spec: str, why: str) -> None:
