@@ -54,7 +54,8 @@ def cluster(address: str) -> Iterator[Executor]:
         from distributed.comm.core import CommClosedError  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise ConfigurationError("--scheduler: distributed is missing; it is in the extra `experiments`") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # this process says itself what went wrong
+    for name in ("distributed", "distributed.client"):  # its import has set them up; the error says what went wrong
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
