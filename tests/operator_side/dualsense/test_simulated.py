@@ -89,21 +89,6 @@ def test_a_normal_pull_is_full_when_free_overcomes_the_strongest_and_rests_at_an
     assert {equilibrium_travel(force_n, strengths) for force_n in (2.6, 3.0, 3.5, 4.4)} == {0.5}
 
 
-@given(st.lists(st.tuples(FORCES, EFFECTS, st.floats(0.0, 0.5), st.integers(1, 300)), min_size=1, max_size=6))
-@settings(derandomize=True, deadline=None, max_examples=60)
-def test_the_step_size_does_not_matter(phases: list[tuple[float, TriggerEffect, float, int]]) -> None:
-    coarse, fine = SimulatedTrigger(), SimulatedTrigger()
-    for force_n, effect, duration_s, steps in phases:
-        for trigger in (coarse, fine):
-            trigger.set_finger_force(force_n)
-            trigger.set_effect(effect)
-        coarse.advance(duration_s)
-        for _ in range(steps):
-            fine.advance(duration_s / steps)
-        assert fine.travel == pytest.approx(coarse.travel, abs=1e-11)
-        assert 0.0 <= fine.travel <= 1.0
-
-
 def test_relaxation_has_the_stated_time_constant() -> None:
     trigger = SimulatedTrigger()
     trigger.set_finger_force(NORMAL_FINGER_FORCE_N)
@@ -176,26 +161,6 @@ def test_hands_come_through() -> None:
     state = state_at(device, 1.0)
     assert (state.l2, state.r2) == pytest.approx((0.2, 1.0))
     assert state.pressed == pressed | {Button.L2, Button.R2}
-
-
-def test_a_pull_is_full_when_free_and_less_as_an_effect_gets_stronger_or_begins_sooner() -> None:
-    device = SimulatedDualSense()
-    device.set_finger_force(NORMAL_FINGER_FORCE_N, NORMAL_FINGER_FORCE_N)
-    now_s = 0.0
-    stronger: list[TriggerEffect] = [Off(), *(feedback(0, strength) for strength in range(1, 9))]
-    sooner: list[TriggerEffect] = [Off(), *(feedback(zone, 8) for zone in reversed(range(8)))]
-    for effects in (stronger, sooner):
-        travels = []
-        for effect in effects:
-            device.write(OutputReport(r2=effect), now_s)
-            now_s += 2.0
-            state = state_at(device, now_s)
-            assert state.l2 == 1.0
-            travels.append(state.r2)
-        assert travels == sorted(travels, reverse=True)
-        assert travels[1] < travels[0] == 1.0
-        assert len(set(travels)) > 5  # the strongest hold a normal finger in the fourth zone wherever they begin before
-        assert 0.25 <= travels[-1] <= 0.6
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))
