@@ -151,35 +151,6 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run.until(lambda: run.state == "armed", 0.1)
 
 
-def test_what_was_felt_before_is_released_first_and_felt_anew_when_armed() -> None:
-    run = advancing()
-    device = run.both.device
-    assert not device.released  # it was unplugged with its triggers stiff
-    run.plug.plugged_in = False
-    run.wait(1.0)
-    assert not device.released
-    run.plug.plugged_in = True
-    run.until(lambda: run.both.connection.state is ConnectionState.CONNECTED, LOOK_PERIOD_S + 0.1)
-    run.wait(0.01)
-    assert run.plug.written_since_found == [True]
-    device.set_finger_force(0.0, 0.0)
-    device.set_buttons(frozenset({Button.L1}))
-    run.wait(1.3)
-    device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
-    run.until(lambda: not device.released, 1.0)
-
-
-def test_it_may_come_after_the_start() -> None:
-    run = Run()
-    run.plug.plugged_in = False
-    run.wait(3.0)
-    assert run.commands == 0
-    assert run.state == "disarmed"
-    assert run.both.connection.take_notes() == ["none found; waiting for one"]
-    run.plug.plugged_in = True
-    run.until(lambda: run.state == "armed", 8.0)
-
-
 def test_whoever_holds_the_arming_button_through_it_all_arms_nothing_before_a_healthy_second() -> None:
     run = advancing()
     run.both.device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
