@@ -8,6 +8,7 @@ from common.errors import DeviceError, NoDeviceError, NoDriverError
 from operator_side.dualsense.hid.connection import (
     BEAT_PERIOD_S,
     LOOK_PERIOD_S,
+    RETELL_AFTER_S,
     Connection,
     ConnectionState,
 )
@@ -163,6 +164,19 @@ def test_the_watchdog_knows_before_anything_is_written_and_hears_of_us_while_an_
     assert world.log == ["rest", "beat", "write"]
 
 
+def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
+    world.connected()
+    world.connection.write(STIFF, world.now_s)
+    world.run(1.0)
+    world.log.clear()
+    world.now_s += RETELL_AFTER_S
+    world.run(PERIOD_S)
+    assert world.log == ["beat", "found"]
+    world.run(1.0)
+    assert set(world.log[2:]) == {"beat"}
+    assert world.connection.found == 1
+
+
 def test_what_nobody_watches_over_gets_no_beats(world: World) -> None:
     world.search.result = OpenController(FakeDevice(world.log), "simulated DualSense")
     world.run(1.0)
@@ -240,3 +254,19 @@ def test_what_no_waiting_mends_is_raised(world: World) -> None:
     world.search.result = NoDriverError("hidapi is missing")
     with pytest.raises(NoDriverError, match="hidapi is missing"):
         world.run(1.0)
+
+
+@pytest.mark.parametrize("unplugged", [False, True])
+def test_closing_releases_or_leaves_it_to_the_watchdog(world: World, unplugged: bool) -> None:
+    device = world.connected()
+    world.connection.write(STIFF, world.now_s)
+    if unplugged:
+        world.unplug(device)
+        world.run(PERIOD_S)
+    world.connection.close()
+    world.connection.close()
+    assert world.search.closed
+    assert (device.released, world.connection.released, "let go" in world.log) == (not unplugged,) * 3
+    looks = len(world.search.looks)
+    world.run(3.0)
+    assert len(world.search.looks) == looks
