@@ -14,7 +14,6 @@ from operator_side.dualsense.reports.battery import Battery, BatteryState
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState
 from operator_side.dualsense.reports.feature_report import Firmware, build_calibration, parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import (
     USUAL_LIGHT,
     WARNING_LIGHT,
@@ -148,19 +147,6 @@ def test_a_late_reader_gets_the_newest_report_once_and_clocks_wrap() -> None:
     report = report_at(device, 2000.0)
     assert parse_input_report(report).sequence == 500_000 % 256
     assert clock_of(report) == pytest.approx(2000.0 - 2**32 / 3e6, abs=1e-6)
-
-
-def test_hands_come_through() -> None:
-    device = SimulatedDualSense(model=Model.EDGE)
-    device.set_sticks(left=(1.0, -1.0), right=(-0.5, 0.5))
-    pressed = frozenset({Button.L1, Button.CROSS, Button.UP, Button.LEFT_PADDLE, Button.RIGHT_FUNCTION})
-    device.set_buttons(pressed)
-    state = state_at(device, 0.0)
-    assert (state.left_stick, state.right_stick, state.pressed) == ((1.0, -1.0), (-0.5, 0.5), pressed)
-    device.set_travel(0.2, 1.0)
-    state = state_at(device, 1.0)
-    assert (state.l2, state.r2) == pytest.approx((0.2, 1.0))
-    assert state.pressed == pressed | {Button.L2, Button.R2}
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import struct
-import subprocess
 from collections import deque
 from pathlib import Path
 
@@ -49,7 +48,6 @@ from tests.helpers.fake_kernel import (
     set_report,
 )
 
-HEADER = Path("/usr/include/linux/uhid.h")
 CREATE2, DESTROY, INPUT2, GET_REPORT_REPLY = 11, 1, 12, 10
 
 
@@ -132,80 +130,6 @@ def test_refusals() -> None:
         identity(unique_id="x" * 64)
     with pytest.raises(ValueError, match="vendor_id = 65536; valid: 0 to 65535"):
         UhidIdentity(name="x", vendor_id=0x10000, product_id=1, bus=3, descriptor=b"x")
-
-
-# The same layout from the kernel's own header.
-
-_PROGRAM = """
-#include <stddef.h>
-#include <stdio.h>
-#include <linux/uhid.h>
-#define AT(member) printf("%zu ", offsetof(struct uhid_event, member))
-int main(void) {
-    printf("%zu ", sizeof(struct uhid_event));
-    AT(u.create2.phys); AT(u.create2.uniq); AT(u.create2.rd_size); AT(u.create2.bus); AT(u.create2.vendor);
-    AT(u.create2.product); AT(u.create2.version); AT(u.create2.country); AT(u.create2.rd_data);
-    AT(u.input2.size); AT(u.input2.data); AT(u.output.data); AT(u.output.size); AT(u.output.rtype);
-    AT(u.get_report.id); AT(u.get_report.rnum); AT(u.get_report.rtype);
-    AT(u.get_report_reply.id); AT(u.get_report_reply.err); AT(u.get_report_reply.size); AT(u.get_report_reply.data);
-    AT(u.set_report.id); AT(u.set_report.rnum); AT(u.set_report.rtype); AT(u.set_report.size); AT(u.set_report.data);
-    AT(u.set_report_reply.id); AT(u.set_report_reply.err);
-    printf("%d %d %d %d %d %d", UHID_DESTROY, UHID_CREATE2, UHID_INPUT2, UHID_GET_REPORT_REPLY, UHID_SET_REPORT_REPLY,
-           UHID_OUTPUT);
-}
-"""
-
-
-@pytest.mark.processes
-@pytest.mark.skipif(not HEADER.exists(), reason="no linux/uhid.h")
-def test_the_layout_is_that_of_the_header(tmp_path: Path) -> None:
-    (tmp_path / "layout.c").write_text(_PROGRAM)
-    compiled = subprocess.run(
-        ["cc", "-o", tmp_path / "layout", tmp_path / "layout.c"],  # noqa: S607
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert compiled.returncode == 0, compiled.stderr
-    said = subprocess.run([tmp_path / "layout"], capture_output=True, text=True, check=True).stdout
-    expected = [EVENT_LENGTH, 132, 196, 260, 262, 264, 268, 272, 276, 280]  # test_create_lies_where...
-    expected += [4, 6, 4, 4100, 4102, 4, 8, 9, 4, 8, 10, 12, 4, 8, 9, 10, 12, 4, 8]  # test_what_is_written and read
-    expected += [1, 11, 12, 10, 14, 6]
-    assert [int(word) for word in said.split()] == expected
-
-
-# The descriptors
-
-
-def report_lengths(descriptor: bytes) -> dict[tuple[str, int], int]:
-    """The length in bytes, id included, of each report that a descriptor declares (HID 1.11, 6.2.2)."""
-    bits: dict[tuple[str, int], int] = {}
-    report_id = size = count = position = 0
-    while position < len(descriptor):
-        prefix = descriptor[position]
-        length = (0, 1, 2, 4)[prefix & 3]
-        value = int.from_bytes(descriptor[position + 1 : position + 1 + length], "little")
-        match prefix & 0xFC:
-            case 0x84:
-                report_id = value
-            case 0x74:
-                size = value
-            case 0x94:
-                count = value
-            case 0x80 | 0x90 | 0xB0 as main:
-                key = ({0x80: "input", 0x90: "output", 0xB0: "feature"}[main], report_id)
-                bits[key] = bits.get(key, 0) + size * count
-        position += 1 + length
-    assert all(total % 8 == 0 for total in bits.values())
-    return {key: 1 + total // 8 for key, total in bits.items()}
-
-
-def test_the_descriptors_declare_the_reports_that_are_sent() -> None:
-    usb, bluetooth = report_lengths(USB_DESCRIPTOR), report_lengths(BLUETOOTH_DESCRIPTOR)
-    for features in (usb, bluetooth):
-        assert [features["feature", report_id] for report_id in (0x05, 0x09, 0x20)] == [41, 20, 64]
-    assert (usb["input", 0x01], usb["output", 0x02]) == (64, 48)
-    assert (bluetooth["input", 0x01], bluetooth["input", 0x31], bluetooth["output", 0x31]) == (10, 78, 78)
 
 
 # The controller that is offered
