@@ -320,8 +320,7 @@ def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((1.0, (1,) * 9), "zone_strengths"),
-        ((1.0, (9,) * 10), "zone_strengths"),
+        *(((1.0, strengths), "zone_strengths") for strengths in ((1,) * 9, (9,) * 10)),
         *(((1.0, (1,) * 10, step_n), "strength_step_n = ") for step_n in (-0.1, NAN, INF)),
     ],
 )

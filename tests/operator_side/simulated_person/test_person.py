@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import msgspec
 import pytest
 
 from common.protocol.messages import Telemetry, Vector3
@@ -140,15 +139,6 @@ def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_s
     assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
 
 
-def test_a_tool_that_points_down_has_no_back_to_carry_to() -> None:
-    desk, down = Desk(), armed(holding=True, up_in_tool=(0.0, 0.0, -1.0))
-    desk.arm()
-    desk.until("lift", down, 3.0)
-    up = msgspec.structs.replace(down, tool_position_m=(0.5, 0.0, UP_AT_M))
-    desk.until("lower", up, 1.0)
-    assert desk.watch(up, 0.3)[-1].r2_n > 0.0
-
-
 @pytest.mark.parametrize("state", ["disarmed", "stopped"])
 def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
     desk = Desk()
@@ -235,19 +225,6 @@ def test_between_attempts_they_open_and_draw_back_and_in_the_end_they_give_up() 
     phases = [hands.phase for hands in desk.hands]
     assert sum(pair == ("close", "advance") for pair in zip(phases[1:], phases, strict=False)) == 2
     assert {hands.buttons for hands in desk.watch(armed(), 3.0)[1:]} == {frozenset({Button.L1})}
-
-
-def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.until("lift", armed(holding=True), 3.0)
-    # A moment without it is not noticed.
-    desk.watch(armed(), 0.3)
-    desk.watch(armed(holding=True), 1.0)
-    assert desk.person.phase == "lift"
-    assert desk.until("done", armed(), 2.0) == pytest.approx(0.25 + 0.5, abs=5 * TICK_S)
-    desk.watch(armed(), 0.5)
-    assert desk.hands[-1].buttons == {Button.L1}
 
 
 # Feeling
