@@ -1,0 +1,21 @@
+"""How blindness is signalled; tests/operator_side/test_core_states.py holds every order of events."""
+
+import itertools
+
+import pytest
+
+from operator_side.dualsense.reports.output_report import WARNING_LIGHT, Rumble
+from operator_side.feel.blindness import Blindness
+
+
+@pytest.mark.parametrize("since_s", [0.0, 10.0, 1e6])
+def test_two_short_pulses_each_second_for_three_seconds(since_s: float) -> None:
+    blindness = Blindness()
+    blindness.lose(since_s)
+    blindness.lose(since_s + 1.0)  # still lost, which is no other loss
+    shaken = [blindness.rumble(since_s + 0.01 * step + 0.001) for step in range(1000)]
+    runs = [(drive, len(list(steps))) for drive, steps in itertools.groupby(shaken)]
+    assert [length for drive, length in runs if drive != Rumble()] == [12] * 6
+    assert all(drive.left == drive.right > 0.5 for drive in shaken if drive != Rumble())
+    assert (blindness.light, blindness.times) == (WARNING_LIGHT, 1)
+    assert not any(drive.left for drive in shaken[300:])
