@@ -75,6 +75,6 @@ def _near(events: Sequence[dict[str, Any]]) -> Screen:
 def _draw_terminal(screen: Screen, path: Path) -> None:
     """Write the screen as an SVG."""
     console = Console(record=True, file=io.StringIO(), width=_COLUMNS, height=_ROWS, force_terminal=True)
-    console.print(rich.screen.Screen(screen.lines(0.0, _COLUMNS, _ROWS)))
+    console.print(rich.screen.Screen(screen.lines(0.0, _COLUMNS)))
     title = "feelahead demo --tui"
     path.write_text(_FONT.sub("", console.export_svg(title=title, unique_id="terminal")))

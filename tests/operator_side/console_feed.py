@@ -1,17 +1,11 @@
-"""Something to see in a console: an arm that sways before a table, as both sides would tell of it.
-
-python -m tests.operator_side.console_feed SECONDS     a console with it, whose address is printed
-"""
+"""Something to see in a console: an arm that sways before a table, as both sides would tell of it."""
 
 import math
-import select
-import sys
 
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
-from common.clock import MonotonicClock
 from common.protocol.codec import encode
 from common.protocol.messages import Header
 from common.protocol.view_messages import (
@@ -179,22 +173,3 @@ class Feed:
             self._console.view(self._pictures.frame(view, now_s, self._count), video=True)
         self._console.view(state(now_s), video=False)
         self._count += 1 if self._console.pages else 0
-
-
-def main() -> None:
-    clock, end_s = MonotonicClock(), MonotonicClock().now() + float(sys.argv[1])
-    with Console("a feed", port=int(sys.argv[2]) if len(sys.argv) > 2 else 0) as console:
-        feed, told = Feed(console), False
-        console.note("a note")
-        while clock.now() < end_s:
-            feed.step(clock.now())
-            for text in console.take_notes():
-                print(text, flush=True)
-            if console.address is not None and not told:
-                told = True
-                print(console.address, console.process_id, flush=True)
-            select.select([console], [], [], 0.005)
-
-
-if __name__ == "__main__":
-    main()

@@ -228,26 +228,6 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         assert {(report.l2, report.r2) for report in world.written[1:]} <= {(None, None)}
 
 
-def test_unplugged_in_mid_run_it_commands_nothing_and_is_found_again(world: World) -> None:
-    world.stiffen()
-    world.until(lambda: world.source.commands > 10)
-    world.plug(False)
-    world.until(lambda: world.controller() == "lost")
-    commands, hellos = world.commands_that_came(), world.source.hellos
-    world.until(lambda: world.source.hellos >= hellos + 5)
-    assert world.source.commands == commands
-    assert "gone" in world.notes()[-1]
-    written = len(world.written)
-    world.plug(True)
-    # The robot side still says that it is armed: until it has stopped, nothing is commanded.
-    world.until(lambda: world.controller() == "connected" and any(map(stiff, world.written[written:])))
-    assert tells_all(world.written[written])
-    assert world.source.commands == commands
-    world.source.state = "disarmed"
-    world.until(lambda: world.source.commands > commands + 10)
-    assert world.notes()[-1].endswith("back again")
-
-
 def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: World) -> None:
     world.stiffen()
     world.plug(False)

@@ -4,68 +4,20 @@ from collections.abc import Callable
 
 import pytest
 
-from common.errors import DeviceError, NoDeviceError
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
-from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import OutputReport
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
+from tests.operator_side.dualsense.simulated_system import SimulatedSystem, VirtualSearch
 
 pytestmark = pytest.mark.long
 
+PLACE = b"usb"
 GAP_S = 0.1
 RAMP_S = 0.3
 """Long enough for the arm to come to rest from any speed of this run."""
-
-
-class Socket:
-    """Where the controller is plugged in or not: the search, and the device as the loop sees it."""
-
-    def __init__(self, device: SimulatedDualSense) -> None:
-        self.device = device
-        self.plugged_in = True
-        self._looks = False
-        self.written_since_found: list[bool] = []
-
-    # The search
-
-    def begin(self, preferred: str | None) -> None:
-        del preferred
-        self._looks = True
-
-    def take(self) -> OpenController | DeviceError | None:
-        if not self._looks:
-            return None
-        self._looks = False
-        if not self.plugged_in:
-            return NoDeviceError("none found")
-        self.written_since_found = []
-        return OpenController(self, "plugged-in DualSense")
-
-    # The device
-
-    @property
-    def released(self) -> bool:
-        return self.device.released
-
-    def read(self, now_s: float) -> bytes | None:
-        self._check()
-        return self.device.read(now_s)
-
-    def write(self, output: OutputReport, now_s: float) -> None:
-        self._check()
-        self.device.write(output, now_s)
-        self.written_since_found.append(self.device.released)
-
-    def close(self) -> None:
-        pass
-
-    def _check(self) -> None:
-        if not self.plugged_in:
-            raise DeviceError("the controller is gone")
 
 
 class Run:
@@ -73,8 +25,17 @@ class Run:
 
     def __init__(self, link: str = "") -> None:
         self.both = Loopback(LoopbackSettings(RobotSettings(link=link), OperatorSettings(link=link)))
-        self.plug = Socket(self.both.device)
-        self.both.connection = Connection(self.plug, self.both.operator)
+        self.system = SimulatedSystem()
+        self.system.clock = self.both.clock
+        self.system.devices[PLACE] = self.both.device
+        self.both.connection = Connection(VirtualSearch(Finder(self.system), lambda: False), self.both.operator)
+
+    def unplug(self) -> None:
+        self.system.devices.pop(PLACE).unplug()
+
+    def plug_in(self) -> None:
+        self.both.device.plug_in()
+        self.system.devices[PLACE] = self.both.device
 
     def let_go_of_the_person(self) -> None:
         """From now on the hands stay as they are, unless the test moves them."""
@@ -116,7 +77,7 @@ def advancing(link: str = "") -> Run:
 def test_unplugged_the_arm_stops_and_stays(delay_ms: int) -> None:
     run = advancing(f"delay {delay_ms}ms" if delay_ms else "")
     assert run.speed_m_s > 0.01
-    run.plug.plugged_in = False
+    run.unplug()
     run.wait(1e-3 * delay_ms + 0.01)  # what was on its way still arrives
     commands = run.commands
     run.wait(GAP_S)
@@ -133,9 +94,9 @@ def test_unplugged_the_arm_stops_and_stays(delay_ms: int) -> None:
 def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run = advancing()
     device = run.both.device
-    run.plug.plugged_in = False
+    run.unplug()
     run.wait(1.0)
-    run.plug.plugged_in = True
+    run.plug_in()
     commands = run.commands
     run.wait(LOOK_PERIOD_S + 2.0)
     # The hands hold the trigger and the run button as before: that counts for nothing.
@@ -151,41 +112,12 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run.until(lambda: run.state == "armed", 0.1)
 
 
-def test_what_was_felt_before_is_released_first_and_felt_anew_when_armed() -> None:
-    run = advancing()
-    device = run.both.device
-    assert not device.released  # it was unplugged with its triggers stiff
-    run.plug.plugged_in = False
-    run.wait(1.0)
-    assert not device.released
-    run.plug.plugged_in = True
-    run.until(lambda: run.both.connection.state is ConnectionState.CONNECTED, LOOK_PERIOD_S + 0.1)
-    run.wait(0.01)
-    assert run.plug.written_since_found == [True]
-    device.set_finger_force(0.0, 0.0)
-    device.set_buttons(frozenset({Button.L1}))
-    run.wait(1.3)
-    device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
-    run.until(lambda: not device.released, 1.0)
-
-
-def test_it_may_come_after_the_start() -> None:
-    run = Run()
-    run.plug.plugged_in = False
-    run.wait(3.0)
-    assert run.commands == 0
-    assert run.state == "disarmed"
-    assert run.both.connection.take_notes() == ["none found; waiting for one"]
-    run.plug.plugged_in = True
-    run.until(lambda: run.state == "armed", 8.0)
-
-
 def test_whoever_holds_the_arming_button_through_it_all_arms_nothing_before_a_healthy_second() -> None:
     run = advancing()
     run.both.device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
-    run.plug.plugged_in = False
+    run.unplug()
     run.wait(0.5)
-    run.plug.plugged_in = True
+    run.plug_in()
     run.wait(4.0)
     assert run.both.connection.state is ConnectionState.CONNECTED
     assert run.state == "disarmed"

@@ -3,13 +3,13 @@
 The robot side is an arm on a line that tells exactly how far it is from a wall; everything else is as shipped.
 """
 
-import heapq
 import math
 
 import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from common.link_model import DelayLine, LinkProfile
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, Message, MotionCommand, StiffnessUpdate
@@ -25,25 +25,9 @@ FULL_M_S, ACCELERATION_M_S2 = 0.25, 3.0
 AHEAD_M, RAMP_M, HORIZON_M = 0.3, 0.012, 0.6
 
 
-class Line:
+def line(delay_s: float, jitter_s: float, seed: int) -> DelayLine[bytes]:
     """One direction of a link: a steady delay, or one with jitter."""
-
-    def __init__(self, delay_s: float, jitter_s: float, seed: int) -> None:
-        self._delay_s, self._jitter_s = delay_s, jitter_s
-        self._generator = np.random.default_rng(seed)
-        self._under_way: list[tuple[float, int, bytes]] = []
-        self._pushed = 0
-
-    def push(self, now_s: float, payload: bytes) -> None:
-        late_s = self._jitter_s * abs(float(self._generator.normal()))
-        self._pushed += 1
-        heapq.heappush(self._under_way, (now_s + self._delay_s + late_s, self._pushed, payload))
-
-    def pop(self, now_s: float) -> list[bytes]:
-        arrived = []
-        while self._under_way and self._under_way[0][0] <= now_s + 1e-9:
-            arrived.append(heapq.heappop(self._under_way)[2])
-        return arrived
+    return DelayLine(LinkProfile.parse(f"delay {1e3 * delay_s:g}ms {1e3 * jitter_s:g}ms", seed=seed))
 
 
 class Approach:
@@ -54,7 +38,7 @@ class Approach:
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.device.set_buttons(frozenset({Button.L1}))
-        self.there, self.back = Line(delay_s, jitter_s, 1), Line(delay_s, jitter_s, 2)
+        self.there, self.back = line(delay_s, jitter_s, 1), line(delay_s, jitter_s, 2)
         self.loop_s = 2.0 * delay_s
         self.left_m, self.speed_m_s, self.wanted_m_s = AHEAD_M, 0.0, 0.0
         self.tick = 0

@@ -202,20 +202,6 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
     assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 
 
-def test_the_address_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
-    looking = Looking()
-    looking.console.address = "http://127.0.0.1:1/x/"
-    with looking.viewing._status:
-        looking.turns(0.1)
-    assert capsys.readouterr().out == '{"event": "console", "address": "http://127.0.0.1:1/x/"}\n'
-
-
-def test_notes_go_to_the_line_and_to_the_page() -> None:
-    looking = Looking()
-    looking.viewing.note("a note")
-    assert looking.console.told == ["a note"]
-
-
 def test_what_pages_say_reaches_whoever_follows_them() -> None:
     looking = Looking()
     looking.console.hands.append(PageWords(page=3, hands={"page": "ours", "number": 1, "driving": True}))

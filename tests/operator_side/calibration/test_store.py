@@ -107,30 +107,25 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     assert len(said) < 500
 
 
-def test_bytes_that_are_no_text() -> None:
+def test_what_cannot_be_read_is_refused_without_waiting(own_folder: Path) -> None:
     path = calibration_path(ADDRESS)
+
+    def refused(said: str) -> None:
+        with pytest.raises(ConfigurationError, match=said):
+            load_calibration(ADDRESS)
+
+    (own_folder / "feelahead").write_text("a file where a folder should be")
+    refused("cannot be read: Not a directory")
+    (own_folder / "feelahead").unlink()
     path.parent.mkdir(parents=True)
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigurationError, match="utf-8"):
-        load_calibration(ADDRESS)
+    refused("utf-8")
+    path.unlink()
+    os.mkfifo(path)
+    refused(r"is no regular file.*delete the file")
     path.unlink()
     path.mkdir()
-    with pytest.raises(ConfigurationError, match="cannot be read"):
-        load_calibration(ADDRESS)
-
-
-def test_a_pipe_is_refused_without_waiting_for_its_writer() -> None:
-    path = calibration_path(ADDRESS)
-    path.parent.mkdir(parents=True)
-    os.mkfifo(path)
-    with pytest.raises(ConfigurationError, match=r"is no regular file.*delete the file"):
-        load_calibration(ADDRESS)
-
-
-def test_a_folder_that_is_none(own_folder: Path) -> None:
-    (own_folder / "feelahead").write_text("a file where a folder should be")
-    with pytest.raises(ConfigurationError, match="cannot be read: Not a directory"):
-        load_calibration(ADDRESS)
+    refused("cannot be read")
 
 
 def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path: Path) -> None:

@@ -177,24 +177,6 @@ def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
     assert world.connection.found == 1
 
 
-def test_a_write_that_does_not_return_is_a_silence(world: World) -> None:
-    stalls = False
-    device = FakeDevice(world.log)
-    world.search.result = OpenController(device, "DualSense on USB", "aa", b"/dev/hidraw3", b"off", lambda _: stalls)
-    world.run(2 * PERIOD_S)
-    world.connection.write(STIFF, world.now_s)
-    world.connection.take_notes()
-    world.log.clear()
-    stalls = True
-    world.run(3.0)
-    assert world.log == []
-    [note] = world.connection.take_notes()
-    assert "does not return" in note
-    stalls = False
-    world.run(PERIOD_S)
-    assert world.log == ["beat", "found"]
-
-
 def test_what_nobody_watches_over_gets_no_beats(world: World) -> None:
     world.search.result = OpenController(FakeDevice(world.log), "simulated DualSense")
     world.run(1.0)

@@ -7,7 +7,7 @@ import pytest
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
 from operator_side.dualsense.hid.port import OpenController
-from operator_side.dualsense.hid.search import BackgroundSearch, Find, Ready
+from operator_side.dualsense.hid.search import BackgroundSearch, Find
 from operator_side.dualsense.hid.udev import RULES
 from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle
@@ -66,10 +66,6 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
     backend.found[0x0CE6][A] = same
     assert look(ADDRESS).address == ADDRESS
     assert other.closed == other.times_opened
-
-
-def test_the_first_one_is_taken_at_once() -> None:
-    assert Finder(FakeBackend({0x0CE6: {A: FakeHandle()}}))(None).address == ADDRESS
 
 
 def test_no_other_is_taken_while_one_refuses_that_may_be_the_one_from_before() -> None:
@@ -193,12 +189,3 @@ def test_what_was_found_and_not_taken_is_let_go() -> None:
     search.close()
     assert handle.closed == handle.times_opened > 0
     assert handle.written == []
-
-
-def test_what_is_there_already_is_found_once() -> None:
-    controller = usable()[1](None)
-    search = Ready(controller)
-    search.begin(None)
-    assert search.take() is controller
-    assert search.take() is None
-    search.close()

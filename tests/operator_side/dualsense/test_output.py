@@ -245,16 +245,13 @@ def test_refused_bytes_are_named(report: bytes, message: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "arguments", "message"),
     [
-        (
-            MultiPositionFeedback,
-            {"zone_strengths": (1,) * 9},
-            "zone_strengths = .*; valid: a tuple of 10 whole",
+        *(
+            (MultiPositionFeedback, {"zone_strengths": strengths}, f"zone_strengths = {named}.*; valid: a tuple of 10")
+            for strengths, named in (
+                *(((1,) * 9, ""), ([1] * 10, r"\[1, "), ((1,) * 9 + (9,), ".*9"), ((-1,) + (0,) * 9, ".*-1")),
+                *(((1.0,) + (0,) * 9, ".*1.0"), (5, "5")),
+            )
         ),
-        (MultiPositionFeedback, {"zone_strengths": [1] * 10}, r"zone_strengths = \[1, .*; valid: a tuple of 10"),
-        (MultiPositionFeedback, {"zone_strengths": (1,) * 9 + (9,)}, "zone_strengths = .*9.*; valid"),
-        (MultiPositionFeedback, {"zone_strengths": (-1,) + (0,) * 9}, "zone_strengths = .*-1.*; valid"),
-        (MultiPositionFeedback, {"zone_strengths": (1.0,) + (0,) * 9}, "zone_strengths = .*1.0.*; valid"),
-        (MultiPositionFeedback, {"zone_strengths": 5}, "zone_strengths = 5"),
         (OutputReport, {"l2": b"\xfc"}, "l2 = "),
         (OutputReport, {"r2": SimpleNamespace(encode=lambda: b"\xfc" + bytes(10))}, "r2 = "),
         (OutputReport, {"lightbar": (0, 0, 256)}, r"lightbar\[2\] = 256"),

@@ -53,77 +53,24 @@ def controller(tmp_path: Path) -> Iterator[FakeController]:
         yield made
 
 
-# An operator side as the watchdog sees it: it says what it is asked to, then waits until it is ended.
-PARENT = """
-import sys
-from operator_side.dualsense.hid.release_guard import ReleaseGuard
-report = bytes(range(48))
-with ReleaseGuard() as guard:
-    print(guard.process_id, flush=True)
-    for line in sys.stdin:
-        action, _, path = line.strip().partition(" ")
-        if action == "hold":
-            guard.hold(path.encode(), report)
-        elif action == "let-go":
-            guard.let_go()
-        elif action == "beat":
-            guard.beat()
-        elif action == "beat-and-rest":
-            guard.beat()
-            guard.rest()
-        elif action == "leave":
-            break
-        print("done", flush=True)
-"""
-
-
-class Parent:
-    """A real process with a watchdog."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", PARENT],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-            start_new_session=True,
-        )
-        self.process_id = self._process.pid
-        self.watchdog_id = int(self._answer())
-
-    def say(self, line: str) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{line}\n")
-        assert self._answer() == "done"
-
-    def leave(self) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write("leave\n")
-        assert self._process.wait(LIMIT_S) == 0
-
-    def kill(self) -> None:
-        os.kill(self.process_id, signal.SIGKILL)
-        self._process.wait(LIMIT_S)
-
-    def _answer(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
-
-    def __enter__(self) -> "Parent":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._process.kill()
-        self._process.communicate()
-
-
 @pytest.fixture
-def parent() -> Iterator[Parent]:
-    with Parent() as started:
-        yield started
+def guard(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReleaseGuard]:
+    # However late the machine lets the process end.
+    monkeypatch.setattr(operator_side.dualsense.hid.release_guard, "_END_TIMEOUT_S", LIMIT_S)
+    with ReleaseGuard() as made:
+        yield made
+
+
+def leave(guard: ReleaseGuard) -> None:
+    """As when we end, however that is: its pipe closes. It ends by itself."""
+    guard.__exit__(None, None, None)
+    assert guard._process is not None
+    assert guard._process.returncode == 0
+
+
+def process_of(guard: ReleaseGuard) -> int:
+    assert guard.process_id is not None
+    return guard.process_id
 
 
 def wait_for_end(process_id: int) -> None:
@@ -138,45 +85,40 @@ def wait_for_end(process_id: int) -> None:
         os.close(watched)
 
 
-def test_a_killed_operator_leaves_a_released_controller_and_no_orphan(
-    parent: Parent, controller: FakeController
+def test_nothing_is_written_while_the_parent_lives_and_nothing_is_on(
+    guard: ReleaseGuard, controller: FakeController
 ) -> None:
-    parent.say(f"hold {os.fsdecode(controller.path)}")
-    parent.kill()
+    guard.hold(controller.path, REPORT)
+    watchdog = process_of(guard)
+    wait_until_open(watchdog, controller.path)
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        os.kill(watchdog, number)
+    assert controller.written(0.3) == b""
+    leave(guard)
     assert controller.written(LIMIT_S) == REPORT
-    wait_for_end(parent.watchdog_id)
     assert controller.written(0.0) == b""
 
 
-def test_nothing_is_written_while_the_parent_lives_and_nothing_is_on(
-    parent: Parent, controller: FakeController
+def test_when_the_beats_cease_it_releases_once_for_each_silence(
+    guard: ReleaseGuard, controller: FakeController
 ) -> None:
-    parent.say(f"hold {os.fsdecode(controller.path)}")
-    wait_until_open(parent.watchdog_id, controller.path)
-    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
-        os.kill(parent.watchdog_id, number)
-    assert controller.written(0.3) == b""
-    parent.kill()
-    assert controller.written(LIMIT_S) == REPORT
-
-
-def test_when_the_beats_cease_it_releases_once_for_each_silence(parent: Parent, controller: FakeController) -> None:
-    parent.say(f"hold {os.fsdecode(controller.path)}")
+    guard.hold(controller.path, REPORT)
     for _ in range(2):
-        parent.say("beat")
+        guard.beat()
         assert controller.written(LIMIT_S) == REPORT
         assert controller.written(3 * SILENCE_S) == b""
-    parent.kill()
+    leave(guard)
     assert controller.written(LIMIT_S) == REPORT
 
 
-def test_at_rest_no_beat_is_missed(parent: Parent, controller: FakeController) -> None:
-    parent.say(f"hold {os.fsdecode(controller.path)}")
-    wait_until_open(parent.watchdog_id, controller.path)
+def test_at_rest_no_beat_is_missed(guard: ReleaseGuard, controller: FakeController) -> None:
+    guard.hold(controller.path, REPORT)
+    wait_until_open(process_of(guard), controller.path)
     # Both at once, however long the machine lets either process wait in between.
-    os.kill(parent.watchdog_id, signal.SIGSTOP)
-    parent.say("beat-and-rest")
-    os.kill(parent.watchdog_id, signal.SIGCONT)
+    os.kill(process_of(guard), signal.SIGSTOP)
+    guard.beat()
+    guard.rest()
+    os.kill(process_of(guard), signal.SIGCONT)
     assert controller.written(3 * SILENCE_S) == b""
 
 
@@ -208,26 +150,22 @@ def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
         assert (tmp_path / "answers").read_bytes() == b"held\nrefused\nheld\nheld\n"
 
 
-@pytest.mark.parametrize("clean", [False, True])
-@pytest.mark.parametrize("last_words", [[], ["hold {path}", "let-go"]])
 def test_nothing_is_written_and_nobody_is_left_when_nothing_is_held(
-    parent: Parent, controller: FakeController, last_words: list[str], clean: bool
+    guard: ReleaseGuard, controller: FakeController
 ) -> None:
-    for words in last_words:
-        parent.say(words.format(path=os.fsdecode(controller.path)))
-    (parent.leave if clean else parent.kill)()
-    wait_for_end(parent.watchdog_id)
+    guard.hold(controller.path, REPORT)
+    guard.let_go()
+    leave(guard)
     assert controller.written(0.0) == b""
 
 
-def test_the_path_may_become_another_device_s(parent: Parent, controller: FakeController, tmp_path: Path) -> None:
-    parent.say(f"hold {os.fsdecode(controller.path)}")
-    wait_until_open(parent.watchdog_id, controller.path)
+def test_the_path_may_become_another_device_s(guard: ReleaseGuard, controller: FakeController, tmp_path: Path) -> None:
+    guard.hold(controller.path, REPORT)
+    wait_until_open(process_of(guard), controller.path)
     Path(os.fsdecode(controller.path)).rename(tmp_path / "unplugged")
     with FakeController(Path(os.fsdecode(controller.path))) as keyboard:
-        parent.kill()
+        leave(guard)
         assert controller.written(LIMIT_S) == REPORT
-        wait_for_end(parent.watchdog_id)
         assert keyboard.written(0.0) == b""
 
 
@@ -254,52 +192,50 @@ def test_it_starts_with_nothing_but_python_itself() -> None:
 
 
 def end_watchdog(guard: ReleaseGuard) -> None:
-    assert guard.process_id is not None
-    os.kill(guard.process_id, signal.SIGKILL)
-    wait_for_end(guard.process_id)
+    watchdog = process_of(guard)
+    os.kill(watchdog, signal.SIGKILL)
+    wait_for_end(watchdog)
 
 
 def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(
-    controller: FakeController, monkeypatch: pytest.MonkeyPatch
+    guard: ReleaseGuard, controller: FakeController
 ) -> None:
-    monkeypatch.setattr(operator_side.dualsense.hid.release_guard, "_END_TIMEOUT_S", LIMIT_S)
-    with ReleaseGuard() as guard:
-        guard.hold(controller.path, REPORT)
-        first = guard.process_id
-        end_watchdog(guard)
-        assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
-        assert guard.take_notes() == []
-        assert guard.running
-        assert guard.process_id != first
+    guard.hold(controller.path, REPORT)
+    first = guard.process_id
+    end_watchdog(guard)
+    assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
+    assert guard.take_notes() == []
+    assert guard.running
+    assert guard.process_id != first
+    leave(guard)
     assert controller.written(LIMIT_S) == REPORT  # by the other one: it was still held when we left
 
 
-def test_watchdogs_that_end_again_and_again_are_given_up(controller: FakeController) -> None:
-    with ReleaseGuard() as guard:
-        notes = []
-        for _ in range(MOST_REPLACEMENTS + 1):
-            end_watchdog(guard)
-            notes += guard.take_notes()
-        assert len(notes) == MOST_REPLACEMENTS + 1
-        assert "there is no other" in notes[-1]
-        assert not guard.running
-        guard.hold(controller.path, REPORT)
-        guard.beat()
-        assert guard.take_notes() == []
+def test_watchdogs_that_end_again_and_again_are_given_up(guard: ReleaseGuard, controller: FakeController) -> None:
+    notes = []
+    for _ in range(MOST_REPLACEMENTS + 1):
+        end_watchdog(guard)
+        notes += guard.take_notes()
+    assert len(notes) == MOST_REPLACEMENTS + 1
+    assert "there is no other" in notes[-1]
+    assert not guard.running
+    guard.hold(controller.path, REPORT)
+    guard.beat()
+    assert guard.take_notes() == []
 
 
-def test_a_controller_that_the_watchdog_cannot_open_is_told_of_once(tmp_path: Path) -> None:
-    with ReleaseGuard() as guard, select.epoll() as pause:
-        guard.hold(os.fsencode(tmp_path / "nothing"), REPORT)
-        notes: list[str] = []
+def test_a_controller_that_the_watchdog_cannot_open_is_told_of_once(guard: ReleaseGuard, tmp_path: Path) -> None:
+    guard.hold(os.fsencode(tmp_path / "nothing"), REPORT)
+    notes: list[str] = []
+    with select.epoll() as pause:
         for _ in range(round(LIMIT_S / 0.01)):
             notes += guard.take_notes()
             if notes:
                 break
             pause.poll(0.01)
         pause.poll(0.2)
-        [note] = notes + guard.take_notes()
-        assert "cannot open the controller" in note
+    [note] = notes + guard.take_notes()
+    assert "cannot open the controller" in note
 
 
 def test_a_controller_that_refuses_is_tried_a_few_times() -> None:

@@ -1,6 +1,7 @@
 """Commands under way are followed as a slow stepping of time would follow them, whatever was sent and when."""
 
 import math
+from collections.abc import Callable
 
 import pytest
 from hypothesis import example, given
@@ -81,15 +82,6 @@ def test_an_arm_that_follows_at_once_needs_no_acceleration() -> None:
     found = displacement(commands, 0.012, 0.0, 0.004, acceleration_m_s2=math.inf)
     assert found == pytest.approx((0.0, -FULL_M_S), abs=1e-15)
     assert displacement(commands, 0.010, 0.0, 0.004, acceleration_m_s2=math.inf).way_m == pytest.approx(0.5e-3)
-
-
-def test_what_was_sent_until_the_echo_counts_no_more_and_what_came_after_counts() -> None:
-    # Full travel until 0.1 s, none from there on; a report of an arm at full speed.
-    commands = sent_every([1.0] * 25 + [0.0] * 50)
-    seen = displacement(commands, 0.2, 0.1, 0.0, FULL_M_S)
-    assert seen.way_m == pytest.approx(FULL_M_S**2 / (2.0 * 3.0))
-    unseen = displacement(commands, 0.2, 0.08, 0.0, FULL_M_S)
-    assert unseen.way_m == pytest.approx(FULL_M_S * 0.02 + FULL_M_S**2 / (2.0 * 3.0))
 
 
 @given(COMMANDS, SPEED, TRAVEL, st.data())
@@ -183,22 +175,21 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
     assert len(commands) <= MAX_DELAY_S / PERIOD_S + 2
 
 
-@pytest.mark.parametrize(("now_s", "travel"), [(1.0, 1.001), (1.0, math.nan), (0.0, 0.0), (math.inf, 0.0)])
-def test_what_cannot_have_been_sent_is_refused(now_s: float, travel: float) -> None:
-    with pytest.raises(ValueError, match="valid: "):
-        sent_every([0.0, 0.0]).sent(now_s, travel)
+MOMENT = (0.01, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("speed", "full", "acceleration"),
-    [(math.nan, 0.25, 3.0), (0.0, 0.0, 3.0), (0.0, math.inf, 3.0), (0.0, 0.25, 0.0), (0.0, 0.25, math.nan)],
+    ("what", "values"),
+    [
+        *((CommandsUnderWay.sent, values) for values in ((1.0, 1.001), (1.0, math.nan), (0.0, 0.0), (math.inf, 0.0))),
+        *((CommandsUnderWay.displacement, (*MOMENT, *arm)) for arm in ((math.nan, 0.25, 3.0), (0.0, 0.0, 3.0))),
+        *(
+            (CommandsUnderWay.displacement, (*MOMENT, 0.0, *arm))
+            for arm in ((math.inf, 3.0), (0.25, 0.0), (0.25, math.nan))
+        ),
+        *((CommandsUnderWay.__init__, (window_s,)) for window_s in (0.0, -1.0, math.inf, math.nan)),
+    ],
 )
-def test_an_arm_that_cannot_be_is_refused(speed: float, full: float, acceleration: float) -> None:
+def test_what_cannot_be_is_refused(what: Callable[..., object], values: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="valid: "):
-        sent_every([0.0, 0.0]).displacement(0.01, 0.0, 0.0, speed, full, acceleration)
-
-
-@pytest.mark.parametrize("window_s", [0.0, -1.0, math.inf, math.nan])
-def test_a_window_that_cannot_be_is_refused(window_s: float) -> None:
-    with pytest.raises(ValueError, match="window_s"):
-        CommandsUnderWay(window_s)
+        what(sent_every([0.0, 0.0]), *values)

@@ -79,18 +79,6 @@ def test_whatever_comes_it_is_bounded_releases_at_once_and_lets_danger_through(
     assert run.most_in_a_second() <= MOST_WRITES_PER_S
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(derandomize=True, deadline=None, max_examples=5)
-def test_noise_that_turns_each_part_on_and_off_stays_within_it(seed: int) -> None:
-    generator, run = np.random.default_rng(seed), Run()
-    for _ in range(3000):
-        l2, r2, rumble, armed = generator.integers(0, 2, 4).tolist()
-        fields = (NOTHING if armed else RELEASE) | {"l2": 7 * l2, "r2": 7 * r2, "rumble": 0.875 * rumble}
-        run.feel(fields)
-        assert_released_as_told(run, fields)
-    assert 80 <= run.most_in_a_second() <= MOST_WRITES_PER_S
-
-
 def test_triggers_that_stiffen_in_turn_stay_within_it_and_danger_is_felt_soon() -> None:
     run = Run()
     for tick in range(5000):

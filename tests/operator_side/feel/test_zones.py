@@ -5,7 +5,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
-from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
@@ -90,11 +89,6 @@ def test_a_way_that_nothing_gets_to_is_free() -> None:
     assert zone_strengths(far, HORIZON_M, USUAL, 0.0, Displacement(HORIZON_M, 0.0)) is not FREE
 
 
-@pytest.mark.parametrize("strength", range(9))
-def test_a_uniform_field_is_as_strong_everywhere(strength: int) -> None:
-    assert zone_strengths(uniform_field(strength), FAR_M, USUAL, 0.0, STILL) == ((strength,) * 10, 0)
-
-
 def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
     free = field(ways(0.05))
     # u = 0.25 m/s from zone 7 on: 0.3 * 0.25 + 0.25²/6 = 85.4 mm.
@@ -111,12 +105,6 @@ def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -
     touching = field(ways(-1.0), ways(1.0), full_speed_m_s=full_speed_m_s)
     strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
     assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
-
-
-def test_the_first_zone_beyond_the_other_triggers_travel_takes_them_however_fast_it_is() -> None:
-    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=2.0)
-    other = USUAL[4] - 0.05  # so that zone 4 goes at 100 mm/s
-    assert zone_strengths(touching, 10.0, USUAL, other, STILL).strengths == (0,) * 5 + (8,) * 5
 
 
 def update(**changes: float) -> StiffnessUpdate:

@@ -32,41 +32,6 @@ def test_released_means_within_the_dead_zone(l2: float, r2: float, released: boo
     assert operator_intent(ControllerState(l2=l2, r2=r2)).triggers_released is released
 
 
-def test_resting_hands_move_and_arm_nothing_and_hold_what_else_they_hold() -> None:
-    pressed = frozenset({Button.L1, Button.OPTIONS, Button.CROSS, Button.TRIANGLE, Button.CREATE})
-    state = ControllerState(l2=0.5, r2=1.0, left_stick=(1.0, 0.0), right_stick=(0.0, -1.0), pressed=pressed)
-    resting = operator_intent(state).resting()
-    held = operator_intent(ControllerState(pressed=frozenset({Button.L1, Button.TRIANGLE, Button.CREATE})))
-    assert resting == held
-    assert pressing(Button.CIRCLE).resting().emergency_stop
-
-
-def test_left_stick_moves_across_and_right_stick_turns() -> None:
-    intent = operator_intent(ControllerState(left_stick=(1.0, 0.0), right_stick=(0.0, -1.0)))
-    assert intent.lateral == (1.0, 0.0)
-    assert intent.turning == (0.0, -1.0)
-
-
-@pytest.mark.parametrize(
-    ("button", "field", "value"),
-    [
-        (Button.L1, "run", True),
-        (Button.OPTIONS, "arm", True),
-        (Button.CIRCLE, "emergency_stop", True),
-        (Button.TRIANGLE, "next_target", True),
-        (Button.CREATE, "hand_over", True),
-        (Button.CROSS, "gripper", 1),
-        (Button.SQUARE, "gripper", -1),
-    ],
-)
-def test_each_button_does_one_thing(button: Button, field: str, value: object) -> None:
-    idle = operator_intent(ControllerState())
-    intent = pressing(button)
-    changed = {name for name in idle.__dataclass_fields__ if getattr(idle, name) != getattr(intent, name)}
-    assert changed == {field}
-    assert getattr(intent, field) == value
-
-
 def test_every_other_button_does_nothing() -> None:
     unused = [button for button in Button if button not in BUTTON_OF.values()]
     assert len(unused) == len(Button) - 7
@@ -76,10 +41,6 @@ def test_every_other_button_does_nothing() -> None:
 
 def test_both_gripper_buttons_hold() -> None:
     assert pressing(Button.CROSS, Button.SQUARE).gripper == 0
-
-
-def test_the_emergency_stop_overrules_the_other_buttons() -> None:
-    assert pressing(*BUTTON_OF.values()) == pressing(Button.CIRCLE)
 
 
 def test_swapped_sides_swap_triggers_sticks_and_l1_and_nothing_else() -> None:

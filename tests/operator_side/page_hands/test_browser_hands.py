@@ -89,14 +89,6 @@ def test_what_the_trigger_was_told_takes_nothing_from_the_travel() -> None:
     assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
 
 
-def test_a_key_let_go_releases_with_the_next_report() -> None:
-    desk = Desk()
-    desk.arm()
-    assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
-    assert {(one.r2, one.run) for one in desk.let_pass(0.1, run=True)[1:]} == {(0.0, True)}
-    assert {(one.r2, one.run) for one in desk.let_pass(0.1, r2=1.0)[1:]} == {(0.0, False)}
-
-
 def test_silence_releases_everything() -> None:
     desk = Desk()
     desk.arm()

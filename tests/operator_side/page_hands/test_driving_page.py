@@ -73,17 +73,6 @@ def running(pages: DrivingPage, page: TalkingPage, start_s: float = 0.0) -> floa
     return now_s
 
 
-def test_silence_releases_and_the_page_that_comes_back_rests_first(pages: DrivingPage) -> None:
-    page = TalkingPage(pages)
-    now_s = running(pages, page)
-    assert pages.hands(now_s + SILENCE_S) is not None
-    assert pages.hands(now_s + SILENCE_S + 0.001) is None
-    page.say(now_s + 0.2, run=True, r2=1.0)
-    assert pages.hands(now_s + 0.2) is None
-    assert (pages.driver, pages.silences) == ("page1", 1)
-    assert pages.rest_s(now_s + 0.2) == REST_S
-
-
 def test_nobody_takes_over_from_a_page_that_drives_nor_drives_without_meaning_it(pages: DrivingPage) -> None:
     one, two = TalkingPage(pages, 1), TalkingPage(pages, 2)
     now_s = running(pages, one)

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import msgspec
 import pytest
 
 from common.protocol.messages import Telemetry, Vector3
@@ -17,7 +16,6 @@ from operator_side.dualsense.simulated.trigger_model import (
 )
 from operator_side.simulated_person.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.simulated_person.settings import PersonSettings
-from operator_side.simulated_person.whoever import whoever
 from tests.helpers.felt import feedback
 from tests.helpers.simulated_desk import (
     CALIBRATION,
@@ -28,7 +26,6 @@ from tests.helpers.simulated_desk import (
     VIEW,
     Desk,
     Hands,
-    WatchedDualSense,
     armed,
     crossover,
     habitual_force_n,
@@ -127,12 +124,6 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     assert all(Button.L1 in hands.buttons and hands.right == (0.0, 0.0) for hands in desk.hands)
 
 
-def test_they_set_it_down_gently_where_they_took_it_from() -> None:
-    desk = carried()
-    sinks(desk, UP_AT_M, 0.3, 0.05)
-    assert stick_speed_m_s(desk.hands[-1]) == pytest.approx(GENTLY_M_S, abs=0.002)
-
-
 @pytest.mark.parametrize("trust", [0.0, 1.0])
 def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_stands(trust: float) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
@@ -148,15 +139,6 @@ def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_s
     assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
 
 
-def test_a_tool_that_points_down_has_no_back_to_carry_to() -> None:
-    desk, down = Desk(), armed(holding=True, up_in_tool=(0.0, 0.0, -1.0))
-    desk.arm()
-    desk.until("lift", down, 3.0)
-    up = msgspec.structs.replace(down, tool_position_m=(0.5, 0.0, UP_AT_M))
-    desk.until("lower", up, 1.0)
-    assert desk.watch(up, 0.3)[-1].r2_n > 0.0
-
-
 @pytest.mark.parametrize("state", ["disarmed", "stopped"])
 def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
     desk = Desk()
@@ -166,20 +148,6 @@ def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> No
     assert [hands.r2_n == 0.0 for hands in stopped].index(True) * TICK_S == pytest.approx(0.25, abs=2 * TICK_S)
     assert stopped[-1].phase == "wait"
     desk.until("arm", view(state=state), 2.0)
-
-
-def test_an_arm_that_does_not_answer_is_asked_again() -> None:
-    desk = Desk()
-    desk.watch(VIEW, 11.0)
-    presses = [
-        hands.now_s
-        for before, hands in zip(desk.hands, desk.hands[1:], strict=False)
-        if Button.OPTIONS in hands.buttons and Button.OPTIONS not in before.buttons
-    ]
-    assert len(presses) == 3
-    # Each time pressed shortly, and with the hands at rest.
-    assert sum(Button.OPTIONS in hands.buttons for hands in desk.hands) * TICK_S == pytest.approx(0.6, abs=0.05)
-    assert all(hands.r2_n == hands.l2_n == 0.0 for hands in desk.hands)
 
 
 # Steering
@@ -214,16 +182,6 @@ def test_the_stick_goes_to_where_the_target_is_seen(
     assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
     # So far off the line they centre first.
     assert hands.r2_n == 0.0
-
-
-def test_the_nearer_to_the_line_the_faster_they_advance() -> None:
-    pulled = []
-    for off_m in (0.03, 0.012, 0.006, 0.0):
-        desk = Desk()
-        desk.arm()
-        pulled.append(desk.watch(armed((off_m, 0.0, 0.1)), 1.0)[-1].r2_n)
-    assert pulled[0] == 0.0
-    assert pulled == sorted(set(pulled))
 
 
 def test_they_close_only_when_the_target_is_in_line_and_in_reach() -> None:
@@ -269,19 +227,6 @@ def test_between_attempts_they_open_and_draw_back_and_in_the_end_they_give_up() 
     assert {hands.buttons for hands in desk.watch(armed(), 3.0)[1:]} == {frozenset({Button.L1})}
 
 
-def test_what_slipped_out_of_the_fingers_is_let_be() -> None:
-    desk = Desk()
-    desk.arm()
-    desk.until("lift", armed(holding=True), 3.0)
-    # A moment without it is not noticed.
-    desk.watch(armed(), 0.3)
-    desk.watch(armed(holding=True), 1.0)
-    assert desk.person.phase == "lift"
-    assert desk.until("done", armed(), 2.0) == pytest.approx(0.25 + 0.5, abs=5 * TICK_S)
-    desk.watch(armed(), 0.5)
-    assert desk.hands[-1].buttons == {Button.L1}
-
-
 # Feeling
 
 
@@ -290,19 +235,6 @@ UNMOVED = dataclasses.replace(CLEAR_SIGHTED, trust=0.0)
 STIFF = feedback(0, 8)
 TOWARDS = armed((0.0, 0.0, 0.06))
 MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
-
-
-def test_a_trigger_that_stiffens_yields_less_to_the_same_finger_at_once() -> None:
-    desk = Desk(UNMOVED)
-    desk.arm()
-    desk.watch(TOWARDS, 1.0)
-    force_n, free = desk.hands[-1].r2_n, desk.device.travel[1]
-    assert force_n == pytest.approx(habitual_force_n(MEANT), abs=0.02)
-    desk.resist(STIFF)
-    desk.watch(TOWARDS, 0.2)
-    assert desk.device.travel[1] < 0.5 * free
-    # However long it resists, they push no harder.
-    assert {hands.r2_n for hands in desk.watch(TOWARDS, 1.0)} == {force_n}
 
 
 @pytest.mark.parametrize(
@@ -414,17 +346,3 @@ def test_misjudged_distances_spread_as_they_are_said_to() -> None:
 
 
 # Pulling only
-
-
-def test_a_finger_that_only_pulls_rests_arms_and_pulls_with_its_constant_force() -> None:
-    device = WatchedDualSense()
-    hands = whoever(device, PersonSettings(pull_n=3.0), 0)
-    seen: list[tuple[str, float, float, bool]] = []
-    for tick in range(round(61.3 / TICK_S)):
-        now_s = tick * TICK_S
-        hands.tick(now_s, VIEW if now_s < 1.3 else armed(), 0.0)
-        seen.append((hands.doing, *device.forces_n, Button.OPTIONS in device.buttons))
-        assert Button.L1 in device.buttons
-    assert set(seen[: round(1.2 / TICK_S)]) == {("resting", 0.0, 0.0, False)}
-    assert seen[round(1.29 / TICK_S)] == ("arming", 0.0, 0.0, True)
-    assert set(seen[-10_000:]) == {("pulling", 0.0, 3.0, False)}

@@ -46,7 +46,7 @@ def drawn(shown: OperatorFacts | None, width: int = 80, height: int = 24, age_s:
         screen.notes.append(f"note {number} \x1b[2J")
         if shown is not None:
             screen.add(shown)
-    lines = console.render_lines(Whole(screen.lines(age_s, width, height)), console.options.update(height=height))
+    lines = console.render_lines(Whole(screen.lines(age_s, width)), console.options.update(height=height))
     return ["".join(text for text, *_ in line) for line in lines]
 
 
