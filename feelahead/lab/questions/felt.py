@@ -2,46 +2,37 @@
 
 feelahead bench felt --quick --picture felt.png
 feelahead bench felt --equality
+feelahead bench felt --cover
+feelahead bench felt --field --picture ways.png
 """
 
-import math
-import time
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Final
 
-import numpy as np
+import tyro
+from msgspec import Meta
 from rich.table import Table as Shown
 
-from common.arrays import FloatArray
-from common.protocol.messages import TriggerField
-from feelahead.lab.approaches.ticks import DEMO, Recorded, record, with_cover, with_hulls
+from common.files.input_file import require_input_file
+from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene, scene_names
+from feelahead.lab.approaches.ticks import DEMO, record
+from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
+from feelahead.lab.field import CONVEX, DRAWN, SHOWN_MM, Facing, draw_field, look_ahead, way_name
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference.beside import compare_ticks
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from robot_side.ahead.law import Sensed, Situation
-from robot_side.ahead.looks import Looks
-from robot_side.ahead.scene_table import scene_table
-from robot_side.ahead.swept_law import SweptLaw
-from robot_side.compiled.warm_up import warm_up
-from robot_side.settings import RobotSettings
+from feelahead.lab.variants import COVER_M, KINDS, Variant, errors_mm, replay
 
-COVER_M: Final = RobotSettings().cover_m
-WAYS: Final = tuple(
-    f"{side} {kind} {strength}" for side in ("R2", "L2") for kind in ("fast", "slow") for strength in ("first", "full")
-)
-"""Ways that are compared: where strength begins and is full, of both triggers' fast and slow zones."""
-KINDS: Final = ("fast first", "fast full", "slow first", "slow full")
-_FULL_SLOW: Final = 3
-"""Things to be touched are felt by four of the eight strengths at most."""
 _OF_MESHES: Final = ("mug", "u_mesh")
-_CHUNK: Final = 250
 _LIMIT_M: Final = 1e-12
+_LIMIT_COVER_MM: Final = 1e3 * COVER_M
+_QUICK_POINTS: Final = 10_000
+_QUICK_SCENES: Final = 2
 _LEAST_MM: Final = 1e-3
 """Errors below are drawn here: the axis is logarithmic."""
 
@@ -54,11 +45,38 @@ class FeltSweep(Sweep):
 
     equality: bool = False
     """Instead: the demo's 10 000 ticks by the compiled law and by plain NumPy; how far the two are apart."""
+    cover: bool = False
+    """Instead: how closely spheres cover grippers: the built-in one, and those of --model."""
+    field: bool = False
+    """Instead: how far before things R2's strengths begin, without camera error, and what a look takes. The frozen
+    scenes with one convex thing ahead, or those of --model, are moved along the approach."""
+    model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
+    """--cover, --field: MJCF files with an arm."""
+    site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """--cover, --field: the site between the fingertips, z along the approach."""
+    points: Annotated[int, Meta(ge=100, le=10_000_000), tyro.conf.arg(metavar="N")] = 200_000
+    """--cover: points of either surface, shared among a gripper's links."""
+    step_mm: Annotated[float, Meta(ge=1.0, le=150.0), tyro.conf.arg(metavar="MM")] = 10.0
+    """--field: free ways from 0 to 150 mm in such steps."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        asked = [f"--{name}" for name in ("equality", "cover", "field") if getattr(self, name)]
+        if len(asked) > 1:
+            raise ValueError(f"{' and '.join(asked)} exclude each other; valid: one of them")
         if self.equality and self.picture is not None:
             raise ValueError(f"--picture {self.picture}: --equality has no figure; valid: without --equality")
+        if (self.model or self.site is not None) and not (self.cover or self.field):
+            raise ValueError("--model and --site are for --cover and --field; valid: with one of them")
+        if self.cover and bool(self.model) != (self.site is not None):
+            raise ValueError("--cover takes --model and --site together; valid: both, or neither")
+        for model in self.model:
+            require_input_file("--model", model, "an MJCF file")
+
+    def scenes(self) -> dict[Path, str]:
+        """Name the scenes that --field looks at."""
+        frozen = CONVEX[:_QUICK_SCENES] if self.quick else CONVEX
+        return scene_names(self.model or tuple(frozen_scene(name) for name in frozen))
 
 
 @dataclass(frozen=True)
@@ -70,20 +88,6 @@ class Run:
     equality: bool = False
     times: int = 2
     """Each tick is gone through this often; the least time counts."""
-
-
-@dataclass(frozen=True)
-class Variant:
-    """The look ahead, as it is but for what is given here."""
-
-    knob: str = "as it is"
-    value: str = ""
-    late_ticks: int = 0
-    """A look is felt by that many ticks later, shortened by what the tool has moved along since."""
-    cover_m: float = COVER_M
-    """The gripper's spheres stand out this far: fewer of them for more"""
-    hulls: bool = False
-    """Meshes count as their convex hulls, each object's as one."""
 
 
 LADDERS: Final = {
@@ -100,8 +104,18 @@ LADDERS: Final = {
 """One thing is set otherwise at a time; each is compared with the finest of the same ladder, the last."""
 
 
-def cells(settings: FeltSweep) -> Iterator[Run]:
-    """Lay out the recorded runs."""
+def cells(settings: FeltSweep) -> Iterator[Run | Gripper | Facing]:
+    """Lay out the recorded runs, the grippers, or the scenes."""
+    if settings.cover:
+        points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
+        yield Gripper("built-in", None, None, points)
+        for model, name in scene_names(settings.model).items():
+            yield Gripper(name, model, settings.site, points)
+        return
+    if settings.field:
+        for model, name in settings.scenes().items():
+            yield Facing(name, model, settings.site or SITE, settings.step_mm)
+        return
     if settings.equality:
         yield Run(DEMO, 3.0 if settings.quick else 10.0, equality=True)
         return
@@ -110,8 +124,11 @@ def cells(settings: FeltSweep) -> Iterator[Run]:
         yield Run(scene, 3.0 if settings.quick else 3.5)
 
 
-def run(cell: Run, seed: int) -> Iterator[Row]:
-    """Record one run, and ask each setting its ticks: a row for each setting."""
+def run(cell: Run | Gripper | Facing, seed: int) -> Iterator[Row]:
+    """Record one run, and ask each setting its ticks: a row for each setting. Or measure a cover, or look ahead."""
+    if not isinstance(cell, Run):
+        yield from measure_cover(cell, seed) if isinstance(cell, Gripper) else look_ahead(cell)
+        return
     recorded = record(cell.run, cell.duration_s, seed)
     if cell.equality:
         found = compare_ticks(recorded.new_law(), recorded.ticks, recorded.settings.motion)
@@ -132,119 +149,11 @@ def run(cell: Run, seed: int) -> Iterator[Row]:
             )
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """One way of looking, over the ticks of one run."""
-
-    took_us: FloatArray
-    """(t,) processor time of the law, the least of all times that the tick was gone through"""
-    ways_m: FloatArray
-    """(t, 8) those of WAYS; the horizon where nothing is felt"""
-    horizon_m: FloatArray
-    """(t,)"""
-    spheres: int
-    looks_per_s: float
-
-    def costs(self) -> dict[str, float]:
-        """Sum up the costs."""
-        p50, p99 = np.quantile(self.took_us, (0.5, 0.99)).tolist()
-        times = {"p50_us": p50, "p99_us": p99, "mean_us": float(self.took_us.mean())}
-        return {"spheres": self.spheres, "looks_per_s": self.looks_per_s, **times}
-
-
-def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
-    """Compare one kind of way of both triggers, in mm: too late is above 0, too early below.
-
-    A tick counts if either feels something; a way that only one of both feels counts up to the horizon.
-    """
-    columns = [place for place, name in enumerate(WAYS) if name.endswith(kind)]
-    horizon = np.minimum(found.horizon_m, finest.horizon_m)[:, None]
-    ours, theirs = (np.minimum(one.ways_m[:, columns], horizon) for one in (found, finest))
-    apart: FloatArray = 1e3 * (ours - theirs)[np.minimum(ours, theirs) < horizon]
-    if not apart.size:
-        return {}
-    ends = {"earliest": float(apart.min()), "latest": float(apart.max())}
-    return {"mean": float(apart.mean()), "p95": float(np.quantile(np.abs(apart), 0.95)), **ends}
-
-
-def replay(recorded: Recorded, variants: list[Variant], times: int) -> list[Replayed]:
-    """Ask each variant the same ticks, in turns of a chunk, `times` times over."""
-    warm_up()
-    ticks = [with_cover(recorded, one.cover_m) if one.cover_m != COVER_M else recorded.ticks for one in variants]
-    ticks = [with_hulls(recorded) if one.hulls else own for one, own in zip(variants, ticks, strict=True)]
-    count = len(recorded.ticks)
-    took_s, felt = np.full((len(variants), count), math.inf), np.empty((len(variants), count, len(WAYS) + 1))
-    looks = np.zeros(len(variants))
-    for _ in range(times):
-        laws = [LateLaw(recorded.new_law(), variant.late_ticks) for variant in variants]
-        for first in range(0, count, _CHUNK):
-            for number, (law, own) in enumerate(zip(laws, ticks, strict=True)):
-                for place in range(first, min(first + _CHUNK, count)):
-                    tick = own[place]
-                    # A new frame is taken over equally often, however one looks.
-                    scene_table(tick.situation.objects)
-                    began_s = time.thread_time()
-                    sensed = law.sense(tick.situation, tick.now_s)
-                    took_s[number, place] = min(took_s[number, place], time.thread_time() - began_s)
-                    felt[number, place] = *_ends(sensed.r2), *_ends(sensed.l2), sensed.horizon_m
-        looks[:] = [law.law.ahead.counts.fields for law in laws]
-    passed_s = recorded.ticks[-1].now_s - recorded.ticks[0].now_s
-    spheres = [len(own[0].situation.pose.sphere_radii_m) for own in ticks]
-    return [
-        Replayed(1e6 * took_s[k], felt[k, :, :-1], felt[k, :, -1], spheres[k], float(looks[k]) / passed_s)
-        for k in range(len(variants))
-    ]
-
-
-def _ends(felt: TriggerField) -> tuple[float, ...]:
-    return felt.fast_m[0], felt.fast_m[-1], felt.slow_m[0], felt.slow_m[_FULL_SLOW]
-
-
-class LateLaw:
-    """A law, whose looks become known some ticks later."""
-
-    def __init__(self, law: SweptLaw, late_ticks: int) -> None:
-        self.law = law
-        self._late = _LateLooks(late_ticks) if late_ticks else None
-        if self._late is not None:
-            law.turns.looks = self._late
-
-    def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick."""
-        if self._late is not None:
-            self._late.tick()
-        return self.law.sense(situation, now_s)
-
-
-class _LateLooks(Looks):
-    """Takes looks in some ticks later; the very first look from a place at once."""
-
-    def __init__(self, ticks: int) -> None:
-        super().__init__()
-        self._ticks, self._now = ticks, 0
-        self._waiting: deque[tuple[int, int, int, float, tuple[Any, ...]]] = deque()
-
-    def add(self, side: int, place: int, now_s: float, *seen: Any) -> None:
-        """Take a look in, later."""
-        if self.looked_s[side][place] < 0.0:
-            super().add(side, place, now_s, *seen)
-            return
-        self.looked_s[side][place] = now_s
-        self._waiting.append((self._now + self._ticks, side, place, now_s, seen))
-
-    def tick(self) -> None:
-        """Let a tick pass."""
-        self._now += 1
-        while self._waiting and self._waiting[0][0] <= self._now:
-            _, side, place, then_s, seen = self._waiting.popleft()
-            if place < len(looked_s := self.looked_s[side]):
-                newest_s = looked_s[place]
-                super().add(side, place, then_s, *seen)
-                looked_s[place] = newest_s
-
-
-def show(_: FeltSweep, table: Table) -> Iterator[Shown | str]:
-    """Make a table for each run: a row for each setting; or one of the largest differences."""
+def show(settings: FeltSweep, table: Table) -> Iterator[Shown | str]:
+    """Make a table for each run: a row for each setting; or one of the largest differences, the links, the scenes."""
+    if settings.cover or settings.field:
+        yield _of_covers(table) if settings.cover else _of_scenes(table)
+        return
     costs = ("spheres", "looks_per_s", "p50_us", "p99_us", "mean_us")
     for (name,), rows in table.groups("run"):
         if (ticks := rows.values("ticks")) != []:
@@ -265,19 +174,37 @@ def show(_: FeltSweep, table: Table) -> Iterator[Shown | str]:
         )
 
 
+def _of_covers(table: Table) -> Shown:
+    figures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
+    rows = ((f"{row['gripper']}: {row['part']}", *map(row.get, figures)) for row in table)
+    return shown("grippers in spheres: geoms out of spheres, spheres out of geoms", ("part", *figures), rows)
+
+
+def _of_scenes(table: Table) -> Shown:
+    figures = (*map(way_name, DRAWN), "sigma_mm", "overlaps", "r2_us", "l2_us")
+    rows = ((row["scene"], *map(row.get, figures)) for row in table.where(free_mm=SHOWN_MM))
+    return shown(f"{SHOWN_MM:g} mm before each thing: ways after which R2 begins to resist", ("scene", *figures), rows)
+
+
 def _apart(row: Row, kind: str) -> str | None:
     mean, p95, earliest, latest = (row.get(f"{kind} {name}") for name in ("mean", "p95", "earliest", "latest"))
     return None if mean is None else f"{mean:+.2f}; {p95:.2f}; {earliest:+.1f} to {latest:+.1f}"
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Hold the compiled law to the plain one."""
+    """Hold the compiled law to the plain one, and spheres to what they cover."""
+    for (name,), rows in table.groups("gripper") if settings.cover else ():
+        yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
+        yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
     if settings.equality:
         yield Goal("largest difference of compiled and plain, SI units", max(table.values("largest")), _LIMIT_M)
 
 
-def draw(_: FeltSweep, table: Table, path: Path) -> None:
+def draw(settings: FeltSweep, table: Table, path: Path) -> None:
     """Draw run time against error of full strength, a line for each thing that is set, of each run."""
+    if settings.cover or settings.field:
+        draw_cover(table, path) if settings.cover else draw_field(table, frozen(settings), path)
+        return
     runs = list(table.groups("run"))
     with figure(path, 1, len(runs), figsize=(3.4 * len(runs), 3.8), squeeze=False, sharey=True) as (_, (all_axes,)):
         for axes, ((name,), rows) in zip(all_axes, runs, strict=True):
@@ -292,6 +219,11 @@ def draw(_: FeltSweep, table: Table, path: Path) -> None:
         all_axes[-1].legend(fontsize=6)
 
 
+def frozen(settings: FeltSweep) -> str:
+    """Hash the frozen scenes that --field looks at."""
+    return frozen_hash(tuple(settings.scenes())) if settings.field else ""
+
+
 QUESTION = Question(
     "bench felt",
     FeltSweep,
@@ -300,6 +232,7 @@ QUESTION = Question(
     show,
     draw,
     goals,
+    frozen=frozen,
     failed=lambda row: row.get("largest", 0.0) > _LIMIT_M,
     timed=True,
 )

@@ -1,8 +1,10 @@
 """The compiled law and the plain definition agree, and `feelahead bench felt` measures what it says."""
 
 import csv
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,26 +13,36 @@ from hypothesis import strategies as st
 
 import feelahead.main
 from common.errors import ConfigurationError
-from feelahead.lab.approaches.frozen import frozen_scene
+from feelahead.lab import cover
+from feelahead.lab.approaches.frozen import frozen_hash, frozen_scene
 from feelahead.lab.approaches.ticks import DEMO, Recorded, as_hulls, record, scene_of, with_cover
-from feelahead.lab.questions.felt import LADDERS, WAYS, LateLaw, Replayed, Run, Variant, errors_mm, replay, run
+from feelahead.lab.cover import STANDS_OUT, Gripper
+from feelahead.lab.field import draw_field, way_name
+from feelahead.lab.questions.felt import LADDERS, Run, run
 from feelahead.lab.reference import plain_feel, plain_ramp, plain_ways
 from feelahead.lab.reference.beside import Differences, compare_ticks
+from feelahead.lab.table import Table
+from feelahead.lab.variants import WAYS, LateLaw, Replayed, Variant, errors_mm, replay
 from robot_side.ahead.field import Ahead, Along
 from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.ahead.scene_table import scene_table
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
+from robot_side.simulation.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.ahead.fields import along, ball_pose, look
 from tests.helpers.ahead.situations import at, moving, situation, swept, walls
+from tests.helpers.arm_models import planar_arm
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation
+from tests.helpers.repository import DATA
 
 LIMIT = 1e-12
 REACH_M = 0.25
 ENCODER_SIGMA_RAD = np.full(6, 2e-3)
 HORIZON_M = 0.5
+WALL = str(DATA / "wall.xml")
+COVER_MM, RAMP_MM = 3.0, 12.0
 
 
 def any_scene(rng: np.random.Generator) -> PerceivedObjects:
@@ -222,10 +234,92 @@ def test_equality_is_a_table_a_goal_and_a_file(tmp_path: Path, capsys: pytest.Ca
         assert all(float(row["largest"]) <= LIMIT for row in csv.DictReader(file))
 
 
+def test_the_cover_of_a_gripper_is_a_row_for_each_part_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written, picture = tmp_path / "out.csv", tmp_path / "out.png"
+    own = ["--model", str(planar_arm(tmp_path)), "--site", "tcp"]
+    few = ["--points", "2000", "--csv", str(written), "--picture", str(picture)]
+    assert feelahead.main.command(["bench", "felt", "--cover", *own, *few]) == 0
+    assert "missed" not in capsys.readouterr().out
+    with written.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["gripper"], row["part"], row["spheres"]) for row in rows[:3]] == [
+        ("built-in", "gripper", "158"),
+        ("built-in", "left_finger", "44"),
+        ("built-in", "right_finger", "44"),
+    ]
+    assert [(row["gripper"], row["part"]) for row in rows[3:]] == [("arm", "hand"), ("arm", "left"), ("arm", "right")]
+    for row in rows:
+        assert float(row["sticks_out_mm"]) == 0.0
+        median_mm, p99_mm, most_mm = (float(row[name]) for name in STANDS_OUT)
+        assert 1.0 < median_mm < p99_mm < most_mm <= 3.0
+        assert most_mm > 2.0
+    assert [round(float(rows[0][name]), 1) for name in ("gap_mm", "gap_kept_mm")] == [85.0, 79.0]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_spheres_that_are_too_small_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spheres of half a millimetre less leave corners out, and stand out by that much less."""
+
+    def smaller(*arguments: Any) -> GripperCover:
+        found = cover_gripper(*arguments)
+        return replace(found, radii_m=found.radii_m - 0.0005)
+
+    monkeypatch.setattr(cover, "cover_gripper", smaller)
+    for row in run(Gripper("built-in", None, None, 2000), 0):
+        assert 0.1 < row["sticks_out_mm"] <= 0.5 + 1e-6
+        assert 2.0 < row["stands_out_mm"] <= 2.5 + 1e-6
+
+
+def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    summary, picture = tmp_path / "out.json", tmp_path / "out.png"
+    models = ["--model", str(DATA / "wall.xml"), str(DATA / "rod_5mm.xml")]
+    written = ["--summary", str(summary), "--picture", str(picture)]
+    assert feelahead.main.command(["bench", "felt", "--field", "--step-mm", "50", *models, *written]) == 0
+    assert f"frozen scenes and limits: {frozen_hash()}" in " ".join(capsys.readouterr().out.split())
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    for (scene,), rows in Table(json.loads(summary.read_text())["runs"]).groups("scene"):
+        assert scene in ("wall", "rod_5mm")
+        assert rows.values("free_mm") == [0.0, 50.0, 80.0, 100.0, 150.0]
+        assert min(rows.values("overlaps") + rows.values("r2_us") + rows.values("l2_us")) > 0.0
+        far = [row for row in rows if row["free_mm"] >= 50.0]
+        before_mm = np.array([[row["free_mm"] - row[way_name(strength)] for strength in range(1, 9)] for row in far])
+        np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=1e-6)
+        assert (np.diff(before_mm, axis=1) <= 0.0).all()
+        # The eighth at D_σ and what the spheres stand out, or a little earlier, as strengths are rounded; the first on
+        # the ramp before.
+        begins_mm = before_mm[0] - far[0]["sigma_mm"]
+        assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
+        assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM
+
+
+def test_a_strength_that_never_begins_is_left_out_of_the_figure(tmp_path: Path) -> None:
+    row = {"scene": "far", "free_mm": 80.0, "sigma_mm": 7.0} | {way_name(strength): None for strength in range(1, 9)}
+    draw_field(Table([row]), "", tmp_path / "out.png")
+    assert (tmp_path / "out.png").is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
-    [(["--seed", "-1"], "seed = -1"), (["--equality", "--picture", "out.png"], "--equality has no figure")],
+    [
+        (["--seed", "-1"], "seed = -1"),
+        (["--equality", "--picture", "out.png"], "--equality has no figure"),
+        (["--cover", "--field"], "--cover and --field exclude each other; valid: one of them"),
+        (["--equality", "--cover"], "--equality and --cover exclude each other"),
+        (["--model", WALL], "--model and --site are for --cover and --field"),
+        (["--cover", "--site", "tcp"], "--cover takes --model and --site together"),
+        (["--cover", "--points", "0"], "points = 0; valid: 100 to"),
+        (["--field", "--step-mm", "nan"], "step_mm = nan; valid: 1 to 150"),
+        (["--field", "--model", "no_such.xml"], "no_such.xml: there is no such file"),
+        (["--field", "--model", WALL, "--site", "hand"], "'hand'; valid: tool"),
+        (["--field", "--model", str(DATA / "empty.xml")], "nothing is ahead of the gripper within 2 m"),
+        (["--field", "--workers", "2"], "--workers 2"),
+    ],
 )
 def test_bad_input_is_named(arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError, match=named):
+    with pytest.raises(ConfigurationError, match=named) as caught:
         feelahead.main.command(["bench", "felt", *arguments])
+    assert "\n" not in str(caught.value)
