@@ -10,8 +10,6 @@ from pathlib import Path
 from common.errors import ConfigurationError
 
 _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
-_OWN = "robot,operator,experiments"
-"""Extras of a question in a file of one's own."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +43,17 @@ class Menu:
     def _ask(self, module: str, name: str, arguments: Sequence[str]) -> int:
         try:
             sweep = import_module("feelahead.lab.sweep")
-            question = import_module(module).QUESTION
-        except ModuleNotFoundError as error:
-            extras = self.questions.get(name, _OWN)
-            raise ConfigurationError(
-                f"{self.name} {name}: {error.name} is not installed; pip install 'feelahead[{extras}]'"
-            ) from error
-        except (AttributeError, SyntaxError) as error:
-            raise ConfigurationError(f"{self.name} {name}: {error}; valid: a file that holds a QUESTION") from error
+            found = import_module(module)
+        except (ImportError, SyntaxError) as error:
+            reason = f"{error}; valid: a question's file"
+            if name in self.questions and isinstance(error, ModuleNotFoundError):
+                reason = f"{error.name} is not installed; pip install 'feelahead[{self.questions[name]}]'"
+            raise ConfigurationError(f"{self.name} {name}: {reason}") from error
+        if name not in self.questions and Path(found.__file__ or "").resolve() != Path(name).resolve():
+            raise ConfigurationError(f"{self.name} {name}: named like a module of Python; valid: another name")
+        question = getattr(found, "QUESTION", None)
+        if not isinstance(question, sweep.Question):
+            raise ConfigurationError(f"{self.name} {name}: it holds no QUESTION; valid: QUESTION = Question(...)")
         code: int = sweep.ask(question, arguments)
         return code
 

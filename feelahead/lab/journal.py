@@ -5,9 +5,10 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, Self
 
 from common.errors import ConfigurationError, FeelaheadError
 from feelahead.lab.table import Row
@@ -23,14 +24,14 @@ class Journal:
     def __init__(self, path: Path | None, made_by: Mapping[str, Any]) -> None:
         """Open or begin the file; ConfigurationError where it holds another run's work or another run writes to it."""
         self.done: dict[str, list[Row]] = {}
-        self._file: BinaryIO | None = None
+        self._file: FileIO | None = None
         if path is None:
             return
         if path.exists() and not path.is_file():
             raise ConfigurationError(f"--resume {path}: not a regular file; valid: a file of its own, or a new one")
         try:
             with ExitStack() as stack:
-                self._file = stack.enter_context(path.open("a+b"))
+                self._file = stack.enter_context(FileIO(path, "a+"))
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
                 stack.pop_all()
@@ -50,12 +51,12 @@ class Journal:
 
     def keep(self, key: str, rows: list[Row]) -> None:
         """Write one finished piece; FeelaheadError when the disk does not take it."""
-        self.done[key] = rows
         self._write(json.dumps({"key": key, "rows": rows}).encode())
+        self.done[key] = rows
 
-    def _load(self, path: Path, file: BinaryIO, first: bytes) -> None:
+    def _load(self, path: Path, file: FileIO, first: bytes) -> None:
         file.seek(0)
-        text = file.read()
+        text = file.readall()
         lines = text.splitlines(keepends=True)
         torn = lines.pop() if lines and not lines[-1].endswith(b"\n") else b""
         if not lines and first.startswith(torn):
@@ -76,8 +77,9 @@ class Journal:
         if self._file is None:
             return
         try:
-            self._file.write(line + b"\n")
-            self._file.flush()
+            rest = line + b"\n"
+            while rest:
+                rest = rest[self._file.write(rest) :]
             os.fsync(self._file.fileno())
         except OSError as error:
             raise FeelaheadError(f"--resume {self._file.name}: cannot be written: {error.strerror}") from error

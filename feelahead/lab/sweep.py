@@ -10,6 +10,7 @@ import functools
 import hashlib
 import importlib
 import json
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
@@ -40,6 +41,8 @@ _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
 _RESTARTS = 3
 """How often a pool is started again after one of its processes was killed."""
 _WORKERS = 2
+_MOST_RUNS = 10_000_000
+_SCHEDULER = re.compile(r"[a-z]+://[^/:]+:\d{1,5}")
 _WIDTH = 200
 """Columns of output that no terminal shows."""
 
@@ -76,6 +79,20 @@ class Sweep:
         for name in ("resume", "csv", "parquet", "summary"):
             require_output_file(f"--{name}", getattr(self, name))
         require_output_file("--picture", self.picture, PICTURES)
+        self._require_files_of_their_own()
+        if self.scheduler is not None and not _SCHEDULER.fullmatch(self.scheduler):
+            raise ValueError(f"--scheduler {self.scheduler!r}: valid: as tcp://127.0.0.1:8786")
+
+    def _require_files_of_their_own(self) -> None:
+        taken: dict[Path, str] = {}
+        for name in ("resume", "csv", "parquet", "summary", "picture"):
+            path: Path | None = getattr(self, name)
+            beside = () if path is None or name not in ("csv", "parquet") else (path.with_name(path.name + ".json"),)
+            for own in () if path is None else (path, *beside):
+                if (other := taken.setdefault(own.resolve(), name)) != name:
+                    raise ValueError(f"--{name} {path}: --{other} writes to {own}; valid: a file for each")
+            if path is not None and name in ("resume", "parquet", "picture") and path.exists() and not path.is_file():
+                raise ValueError(f"--{name} {path}: not a regular file; valid: a file's path")
 
 
 S = TypeVar("S", bound=Sweep)
@@ -170,6 +187,9 @@ def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]
         raise ConfigurationError(f"{flag}: {question.name} measures time, in turns and alone; valid: --workers 1")
     seeds = range(settings.seed, settings.seed + settings.seeds)
     cells = list(question.cells(settings))
+    if not 0 < len(cells) * len(seeds) <= _MOST_RUNS:
+        valid = f"one value or more of each setting, and at most {_MOST_RUNS} runs"
+        raise ConfigurationError(f"{len(cells)} cells with {len(seeds)} seeds each; valid: {valid}")
     order = [_Piece(cell, seed) for cell in cells for seed in seeds]
     made_by = {"question": question.name, "code": code_hash(question), "frozen": question.frozen(settings)}
     failures: list[str] = []
@@ -220,7 +240,7 @@ def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
     except FeelaheadError as error:
         return str(error)
     # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
-    plain: list[Row] = json.loads(json.dumps(rows))
+    plain: list[Row] = json.loads(json.dumps(rows, default=_of_numpy))
     return plain
 
 
@@ -274,6 +294,13 @@ def _write(question: Question[S, C], settings: S, table: Table) -> None:
     if settings.picture is not None and question.draw is not None and len(table):
         question.draw(settings, table, settings.picture)
     question.also(settings, table)
+
+
+def _of_numpy(value: Any) -> Any:
+    """Turn numbers and arrays of NumPy into plain ones."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a row holds {value!r}; valid: numbers, texts, lists and None")
 
 
 def _plain(cell: object) -> dict[str, Any]:

@@ -63,7 +63,12 @@ class Table:
         except ModuleNotFoundError as error:
             raise ConfigurationError("--parquet: pyarrow is missing; it is in the extra `experiments`") from error
         columns = {name: [row.get(name) for row in self.rows] for name in self.columns}
+        new = path.with_name(f".{path.name}.new")
         try:
-            parquet.write_table(pa.table(columns), path)
+            # A file that was there before stays until all of the new one is written.
+            parquet.write_table(pa.table(columns), new)
+            new.replace(path)
         except (OSError, pa.ArrowException) as error:
             raise ConfigurationError(f"--parquet {path}: cannot be written: {error}") from error
+        finally:
+            new.unlink(missing_ok=True)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 from scipy.stats import binom
 
-from common.errors import ConfigurationError
+from common.errors import ConfigurationError, FeelaheadError
 from feelahead.commands.bench_and_try import try_out
 from feelahead.lab.executors import LostWorkersError
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, student_interval, welch_interval
@@ -298,3 +298,59 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "1s")
     with pytest.raises(ConfigurationError, match=r"--scheduler tcp://127\.0\.0\.1:1: no dask scheduler answers there"):
         ask(QUESTION, ["--scheduler", "tcp://127.0.0.1:1"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
+        (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
+        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
+        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
+        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
+        (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
+        (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
+    ],
+)
+def test_what_would_lose_work_or_never_end_is_refused(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    with pytest.raises(ConfigurationError, match=re.escape(said)):
+        ask(QUESTION, arguments)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"),
+    [
+        ("json.py", "QUESTION = 3", "named like a module of Python"),
+        ("own_number.py", "QUESTION = 3", "it holds no QUESTION"),
+        ("own_import.py", "from feelahead.lab.sweep import Questio", "cannot import name 'Questio'"),
+        ("own_syntax.py", "QUESTION =", "invalid syntax"),
+    ],
+)
+def test_a_file_that_holds_no_question_is_refused(tmp_path: Path, name: str, code: str, said: str) -> None:
+    (tmp_path / name).write_text(code)
+    with pytest.raises(ConfigurationError, match=said):
+        try_out([str(tmp_path / name)])
+
+
+def test_a_disk_that_takes_no_more_is_named_and_the_journal_stays_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "journal"
+    with Journal(path, {}) as journal:
+        journal.keep("first", [{"a": 1}])
+
+        def full(_: int) -> None:
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", full)
+            with pytest.raises(FeelaheadError, match=r"--resume .*journal: cannot be written: No space left on device"):
+                journal.keep("second", [{"a": 2}])
+        assert list(journal.done) == ["first"]
+    with Journal(path, {}) as journal:
+        assert journal.done["first"] == [{"a": 1}]
