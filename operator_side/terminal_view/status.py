@@ -27,8 +27,7 @@ from operator_side.terminal_view.screen import Screen
 
 _PERIOD_S: Final = 0.1
 _END_LIMIT_S: Final = 0.5
-_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"
-"""The first screen and its cursor."""
+_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"  # to the first screen and its cursor
 _INPUT, _LOCAL, _LETTERS = 0, 3, 6
 
 
@@ -88,7 +87,10 @@ def main() -> None:
     changed[_LETTERS][termios.VSUSP] = b"\x00"
     changed[_INPUT] &= ~termios.IXON
     changed[_LOCAL] &= ~termios.ECHO
-    console = Console(file=os.fdopen(sys.stdout.fileno(), "w", encoding="utf-8"))
+    output = os.fdopen(sys.stdout.fileno(), "w", encoding="utf-8")
+    console = Console(
+        file=output, _environ={**os.environ, "COLUMNS": "", "LINES": ""}
+    )  # only the terminal's own follow
     try:
         termios.tcsetattr(sys.stdout, termios.TCSANOW, changed)
         with contextlib.suppress(OSError), Live(console=console, screen=True, auto_refresh=False) as live:
