@@ -88,9 +88,7 @@ def main() -> None:
     changed[_INPUT] &= ~termios.IXON
     changed[_LOCAL] &= ~termios.ECHO
     output = os.fdopen(sys.stdout.fileno(), "w", encoding="utf-8")
-    console = Console(
-        file=output, _environ={**os.environ, "COLUMNS": "", "LINES": ""}
-    )  # only the terminal's own follow
+    console = Console(file=output, _environ=os.environ | {"COLUMNS": "", "LINES": ""})  # the terminal's own size
     try:
         termios.tcsetattr(sys.stdout, termios.TCSANOW, changed)
         with contextlib.suppress(OSError), Live(console=console, screen=True, auto_refresh=False) as live:
