@@ -251,13 +251,20 @@ class Lan:
     def back(self) -> None:
         """Wait until the link is up, disarmed, with hands at rest; then armed again."""
         began_s = time.monotonic()
-        status = self.until("operator", "the link is up", lambda status: status["link"] == "up")
+        status = wait_until("operator: the link is up", self._first_after_the_loss, PATIENCE_S)
         print(f"back after {time.monotonic() - began_s:.1f} s")
         assert status["state"] == "disarmed"
         fresh = self.until("operator", "armed again", lambda status: is_done(status) or _is_armed_and_shown(status))
         if is_done(fresh):  # they were at the end of the task
             self.moving()
         self.until("robot", "armed again", is_armed)
+
+    def _first_after_the_loss(self) -> Status | None:
+        """The first status since the link came back, however late it is read: a second later the arm may be armed."""
+        self.listen()
+        said = self.operator.said
+        lost = max((place for place, status in enumerate(said) if status["link"] != "up"), default=-1)
+        return said[lost + 1] if said[lost + 1 :] else None
 
 
 def is_armed(status: Status) -> bool:
