@@ -188,17 +188,6 @@ def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_byt
     )
 
 
-def compare(
-    profile: LinkProfile, reference: LinkSample, seeds: int, size_bytes: int, advance: Callable[[], object]
-) -> list[SeedResult]:
-    """Compare the seeds 0 to `seeds` − 1; `advance` is called after each."""
-    results = []
-    for seed in range(seeds):
-        results.append(compare_one(profile, reference, seed, size_bytes))
-        advance()
-    return results
-
-
 def pair_of_runs(
     profile: LinkProfile, reference: LinkSample, pair: int, size_bytes: int
 ) -> tuple[float, list[list[float]]]:
@@ -213,17 +202,6 @@ def band_of(pairs: Sequence[tuple[float, Sequence[Sequence[float]]]]) -> Band:
     low, high = np.quantile([figures for _, both in pairs for figures in both], _BAND, axis=0)
     ranges = {name: (float(low[place]), float(high[place])) for place, name in enumerate(FIGURES)}
     return Band(len(pairs), float(np.quantile([apart for apart, _ in pairs], 0.99)), ranges)
-
-
-def measure_band(
-    profile: LinkProfile, reference: LinkSample, pairs: int, size_bytes: int, advance: Callable[[], object]
-) -> Band:
-    """Measure the band by `pairs` pairs of runs; `advance` is called after each."""
-    found = []
-    for pair in range(pairs):
-        found.append(pair_of_runs(profile, reference, pair, size_bytes))
-        advance()
-    return band_of(found)
 
 
 def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[SeedResult], band: Band | None) -> list[Goal]:
