@@ -18,7 +18,7 @@ from feelahead.lab.link.ends import BYTES, OperatorEnd, RobotEnd
 
 Kind = Literal["whole ends", "bare ZeroMQ"]
 Take = Callable[[float, float], list[dict[str, float]]]
-"""Have both ends take a turn of so many seconds with this period; return the robot's figures, then the operator's."""
+"""Have both ends take a turn of this length and period (s); return the robot's figures, then the operator's."""
 _SETTLING_S: Final = 0.4
 """Sessions that fell asleep are there again after this time; a turn is measured from then on."""
 _PATIENCE_S: Final = 120.0

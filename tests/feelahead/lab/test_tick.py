@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from feelahead.lab.questions.tick import QUESTION, Case, TickSweep, goals, rows, run
+from feelahead.lab.questions.tick import QUESTION, Case, rows, run
 from feelahead.lab.sweep import ask
-from feelahead.lab.table import Table
 from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, Crowd, CrowdedCamera
 from feelahead.lab.tick.timed_robot import COLUMNS
 from robot_side.objects.perceived import PerceivedObjects, Role
@@ -92,18 +91,6 @@ def test_look_to_message_leaves_out_physics_and_frames() -> None:
     assert found["tick"]["share"] == pytest.approx(0.5)
 
 
-def test_memory_that_grows_is_told_apart_from_memory_that_does_not() -> None:
-    for last_mb, verdict in ((101.0, "met"), (110.0, "missed")):
-        table = Table({"resident_mb": value} for value in (90.0, 100.0, last_mb))
-        [goal] = goals(TickSweep(allocations=1000), table)
-        assert goal.verdict == verdict
-
-
-def test_memory_is_said_at_even_points(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ask(QUESTION, ["--allocations", "200"]) == 0
-    assert "resident memory grows by" in capsys.readouterr().out
-
-
 @pytest.mark.processes
 def test_a_real_robot_side_is_timed() -> None:
     found = {row["part"]: row for row in run(Case("10 objects", 1.5, stages=True, objects=10), 0)}
@@ -111,7 +98,7 @@ def test_a_real_robot_side_is_timed() -> None:
     assert found["law"]["p50_us"] > 0.0
 
 
-@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"], ["--allocations", "1"]])
+@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"]])
 def test_values_out_of_range_are_refused(arguments: list[str]) -> None:
     with pytest.raises(ConfigurationError, match="valid"):
         ask(QUESTION, arguments)
