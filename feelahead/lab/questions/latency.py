@@ -5,11 +5,11 @@ feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture
 
 import atexit
 import functools
+import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
-from importlib import import_module
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from pathlib import Path
 from statistics import fmean, median
@@ -20,23 +20,26 @@ from msgspec import Meta
 from rich.box import MARKDOWN
 from rich.table import Table as Shown
 
+from common.command.command_line import parse_settings
 from common.command.live_view import LINK_UP
 from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
-from common.errors import ConfigurationError, FeelaheadError
+from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.real_time import LINK_S, START_S, run_for
 from feelahead.both_sides.summary import merge_summaries, read_summary
-from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
+from feelahead.both_sides.trial import Trial, figures_of
+from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
 
 Medium = Literal["virtual", "loopback", "containers"]
-_CONTAINERS: Final = "feelahead.containers.medium"
 _DIRECTIONS: Final = ("to_robot", "to_operator")
 _LOOK_S: Final = 0.01
 _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
@@ -103,19 +106,15 @@ def cells(settings: LatencySettings) -> Iterator[Cell]:
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
     """Run one trial; delays in milliseconds, losses in per cent."""
-    figures = _MEDIA[cell.medium](replace(cell.trial, seed=seed))
-    row: Row = asdict(figures)
-    for direction in _DIRECTIONS:
-        way = row.pop(direction)
-        share = way.pop("loss_share")
-        way["lost_percent"] = None if share is None else 100.0 * share
-        row |= {f"{direction}_{name}": value for name, value in way.items()}
-    yield row
+    yield _MEDIA[cell.medium](replace(cell.trial, seed=seed))
 
 
-def in_virtual_time(trial: Trial) -> TrialFigures:
+def in_virtual_time(trial: Trial) -> Row:
     """Run both cores and the emulated link in this process, as fast as it goes."""
-    both = Loopback(LoopbackSettings(trial.robot_settings(), trial.operator_settings()))
+    link = trial.link_arguments()
+    robot = parse_settings(RobotSettings, "feelahead-robot", [*trial.robot_arguments(), *link])
+    operator = parse_settings(OperatorSettings, "feelahead-operator", [*trial.operator_arguments(), *link])
+    both = Loopback(LoopbackSettings(robot, operator))
     while both.operator.status(both.clock.now())["link"] != LINK_UP:
         if both.clock.now() > LINK_S:
             raise FeelaheadError(f"no link within {LINK_S:g} s over --link {trial.link!r}")
@@ -124,7 +123,7 @@ def in_virtual_time(trial: Trial) -> TrialFigures:
     return figures_of(both.summary())
 
 
-def on_loopback(trial: Trial) -> TrialFigures:
+def on_loopback(trial: Trial) -> Row:
     """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for what it sends."""
     with tempfile.TemporaryDirectory(prefix="feelahead-latency-") as folder:
         summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
@@ -140,30 +139,19 @@ def on_loopback(trial: Trial) -> TrialFigures:
         return figures_of(merge_summaries(robot_said, operator_said, []))
 
 
-def in_containers(trial: Trial) -> TrialFigures:
-    """Run both sides in containers, in real time; the router between them has the link."""
-    figures: TrialFigures = _containers()(trial)
-    return figures
-
-
-_MEDIA: Final[Mapping[Medium, Callable[[Trial], TrialFigures]]] = {
-    "virtual": in_virtual_time,
-    "loopback": on_loopback,
-    "containers": in_containers,
-}
-
-
 @functools.cache
-def _containers() -> Callable[[Trial], TrialFigures]:
+def _containers() -> ContainerMedium:
     """Open the containers once, and leave nothing of them at the end of the process."""
-    try:
-        module = import_module(_CONTAINERS)
-    except ImportError as error:
-        raise ConfigurationError(f"--compose: {error}; valid: in a clone of the repository") from error
     stack = ExitStack()
     atexit.register(stack.close)
-    opened: Callable[[Trial], TrialFigures] = stack.enter_context(module.open_medium()).run
-    return opened
+    return ContainerMedium(stack, os.getpid())
+
+
+_MEDIA: Final[Mapping[Medium, Callable[[Trial], Row]]] = {
+    "virtual": in_virtual_time,
+    "loopback": on_loopback,
+    "containers": lambda trial: _containers().run(trial),
+}
 
 
 def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
