@@ -18,9 +18,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideProcess
@@ -29,6 +27,7 @@ from feelahead.both_sides.summary import read_summary
 from feelahead.lab.goals import Goal
 from feelahead.lab.hostile.inputs import Attacker
 from feelahead.lab.hostile.raw_zmtp import port_of
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 
@@ -146,16 +145,15 @@ def growth_mb(table: Table, phase: str) -> float:
 
 def show(_: HostileSweep, table: Table) -> Iterator[RenderableType]:
     """Show each figure quiet and under attack, and the counts of the end."""
-    shown = Shown(title="hostile input at the robot side's port", box=MARKDOWN)
-    for heading in ("figure", "quiet", "hostile"):
-        shown.add_column(heading, justify="left" if heading == "figure" else "right")
-    for name in (*_FIGURES, "memory_mb", "descriptors"):
-        shown.add_row(name, *(f"{_median(table, phase, name):.0f}" for phase in ("quiet", "hostile")))
-    shown.add_row("memory growth, MB", *(f"{growth_mb(table, phase):+.1f}" for phase in ("quiet", "hostile")))
+    phases = ("quiet", "hostile")
+    names = (*_FIGURES, "memory_mb", "descriptors")
+    lines: list[tuple[str | float, ...]] = [
+        (name, *(_median(table, phase, name) for phase in phases)) for name in names
+    ]
+    lines.append(("memory growth, MB", *(growth_mb(table, phase) for phase in phases)))
     for end in table.where(phase="end"):
-        for name in list(end)[list(end).index("sent") :]:
-            shown.add_row(name, "", str(end[name]))
-    yield shown
+        lines += [(name, "", str(end[name])) for name in list(end)[list(end).index("sent") :]]
+    yield shown("hostile input at the robot side's port", ("figure", *phases), lines)
 
 
 def goals(_: HostileSweep, table: Table) -> Iterator[Goal]:

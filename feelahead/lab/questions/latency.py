@@ -17,7 +17,6 @@ from typing import Annotated, Final, Literal
 
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.table import Table as Shown
 
 from common.command.command_line import parse_settings
@@ -34,6 +33,7 @@ from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from operator_side.settings import OperatorSettings
@@ -156,26 +156,21 @@ _MEDIA: Final[Mapping[Medium, Callable[[Trial], Row]]] = {
 
 def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
     """Make a table of figures, and one of how far the media agree."""
-    shown = Shown(title="latency: a constant finger towards a wall", box=MARKDOWN)
-    for heading in (
+    headings = (
         *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
         *("to operator, ms", "sd", "p50", "p99", "lost, %"),
         *("contacts", "mm/s, median (most)", "nearest, mm", "stiffness", "tick p99, us", "stops"),
-    ):
-        shown.add_column(heading, justify="left" if heading in ("link", "haptics", "medium") else "right")
-    for (link, haptics, medium), group in table.groups("link", "haptics", "medium"):
+    )
+    lines = []
+    for kind, group in table.groups("link", "haptics", "medium"):
         speeds = group.values("contact_speed_mm_s")
-        shown.add_row(
-            *(link, haptics, medium, str(len(group))),
-            *(cell for direction in _DIRECTIONS for cell in _delays(group, direction)),
-            f"{len(speeds)}/{len(group)}",
-            f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else "",
-            _mean(group.values("min_distance_mm"), 1),
-            _mean(group.values("stiffness_max"), 2),
-            _mean(group.values("tick_p99_us"), 0),
-            str(sum(group.values("stops"))),
+        line = [*kind, str(len(group)), *(cell for direction in _DIRECTIONS for cell in _delays(group, direction))]
+        line += [f"{len(speeds)}/{len(group)}", f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else ""]
+        rest = (("min_distance_mm", 1), ("stiffness_max", 2), ("tick_p99_us", 0))
+        lines.append(
+            [*line, *(_mean(group.values(name), digits) for name, digits in rest), str(sum(group.values("stops")))]
         )
-    yield shown
+    yield shown("latency: a constant finger towards a wall", headings, lines)
     if len({row["medium"] for row in table}) > 1:
         yield agreement(table)
 
@@ -196,23 +191,22 @@ def agreement(table: Table) -> Shown:
     """Compare each pair of media: two one-sided tests, by Welch's interval over seeds, against a margin."""
     margins = ", ".join(f"{name} within ±{margin:g} {unit}" for _, name, unit, margin in _COMPARED)
     title = f"do the media agree? {margins}: the whole 95 % interval (Welch, over seeds) has to lie within"
-    shown = Shown(title=title, box=MARKDOWN)
-    for heading in ("link", "media", "direction", "seeds", *(name for _, name, _, _ in _COMPARED)):
-        shown.add_column(heading)
+    lines = []
     for (link,), group in table.groups("link"):
-        for first, second in combinations(dict.fromkeys(row["medium"] for row in group), 2):
+        for media in combinations(dict.fromkeys(row["medium"] for row in group), 2):
             for direction in _DIRECTIONS:
                 samples = [
-                    [by_seed(group.where(medium=medium), f"{direction}_{name}") for medium in (first, second)]
+                    [by_seed(group.where(medium=medium), f"{direction}_{name}") for medium in media]
                     for name, *_ in _COMPARED
                 ]
                 verdicts = (
                     verdict(one, other, margin, unit)
                     for (one, other), (_, _, unit, margin) in zip(samples, _COMPARED, strict=True)
                 )
-                seeds = f"{len(samples[0][0])}, {len(samples[0][1])}"
-                shown.add_row(link, f"{first} - {second}", direction, seeds, *verdicts)
-    return shown
+                lines.append(
+                    [link, " - ".join(media), direction, ", ".join(str(len(of)) for of in samples[0]), *verdicts]
+                )
+    return shown(title, ("link", "media", "direction", "seeds", *(name for _, name, _, _ in _COMPARED)), lines)
 
 
 def by_seed(group: Table, name: str) -> list[float]:

@@ -16,9 +16,7 @@ from typing import Annotated, Final
 import numpy as np
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 from rich.text import Text
 
 from common.emulation.clauses import LinkModel
@@ -38,6 +36,7 @@ from feelahead.lab.link.samples import (
     play,
     read_link_sample,
 )
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 
@@ -47,6 +46,7 @@ _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")
 _TURNS: Final = 7
 _PAIRS: Final = 10
 """Pairs of the model's own runs, for each seed."""
+_ESTIMATED: Final = ("offset_error_ms", "one_way_error_ms", "bound_ms")
 _RESULT: Final = tuple(field.name for field in dataclasses.fields(SeedResult))
 
 
@@ -179,12 +179,9 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
     """Say what was asked and achieved; show the figures."""
     if settings.estimates:
         for (link, skew), rows in table.groups("link", "skew_ppm"):
-            found = []
-            for name in ("offset_error_ms", "one_way_error_ms", "bound_ms"):
-                sizes = np.abs(rows.values(name) or [np.nan])
-                figures = float(np.sqrt(np.mean(sizes**2))), float(np.quantile(sizes, 0.99)), float(sizes.max())
-                found.append(dict(zip(("estimate", "rms", "p99", "max"), (name, *figures), strict=True)))
-            yield _shown(f"{link}, {skew:g} ppm: errors in ms at the end", Table(found))
+            sizes = {name: np.abs(rows.values(name) or [np.nan]) for name in _ESTIMATED}
+            lines = ((name, np.sqrt(np.mean(of**2)), np.quantile(of, 0.99), of.max()) for name, of in sizes.items())
+            yield shown(f"{link}, {skew:g} ppm: errors in ms at the end", ("estimate", "rms", "p99", "max"), lines)
     elif settings.virtual:
         yield from map(Text, report_lines({"in virtual time": table.rows[0]["line"]}))
         us = float(np.median(table.values("us_a_message")))
@@ -192,26 +189,14 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
         yield Text(f"processor time of the line alone: {us:.1f} us a message, {share:.2f} % of a core both ways")
         if settings.against is not None:
             columns = (*_RESULT, "stalls")
-            yield _shown(
-                "The model beside the recording", Table({name: row[name] for name in columns} for row in table)
-            )
+            yield shown("the model beside the recording", columns, table.lines(*columns))
     else:
         names = ("robot", "operator", "sent_per_s")
-        medians = [
-            {"ends": kind} | {name: float(np.median(rows.values(name))) for name in names}
-            for (kind,), rows in table.groups("kind")
-        ]
-        yield _shown("Shares of a core without spinning and without a link, in turns (medians)", Table(medians))
-
-
-def _shown(title: str, rows: Table) -> Shown:
-    shown = Shown(title=Text(title), box=MARKDOWN)
-    for name in rows.rows[0]:
-        shown.add_column(name.replace("_", " "), justify="right")
-    for row in rows:
-        values = row.values()
-        shown.add_row(*(f"{one:.3f}" if isinstance(one, float) else "-" if one is None else str(one) for one in values))
-    return shown
+        groups = ((kind, rows) for (kind,), rows in table.groups("kind"))
+        shares = ((kind, *(float(np.median(rows.values(name))) for name in names)) for kind, rows in groups)
+        yield shown(
+            "shares of a core without spinning and without a link, in turns (medians)", ("ends", *names), shares
+        )
 
 
 def ratio(turns: Table) -> float:
@@ -224,7 +209,7 @@ def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
     """Hold the figures against their limits."""
     if settings.estimates:
         first = table.where(link=next(iter(SCENARIOS)))
-        for name in ("offset_error_ms", "one_way_error_ms"):
+        for name in _ESTIMATED[:2]:
             found = first.values(name)
             # A missing figure must not pass for a good one.
             worst = max(map(abs, found)) if len(found) == len(first) else None

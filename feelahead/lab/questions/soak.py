@@ -20,12 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-import numpy as np
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 from rich.text import Text
 
 from common.clock import MonotonicClock, clock_domain
@@ -37,6 +34,7 @@ from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.real_time import LINK_S, START_S
 from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from operator_side.core import OperatorSide
@@ -54,8 +52,6 @@ _ROBOT: Final = "robot side"
 _OWNER: Final = "operator side"
 _PERIOD_S: Final = 0.02
 """The robot side tells observers as often what they may feel."""
-_ALONE_S: Final = 30.0
-"""Ticks are looked at for at most this time before the observers come, and at most for a tenth of the run."""
 _GAP: Final = "no command for"
 
 
@@ -129,8 +125,6 @@ def _real(cell: Soak, seed: int) -> Iterator[Row]:
         while owner.wait_for("status", START_S).get("link") != LINK_UP:
             robot.check()
         sides = _Running(robot, owner)
-        sides.wait(min(_ALONE_S, _SETTLED * 60.0 * cell.minutes))
-        yield sides.ticks("alone")
         sides.bring(
             [
                 (
@@ -148,12 +142,12 @@ def _real(cell: Soak, seed: int) -> Iterator[Row]:
             yield _sample(_OWNER, owner.process_id, minutes)
             if cell.observers:
                 yield _sample(_LIGHT, "self", minutes)
-        yield sides.ticks(f"with {sides.watching} observers")
         # The robot side last: the owner is not to take its end for a fault of the link.
         for side in (owner, robot):
             side.stop()
             side.check()
-        yield _end(merge_summaries(*(read_summary(path) for path in summaries), []))
+        robot_said, owner_said = (read_summary(path) for path in summaries)
+        yield _end(merge_summaries(robot_said, owner_said, []))
 
 
 def _sample(process: str, number: int | str, minutes: float) -> Row:
@@ -176,7 +170,6 @@ class _Running:
         self._robot, self._owner = robot, owner
         self._clock, self._pause = MonotonicClock(), threading.Event()
         self._observers: Sequence[tuple[OperatorSockets, OperatorSide]] = ()
-        self._ticks_us: list[tuple[float, float]] = []
 
     def bring(self, observers: Sequence[tuple[OperatorSockets, OperatorSide]]) -> None:
         """Wait until the robot side has taken all of them in; SideFailedError when it does not."""
@@ -186,7 +179,6 @@ class _Running:
             if self._clock.now() > end_s:
                 raise SideFailedError(f"the robot side knows of {self.watching} observers after {LINK_S:g} s")
             self.wait(_PERIOD_S)
-        self._ticks_us.clear()
 
     def wait(self, seconds: float) -> None:
         """Let time pass while all take their turns; SideFailedError when a side fails."""
@@ -205,14 +197,7 @@ class _Running:
             for event in self._robot.events():
                 if event["event"] == "status":
                     self.watching = event["observers"]
-                    self._ticks_us.append((event["tick_us"], event["tick_p99_us"]))
             self._pause.wait(min(end_s - now_s, _PERIOD_S))
-
-    def ticks(self, when: str) -> Row:
-        """Give the medians of the ticks' medians and p99 since this was last asked for; nobody judges them."""
-        median_us, p99_us = np.median(self._ticks_us, axis=0) if self._ticks_us else (None, None)
-        self._ticks_us.clear()
-        return {"when": when, "tick_us": median_us, "tick_p99_us": p99_us}
 
 
 def flat(samples: Sequence[Row], sides: int = 1) -> bool:
@@ -226,18 +211,12 @@ def flat(samples: Sequence[Row], sides: int = 1) -> bool:
 
 def show(_settings: SoakSweep, table: Table) -> Iterator[RenderableType]:
     """Show start, settled, middle and end of each process, then the rest in words."""
-    shown = Shown(title="soak", box=MARKDOWN)
-    for heading in ("process", "at, min", "resident, MB", "descriptors"):
-        shown.add_column(heading, justify="left" if heading == "process" else "right")
-    for (_, name), rows in Table(row for row in table if "process" in row).groups("seed", "process"):
-        for index in (0, int(_SETTLED * len(rows)), len(rows) // 2, len(rows) - 1):
-            one = rows.rows[index]
-            shown.add_row(name, f"{one['at_min']:.1f}", f"{one['mb']:.1f}", str(one["descriptors"]))
-    yield shown
+    lines: list[list[Any]] = []
+    for _, rows in Table(row for row in table if "process" in row).groups("seed", "process"):
+        all_of = list(rows.lines("process", "at_min", "mb", "descriptors"))
+        lines += [all_of[index] for index in (0, int(_SETTLED * len(rows)), len(rows) // 2, len(rows) - 1)]
+    yield shown("soak", ("process", "at, min", "resident, MB", "descriptors"), lines)
     for row in table:
-        if row.get("tick_us") is not None:
-            ticks = f"median {row['tick_us']:.0f} us, p99 {row['tick_p99_us']:.0f} us"
-            yield Text(f"tick of the robot side {row['when']}: {ticks}")
         if "messages" in row:
             stops = ", ".join(f"{count} x {reason}" for reason, count in row["why"].items()) or "none"
             yield Text(f"messages {row['messages']}")

@@ -12,9 +12,7 @@ from typing import Annotated, Final
 
 import numpy as np
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
@@ -22,6 +20,7 @@ from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.real_time import START_S, run_for
 from feelahead.both_sides.summary import read_summary
 from feelahead.lab.goals import Goal
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.tick.timed_robot import AWAY, COLUMNS, PROGRAM, STAGES
@@ -107,14 +106,8 @@ def rows(ticks: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]
     thread_s, now_s = ticks[:, COLUMNS.index("thread_s")], ticks[:, 0]
     share = float((thread_s[-1] - thread_s[0]) / (now_s[-1] - now_s[0]))
     for name, values in found.items():
-        p10, p50, p99 = (float(value) for value in np.quantile(values, (0.1, 0.5, 0.99)))
-        row: Row = {
-            "part": name,
-            "p10_us": p10,
-            "p50_us": p50,
-            "p99_us": p99,
-            "mean_us": float(values.mean()),
-        }
+        p10, p50, p99 = np.quantile(values, (0.1, 0.5, 0.99))
+        row: Row = {"part": name, "p10_us": p10, "p50_us": p50, "p99_us": p99, "mean_us": values.mean()}
         yield row | ({"ticks": len(ticks), "share": share, "overruns": overruns} if name == "tick" else {})
 
 
@@ -122,20 +115,11 @@ def show(_: TickSweep, table: Table) -> Iterator[RenderableType]:
     """Show the demo's stages, and each case's sums."""
     machine = f"us of processor time; {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
     stages = table.where(case="demo, each stage timed")
-    yield _shown(f"the demo's tick at 1 kHz, {machine}", ("part", "p10_us", "p50_us", "p99_us", "mean_us"), stages)
-    sums = [row for row in table if row["part"] in ("look to message", "tick without physics", "tick")]
+    columns: tuple[str, ...] = ("part", "p10_us", "p50_us", "p99_us", "mean_us")
+    yield shown(f"the demo's tick at 1 kHz, {machine}", columns, stages.lines(*columns))
+    sums = Table(row for row in table if row["part"] in ("look to message", "tick without physics", "tick"))
     columns = ("case", "part", "p50_us", "p99_us", "share", "overruns")
-    yield _shown(f"by objects perceived, {machine}", columns, Table(sums))
-
-
-def _shown(title: str, columns: tuple[str, ...], found: Table) -> Shown:
-    shown = Shown(title=title, box=MARKDOWN)
-    for name in columns:
-        shown.add_column(name.replace("_", " "), justify="left" if name in ("case", "part") else "right")
-    for row in found:
-        values = (row.get(name) for name in columns)
-        shown.add_row(*("" if one is None else f"{one:.4g}" if isinstance(one, float) else str(one) for one in values))
-    return shown
+    yield shown(f"by objects perceived, {machine}", columns, sums.lines(*columns))
 
 
 def goals(_: TickSweep, table: Table) -> Iterator[Goal]:
