@@ -13,7 +13,6 @@ from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, cru
 T_S = QUICK.safety.gap_s
 _AGE_LIMIT_S = QUICK.safety.age_s + QUICK.safety.jitter_s
 _RESTING_RAD_S = 0.005
-_STEADY_DELAY_S = 0.5
 
 
 @fault("stream stops", "decelerate from the measured state, hold; explicit re-arm", "deceleration from T to T + 5 ms")
@@ -153,7 +152,7 @@ def replay() -> Outcome:
 @fault("steady 500 ms each way", "the arm moves normally", "speed within 2 %")
 def steady_delay() -> Outcome:
     """500 ms each way; not a fault at all."""
-    speeds = [_mean_speed(delay_s) for delay_s in (0.0, _STEADY_DELAY_S)]
+    speeds = [_mean_speed(delay_s) for delay_s in (0.0, 0.5)]
     ratio = speeds[1] / speeds[0]
     return Outcome(0.98 < ratio < 1.02, f"speed {100.0 * ratio:.1f} % of that without delay, no stop")
 

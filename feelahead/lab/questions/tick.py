@@ -52,7 +52,6 @@ class Case:
     seconds: float
     stages: bool = False
     objects: int = 0
-    moving: int = 0
     only: bool = False
 
 
@@ -65,14 +64,11 @@ def cells(settings: TickSweep) -> Iterator[Case]:
     counts = [count for count in settings.objects if not (settings.quick and count > 1_000)]
     for count in counts:
         yield Case(f"{count} objects", seconds, objects=count)
-    for count in counts:
-        if count >= 1_000:
-            yield Case(f"{count} objects, 100 move", seconds, objects=count, moving=100)
 
 
 def run(cell: Case, seed: int) -> Iterator[Row]:
     """Run one case; a row for each stage, and for the sums."""
-    names = ("stages", "objects", "moving", "only")
+    names = ("stages", "objects", "only")
     with tempfile.TemporaryDirectory() as folder:
         log, summary = Path(folder) / "ticks.npy", Path(folder) / "robot.json"
         ours = [f"--log={log}", f"--summary={summary}", *(f"--{name}={getattr(cell, name)}" for name in names)]
