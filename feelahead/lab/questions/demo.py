@@ -4,7 +4,7 @@ feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Annotated, Final
 
 import tyro
@@ -69,7 +69,7 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
     """Run the person's whole task once."""
-    yield asdict(run_trial(cell, seed))
+    yield run_trial(cell, seed)
 
 
 def show(_: DemoSettings, table: Table) -> Iterator[Shown]:

@@ -5,7 +5,6 @@ feelahead bench link --virtual --against tests/data/netem/normal.csv.gz --seeds 
 feelahead bench link --estimates --seeds 100
 """
 
-import dataclasses
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -27,7 +26,6 @@ from feelahead.lab.goals import Goal
 from feelahead.lab.link.clocks import SCENARIOS, errors
 from feelahead.lab.link.pair import Kind, pair
 from feelahead.lab.link.samples import (
-    SeedResult,
     band_of,
     compare_one,
     judge,
@@ -47,7 +45,16 @@ _TURNS: Final = 7
 _PAIRS: Final = 10
 """Pairs of the model's own runs, for each seed."""
 _ESTIMATED: Final = ("offset_error_ms", "one_way_error_ms", "bound_ms")
-_RESULT: Final = tuple(field.name for field in dataclasses.fields(SeedResult))
+_COMPARED: Final = (
+    "seed",
+    "distance",
+    "mean_error_ms",
+    "sd_error_ms",
+    "late_share",
+    "loss_share",
+    "mean_burst",
+    "stalls",
+)
 
 
 @dataclass(frozen=True)
@@ -168,7 +175,7 @@ def _play(cell: Played, seed: int) -> Row:
         row |= {"p1_ms": p1, "p50_ms": p50, "p95_ms": p95, "p99_ms": p99}
     if recorded is not None:
         reference, stalls = recorded.without_stalls(profile)
-        row |= {"stalls": stalls} | dataclasses.asdict(compare_one(profile, reference, seed, cell.bytes))
+        row |= {"stalls": stalls} | compare_one(profile, reference, seed, cell.bytes)
         if needs_band(profile):
             pairs = range(_PAIRS * seed, _PAIRS * (seed + 1))
             row["band"] = [pair_of_runs(profile, reference, one, cell.bytes) for one in pairs]
@@ -188,8 +195,7 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
         share = 2e-4 * settings.rate * us
         yield Text(f"processor time of the line alone: {us:.1f} us a message, {share:.2f} % of a core both ways")
         if settings.against is not None:
-            columns = (*_RESULT, "stalls")
-            yield shown("the model beside the recording", columns, table.lines(*columns))
+            yield shown("the model beside the recording", _COMPARED, table.lines(*_COMPARED))
     else:
         names = ("robot", "operator", "sent_per_s")
         groups = ((kind, rows) for (kind,), rows in table.groups("kind"))
@@ -219,9 +225,8 @@ def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
     elif settings.against is not None:
         profile = _played(settings).profile(0)
         reference, _ = read_link_sample(settings.against, "--against").without_stalls(profile)
-        results = [SeedResult(**{name: row[name] for name in _RESULT}) for row in table]
         pairs = [one for row in table for one in row.get("band", ())]
-        yield from judge(profile, reference, results, band_of(pairs) if pairs else None)
+        yield from judge(profile, reference, table.rows, band_of(pairs) if pairs else None)
     elif not settings.virtual:
         yield Goal("whole ends by bare ZeroMQ, share of a core", ratio(table), _BARE_LIMIT)
 
