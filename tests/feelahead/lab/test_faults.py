@@ -1,6 +1,5 @@
 """Every row of `try faults`, and with the guard that it is about disabled, it no longer holds."""
 
-import ast
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +18,6 @@ from robot_side.operators.lease import Lease
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission, Safety
 from robot_side.simulation.joint_reference import JointReference
-from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.long
 
@@ -126,21 +124,3 @@ def test_an_unsafe_row_is_the_answer_and_the_exit_code(
         monkeypatch.delitem(FAULTS, name)
     assert ask(QUESTION, []) == 1
     assert "UNSAFE" in capsys.readouterr().out
-
-
-def test_nobody_reads_the_wall_clock() -> None:
-    # Not by any name: a clock that jumps by an hour must not be there to trip over.
-    wall_clocks = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.strftime", "time.ctime"}
-    for package in ("common", "robot_side", "operator_side"):
-        for path in (ROOT / package).rglob("*.py"):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-            imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-            assert not imported & {"datetime", "calendar"}, path
-            read = {ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-            # A recording's stamps are the wall clock's: it is read once, and for these alone.
-            if path == ROOT / "common" / "clock.py":
-                read.discard("time.time")
-            elif path.parent != ROOT / "common" / "recording":
-                assert "wall_clock_offset_s" not in path.read_text(encoding="utf-8"), path
-            assert not read & wall_clocks, path
