@@ -8,11 +8,9 @@ hostile ones 20 viewers watch and never read, too.
 """
 
 import itertools
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
@@ -22,8 +20,7 @@ from rich.console import RenderableType
 
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideProcess
-from feelahead.both_sides.real_time import START_S
-from feelahead.both_sides.summary import read_summary
+from feelahead.both_sides.real_time import START_S, started
 from feelahead.lab.goals import Goal
 from feelahead.lab.hostile.inputs import Attacker
 from feelahead.lab.hostile.raw_zmtp import port_of
@@ -73,18 +70,13 @@ def cells(settings: HostileSweep) -> Iterator[Attack]:
 def run(cell: Attack, seed: int) -> Iterator[Row]:
     """Run both sides and the strangers; a row for each stretch, and one for the end."""
     realtime = ["--realtime"] if cell.realtime else []
-    with tempfile.TemporaryDirectory(prefix="feelahead-") as folder:
-        ours, theirs = (Path(folder) / f"{side}.json" for side in ("robot", "operator"))
-        with SideProcess("robot_side", "robot", ["--bind=tcp://127.0.0.1:0", f"--summary={ours}", *realtime]) as robot:
-            heard = robot.wait_for("listening", START_S)
-            ends = [f"--connect={heard['control']}", f"--view-connect={heard['view']}", "--device=simulated"]
-            with SideProcess("operator_side", "operator", [*ends, f"--summary={theirs}", *realtime]) as operator:
-                while operator.wait_for("status", START_S).get("state") != "armed":
-                    pass
-                attacker = Attacker(port_of(heard["control"]), port_of(heard["view"]), seed)
-                yield from _alternate(cell, robot, attacker)
-                codes = [operator.stop(), robot.stop()]
-        summary, driven = read_summary(ours), read_summary(theirs)
+    with started(realtime, realtime) as both:
+        while both.operator.wait_for("status", START_S).get("state") != "armed":
+            pass
+        attacker = Attacker(port_of(both.control), port_of(both.view), seed)
+        yield from _alternate(cell, both.robot, attacker)
+        codes = [both.operator.stop(), both.robot.stop()]
+        summary, driven = both.summaries()
     yield {
         "phase": "end",
         "sent": attacker.sent.total(),

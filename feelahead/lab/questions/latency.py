@@ -6,7 +6,6 @@ feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture
 import atexit
 import functools
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -25,9 +24,8 @@ from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
 from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from feelahead.both_sides.processes import SideProcess
-from feelahead.both_sides.real_time import LINK_S, START_S, run_for
-from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.both_sides.real_time import LINK_S, run_for, started
+from feelahead.both_sides.summary import merge_summaries
 from feelahead.both_sides.trial import Trial, figures_of
 from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
@@ -125,18 +123,10 @@ def in_virtual_time(trial: Trial) -> Row:
 
 def on_loopback(trial: Trial) -> Row:
     """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for what it sends."""
-    with tempfile.TemporaryDirectory(prefix="feelahead-latency-") as folder:
-        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
-        link = trial.link_arguments()
-        ours = ["--bind=tcp://127.0.0.1:0", *trial.robot_arguments(), *link, f"--summary={summaries['robot']}"]
-        with SideProcess("robot_side", "robot", ours) as robot:
-            heard = robot.wait_for("listening", START_S)
-            theirs = [f"--connect={heard['control']}", f"--view-connect={heard['view']}", *trial.operator_arguments()]
-            theirs += [*link, f"--summary={summaries['operator']}"]
-            with SideProcess("operator_side", "operator", theirs) as operator:
-                run_for(robot, operator, trial.duration_s)
-        robot_said, operator_said = (read_summary(path) for path in summaries.values())
-        return figures_of(merge_summaries(robot_said, operator_said, []))
+    link = trial.link_arguments()
+    with started([*trial.robot_arguments(), *link], [*trial.operator_arguments(), *link]) as both:
+        run_for(both.robot, both.operator, trial.duration_s)
+        return figures_of(merge_summaries(*both.summaries(), []))
 
 
 @functools.cache

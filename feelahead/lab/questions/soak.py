@@ -11,13 +11,11 @@ The summaries' statistics keep up to 100 000 samples each: 0.8 MB for each over 
 """
 
 import secrets
-import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Final
 
 import tyro
@@ -32,8 +30,8 @@ from common.sockets.operator import OperatorSockets
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.real_time import LINK_S, START_S
-from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.both_sides.real_time import LINK_S, START_S, started
+from feelahead.both_sides.summary import merge_summaries
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
@@ -113,22 +111,15 @@ def _virtual(cell: Soak, seed: int) -> Iterator[Row]:
 
 
 def _real(cell: Soak, seed: int) -> Iterator[Row]:
-    own = ["--device=simulated", f"--seed={seed}", f"--link={cell.link}"]
-    with tempfile.TemporaryDirectory(prefix="feelahead-soak-") as folder, ExitStack() as stack:
-        summaries = [Path(folder) / f"{name}.json" for name in (_ROBOT, _OWNER)]
-        arguments = ["--bind=tcp://127.0.0.1:0", *own[1:], f"--summary={summaries[0]}"]
-        robot = stack.enter_context(SideProcess("robot_side", _ROBOT, arguments))
-        heard = robot.wait_for("listening", START_S)
-        ends = [f"--connect={heard['control']}", f"--view-connect={heard['view']}"]
-        arguments = [*ends, *own, f"--summary={summaries[1]}"]
-        owner = stack.enter_context(SideProcess("operator_side", _OWNER, arguments))
-        while owner.wait_for("status", START_S).get("link") != LINK_UP:
-            robot.check()
-        sides = _Running(robot, owner)
+    own = [f"--seed={seed}", f"--link={cell.link}"]
+    with started(own, own) as both, ExitStack() as stack:
+        while both.operator.wait_for("status", START_S).get("link") != LINK_UP:
+            both.robot.check()
+        sides = _Running(both.robot, both.operator)
         sides.bring(
             [
                 (
-                    stack.enter_context(OperatorSockets(heard["control"], heard["view"])),
+                    stack.enter_context(OperatorSockets(both.control, both.view)),
                     OperatorSide(secrets.randbits(53), clock_domain(), haptics=False),
                 )
                 for _ in range(cell.observers)
@@ -138,16 +129,15 @@ def _real(cell: Soak, seed: int) -> Iterator[Row]:
             minutes = cell.minutes * step / SAMPLES
             if step:
                 sides.wait(60.0 * cell.minutes / SAMPLES)
-            yield _sample(_ROBOT, robot.process_id, minutes)
-            yield _sample(_OWNER, owner.process_id, minutes)
+            yield _sample(_ROBOT, both.robot.process_id, minutes)
+            yield _sample(_OWNER, both.operator.process_id, minutes)
             if cell.observers:
                 yield _sample(_LIGHT, "self", minutes)
         # The robot side last: the owner is not to take its end for a fault of the link.
-        for side in (owner, robot):
+        for side in (both.operator, both.robot):
             side.stop()
             side.check()
-        robot_said, owner_said = (read_summary(path) for path in summaries)
-        yield _end(merge_summaries(robot_said, owner_said, []))
+        yield _end(merge_summaries(*both.summaries(), []))
 
 
 def _sample(process: str, number: int | str, minutes: float) -> Row:

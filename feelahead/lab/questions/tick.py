@@ -16,9 +16,7 @@ from rich.console import RenderableType
 
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
-from feelahead.both_sides.processes import SideProcess
-from feelahead.both_sides.real_time import START_S, run_for
-from feelahead.both_sides.summary import read_summary
+from feelahead.both_sides.real_time import run_for, started
 from feelahead.lab.goals import Goal
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -70,17 +68,12 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
     """Run one case; a row for each stage, and for the sums."""
     names = ("stages", "objects", "only")
     with tempfile.TemporaryDirectory() as folder:
-        log, summary = Path(folder) / "ticks.npy", Path(folder) / "robot.json"
-        ours = [f"--log={log}", f"--summary={summary}", *(f"--{name}={getattr(cell, name)}" for name in names)]
-        with SideProcess(
-            PROGRAM, "robot", [*ours, f"--seed={seed}", "--bind=tcp://127.0.0.1:0", "--no-cameras"]
-        ) as robot:
-            heard = robot.wait_for("listening", START_S)
-            theirs = ["--device=simulated", f"--connect={heard['control']}", f"--view-connect={heard['view']}"]
-            with SideProcess("operator_side", "operator", [*theirs, f"--seed={seed}"]) as operator:
-                run_for(robot, operator, cell.seconds + _SETTLING_S)
+        log, flags = Path(folder) / "ticks.npy", [f"--{name}={getattr(cell, name)}" for name in names]
+        ours = [f"--log={log}", *flags, f"--seed={seed}", "--no-cameras"]
+        with started(ours, [f"--seed={seed}"], PROGRAM) as both:
+            run_for(both.robot, both.operator, cell.seconds + _SETTLING_S)
+            overruns = both.summaries()[0].get("overruns")
         ticks = np.load(log)
-        overruns = read_summary(summary).get("overruns")
     kept = ticks[ticks[:, 0] >= ticks[0, 0] + _SETTLING_S] if len(ticks) else ticks
     if len(kept) < _LEAST_TICKS:
         raise FeelaheadError(f"{len(kept)} ticks in {cell.seconds:g} s: this machine is too busy to measure")

@@ -3,34 +3,17 @@
 import numpy as np
 import pytest
 
-from common.errors import ConfigurationError
-from feelahead.lab.questions.tick import QUESTION, Case, rows, run
-from feelahead.lab.sweep import ask
-from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera
+from feelahead.lab.questions.tick import Case, rows, run
+from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera, crowd
 from feelahead.lab.tick.timed_robot import COLUMNS
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.perceived import Role
 from robot_side.objects.validity import require_valid
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import load_scene
-from tests.helpers.perceived_scenes import Scene
-
-
-class Seen:
-    """A camera whose frame is the same until it is given another one."""
-
-    def __init__(self, frame: PerceivedObjects) -> None:
-        self.frame = frame
-
-    def perceive(self, now_s: float) -> PerceivedObjects:
-        del now_s
-        return self.frame
-
-    def set_role(self, name: str, role: Role) -> None:
-        del name, role
 
 
 def test_a_crowd_is_valid_and_out_of_the_way() -> None:
-    frame = CrowdedCamera(Seen(Scene().objects()), 100).perceive(0.0)
+    frame = crowd(100, 0.0)
     require_valid(frame)
     assert len(frame.names) == len(set(frame.names)) == 100
     owners = np.concatenate([frame.sphere_object, frame.box_object, frame.tetrahedron_object])
@@ -82,9 +65,3 @@ def test_a_real_robot_side_is_timed() -> None:
     found = {row["part"]: row for row in run(Case("10 objects", 1.5, stages=True, objects=10), 0)}
     assert found["tick"]["p50_us"] > found["look to message"]["p50_us"] > 0.0
     assert found["law"]["p50_us"] > 0.0
-
-
-@pytest.mark.parametrize("arguments", [["--seconds", "1"], ["--objects", "0"]])
-def test_values_out_of_range_are_refused(arguments: list[str]) -> None:
-    with pytest.raises(ConfigurationError, match="valid"):
-        ask(QUESTION, arguments)
