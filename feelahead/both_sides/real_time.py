@@ -65,9 +65,13 @@ def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> Non
             side.check()
             if not side.running:
                 raise FeelaheadError(f"the {side.name} side ended early")
-    # Both at once: neither is to take the other's end for a fault of the link.
-    operator.interrupt()
-    robot.interrupt()
+    end(robot, operator)
+
+
+def end(robot: StartedSide, operator: StartedSide) -> None:
+    """End both at once, lest one takes the other's end for a fault of the link; SideFailedError where one fails."""
+    for side in (operator, robot):
+        side.interrupt()
     for side in (operator, robot):
         side.stop()
         side.check()

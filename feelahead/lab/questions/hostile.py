@@ -75,6 +75,8 @@ def run(cell: Attack, seed: int) -> Iterator[Row]:
             pass
         attacker = Attacker(port_of(both.control), port_of(both.view), seed)
         yield from _alternate(cell, both.robot, attacker)
+        for side in (both.operator, both.robot):  # at once, lest one takes the other's end for a fault
+            side.interrupt()
         codes = [both.operator.stop(), both.robot.stop()]
         summary, driven = both.summaries()
     yield {

@@ -30,7 +30,7 @@ from common.sockets.operator import OperatorSockets
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.real_time import LINK_S, START_S, started
+from feelahead.both_sides.real_time import LINK_S, START_S, end, started
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -133,10 +133,7 @@ def _real(cell: Soak, seed: int) -> Iterator[Row]:
             yield _sample(_OWNER, both.operator.process_id, minutes)
             if cell.observers:
                 yield _sample(_LIGHT, "self", minutes)
-        # The robot side last: the owner is not to take its end for a fault of the link.
-        for side in (both.operator, both.robot):
-            side.stop()
-            side.check()
+        end(both.robot, both.operator)
         yield _end(merge_summaries(*both.summaries(), []))
 
 
