@@ -1,4 +1,4 @@
-"""Both sides as they run in real time, wherever their processes are: from the link's coming up to their end."""
+"""Both sides in real time, in processes anywhere: from the link's coming up to their end."""
 
 import tempfile
 import threading
@@ -50,7 +50,7 @@ def started(robot: Sequence[str], operator: Sequence[str], program: str = "robot
 
 
 def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> None:
-    """Let them run for so long once their link is up, and end both; SideFailedError where one fails."""
+    """Let them run for `duration_s` once their link is up, and end both; SideFailedError where one fails."""
     clock, pause = MonotonicClock(), threading.Event()
     limit_s = clock.now() + LINK_S
     while operator.wait_for("status", LINK_S).get("link") != LINK_UP:

@@ -1,4 +1,4 @@
-"""A trial of a constant finger over a link: the same in virtual time, in two processes, and wherever else they run."""
+"""A trial of a constant finger over a link: the same in virtual time, in two processes, and in containers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from common.emulation.spec import Direction
 
 @dataclass(frozen=True)
 class Trial:
-    """What is done at the wall: rest, arm, and pull R2 with a constant force until the time is over."""
+    """At the wall: rest, arm, and pull R2 with a constant force until the time is over."""
 
     link: str
-    """As `--link` takes it: a name, or netem's words"""
+    """A name or netem's words, like `--link`"""
     haptics: bool
     seed: int
-    """Of the scene, the errors of camera and encoders, and the emulated link"""
+    """For the scene, the errors of camera and encoders, and the emulated link"""
     force_n: float = 3.0
     duration_s: float = 8.0
-    """From the moment at which the link is up; rest and arming take 1.3 s and a round trip or two of it"""
+    """Counted from when the link is up; rest and arming take 1.3 s and a round trip or two of it"""
     link_model: LinkModel = "stream"
-    """Where the link is emulated in the process"""
+    """For a link that the process emulates"""
 
     def robot_arguments(self) -> list[str]:
         """The robot side's flags, without link and address."""

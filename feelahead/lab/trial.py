@@ -23,7 +23,7 @@ from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import TrueContact
 
 Arm = Literal["off", "mechanical", "reacting"]
-"""off: nothing is felt. mechanical: triggers stiffen, and whoever pulls them takes no notice. reacting: they do."""
+"""off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""
 _SAME_CONTACT_S: Final = 0.1
 """A contact with a thing that comes back within this time is the same one."""
 _LOOK_S: Final = 0.05
@@ -33,7 +33,7 @@ _SETTLES_S: Final = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """What is done; with the same seed, two that differ in `arm` alone are a pair."""
+    """The task; with the same seed, two that differ in `arm` alone are a pair."""
 
     scene: SceneName
     link: str
@@ -42,9 +42,9 @@ class Trial:
     duration_s: float
     link_model: LinkModel = "datagram"
     tick_period_s: float = TICK_PERIOD_S
-    """Of the robot side"""
+    """The robot side's"""
     camera_sd_m: float = CameraSettings().sd_m
-    """Of the camera's error along each axis, which the law knows"""
+    """Standard deviation of the camera's error along each axis, which the law knows"""
 
 
 class _Silent:
@@ -65,7 +65,7 @@ class _Silent:
 
 
 class _Watch:
-    """What truly happens, tick by tick."""
+    """Truth, tick by tick."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
         self.hits = 0
@@ -134,10 +134,10 @@ class _Watch:
 def run_trial(trial: Trial, seed: int) -> Row:
     """Run it until the person is done, or for its duration from the start; the same trial gives the same row.
 
-    The seed draws the scene, the errors of camera and encoders, the link and the person. hits: contacts of the gripper
-    with anything but the target, and of what it holds with obstacles. finished_s: from arming until it is placed and
-    the hand has drawn back; None where that did not happen in time. felt_before_s: how long before it touched what it
-    stands on, rumble or a stiff trigger was in the hand without a break.
+    The seed draws the scene, the errors of camera and encoders, the link and the person.
+    hits: contacts of the gripper with anything but the target, and of the held thing with obstacles.
+    finished_s: from arming until the thing is placed and the hand has drawn back; None where time ran out.
+    felt_before_s: for how long rumble or a stiff trigger was felt without a break before the thing touched its place.
     """
     watch = _Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person

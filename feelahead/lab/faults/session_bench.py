@@ -30,7 +30,7 @@ _DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
 
 
 class WatchedArm:
-    """An arm that remembers what it was told, and how fast it measured itself to move."""
+    """An arm that remembers commands and its own measured speed."""
 
     def __init__(self, arm: Arm) -> None:
         self.speeds_rad_s: list[tuple[float, float]] = []
@@ -95,7 +95,7 @@ class Operator:
 
     @property
     def state(self) -> SessionState:
-        """The state of its session as last heard."""
+        """The session's state as last heard."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
@@ -117,7 +117,7 @@ class Operator:
 
 
 class Bench:
-    """The robot side, its messages to each operator, and the motion of its arm."""
+    """The robot side, messages to each operator, and the arm's motion."""
 
     def __init__(self, settings: RobotSettings = QUICK) -> None:
         self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)

@@ -166,7 +166,7 @@ SCENARIOS = {
     "50 + exp(10) / 30 + exp(10)": (_QUEUES, _NEARER, 0.0),
     "likewise, asymmetry told": (_QUEUES, _NEARER, 0.020),
 }
-"""Links in milliseconds, to the robot and to the operator, and the asymmetry in seconds that both ends know.
+"""Links in milliseconds: to the robot, to the operator, and the asymmetry in seconds that both ends know.
 
 50 + exp(10) is a floor of 50 with exponential delays of mean 10 above it. The goals are about the first one.
 """

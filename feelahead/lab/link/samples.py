@@ -142,7 +142,7 @@ FIGURES: dict[str, Callable[[LinkSample], float]] = {
 
 
 def independent_delays(profile: LinkProfile) -> bool:
-    """Say whether each delay is drawn by itself: a run then has the model's distribution up to sampling error.
+    """Say whether each delay is drawn by itself, so that a run has the model's distribution.
 
     netem's correlation of delays does not count: it leaves them independent.
     """

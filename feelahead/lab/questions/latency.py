@@ -44,7 +44,7 @@ _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), 
 """Figures on which the media should agree, each with its name, unit and margin."""
 _COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
 _WIDE: Final = 0.7
-"""Of the room that a link has in the figure, for its media."""
+"""The share of a link's room in the figure that its media take."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class LatencySettings(Sweep):
     media: tuple[Literal["virtual", "loopback"], ...] = ("virtual", "loopback")
     """virtual: in this process, as fast as it goes. loopback: two processes on 127.0.0.1, in real time."""
     compose: bool = False
-    """And in containers, with the kernel's netem between them."""
+    """Run it in containers, too, with the kernel's netem between them."""
     model: LinkModel = "stream"
-    """How a link is emulated: in order and losing nothing, as TCP does, or as datagrams."""
+    """stream keeps the order and loses nothing, as TCP does; datagram loses and reorders."""
     force: Annotated[float, Meta(ge=0.0, le=20.0), tyro.conf.arg(metavar="N")] = 3.0
     """Newtons on R2: 2 is a light pull, 3.7 a normal one."""
     duration: Annotated[float, Meta(ge=2.0, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
-    """Of each trial, from the moment that the link is up; the pull begins after 1.3 s and a round trip or two."""
+    """Length of each trial from when the link is up; the pull begins after 1.3 s and a round trip or two."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -122,7 +122,7 @@ def in_virtual_time(trial: Trial) -> Row:
 
 
 def on_loopback(trial: Trial) -> Row:
-    """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for what it sends."""
+    """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for its own messages."""
     link = trial.link_arguments()
     with started([*trial.robot_arguments(), *link], [*trial.operator_arguments(), *link]) as both:
         run_for(both.robot, both.operator, trial.duration_s)

@@ -46,7 +46,7 @@ class TimedSettings:
     stages: tyro.conf.FlagConversionOff[bool] = True
     """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
-    """Without the scene's own."""
+    """Leave out the scene's own."""
 
 
 def command(arguments: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""`try hostile`: a small run, and the meaning of its figures."""
+"""`try hostile`: a small run, and what memory's growth means."""
 
 import csv
 from pathlib import Path
