@@ -1,51 +1,31 @@
-"""A trial of a constant finger over a link: the same in virtual time, in two processes, and wherever else they run."""
+"""A trial of a constant finger over a link: the same in virtual time, in two processes, and in containers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, get_args
 
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import Direction
-from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.settings import PersonSettings
-from robot_side.settings import RobotSettings
-from robot_side.simulation.built_in_scenes import SceneName
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What is done: rest, arm, and pull R2 with a constant force until the time is over."""
+    """At the wall: rest, arm, and pull R2 with a constant force until the time is over."""
 
     link: str
-    """As `--link` takes it: a name, or netem's words"""
+    """A name or netem's words, like `--link`"""
     haptics: bool
     seed: int
-    """Of the scene, the errors of camera and encoders, and the emulated link"""
+    """For the scene, the errors of camera and encoders, and the emulated link"""
     force_n: float = 3.0
     duration_s: float = 8.0
-    """From the moment at which the link is up; rest and arming take 1.3 s and a round trip or two of it"""
+    """Counted from when the link is up; rest and arming take 1.3 s and a round trip or two of it"""
     link_model: LinkModel = "stream"
-    """Where the link is emulated in the process"""
-    scene: SceneName = "wall"
-
-    def robot_settings(self) -> RobotSettings:
-        """The robot side's, with the link emulated in its process."""
-        return RobotSettings(scene=self.scene, seed=self.seed, link=self.link, link_model=self.link_model)
-
-    def operator_settings(self) -> OperatorSettings:
-        """The operator side's, with the link emulated in its process."""
-        return OperatorSettings(
-            device="simulated",
-            haptics=self.haptics,
-            seed=self.seed,
-            link=self.link,
-            link_model=self.link_model,
-            person=PersonSettings(pull_n=self.force_n),
-        )
+    """For a link that the process emulates"""
 
     def robot_arguments(self) -> list[str]:
         """The robot side's flags, without link and address."""
-        return [f"--scene={self.scene}", f"--seed={self.seed}"]
+        return ["--scene=wall", f"--seed={self.seed}"]
 
     def operator_arguments(self) -> list[str]:
         """The operator side's flags, without link and address."""
@@ -57,72 +37,32 @@ class Trial:
         return [f"--link={self.link}", f"--link-model={self.link_model}"]
 
 
-@dataclass(frozen=True)
-class WayFigures:
-    """What came of the messages in one direction; delays while the arm was armed."""
+def figures_of(
+    summary: Mapping[str, Any], loss_shares: Mapping[Direction, float | None] | None = None
+) -> dict[str, Any]:
+    """Take a trial's figures from both sides' merged summary; None where there is none.
 
-    mean_ms: float | None
-    sd_ms: float | None
-    p50_ms: float | None
-    p99_ms: float | None
-    samples: int
-    """Messages that arrived, in the whole run"""
-    loss_share: float | None
-    """Of everything that was put on the link, first sendings and repeated ones alike; None where nobody counted"""
-
-
-@dataclass(frozen=True)
-class TrialFigures:
-    """What came of one trial."""
-
-    to_robot: WayFigures
-    to_operator: WayFigures
-    first_contact: str | None
-    """What the gripper touched first, supports aside; None for nothing"""
-    contact_speed_mm_s: float | None
-    min_distance_mm: float | None
-    stiffness_max: float
-    """Of R2, 0 to 1"""
-    tick_p99_us: float | None
-    stops: int
-    """How often the robot side stopped the arm"""
-
-
-class Medium(Protocol):
-    """Where both sides run, and what carries their messages."""
-
-    @property
-    def name(self) -> str:
-        """For tables."""
-        ...
-
-    def run(self, trial: Trial) -> TrialFigures:
-        """Do it; FeelaheadError where it could not be done."""
-        ...
-
-
-def figures_of(summary: Mapping[str, Any], loss_shares: Mapping[Direction, float | None] | None = None) -> TrialFigures:
-    """The figures in both sides' merged summary; `loss_shares` in place of what the emulated link lost."""
+    Delays while the arm was armed, stiffness of R2 (0 to 1), first contact supports aside. What was lost is a share of
+    all that was put on the link, first sendings and repeated ones; `loss_shares` replaces the emulated link's.
+    """
+    contact = summary["first_contact"] or {"with": None, "speed_mm_s": None}
+    figures = {
+        "first_contact": contact["with"],
+        "contact_speed_mm_s": contact["speed_mm_s"],
+        "min_distance_mm": summary["min_distance_mm"],
+        "stiffness_max": summary["stiffness"]["r2"]["max"] or 0.0,
+        "tick_p99_us": summary["tick_us"]["p99"],
+        "stops": len(summary["stops"]),
+    }
     received: Mapping[Direction, str] = {"to_robot": "motion_received", "to_operator": "stiffness_received"}
-
-    def way(direction: Direction) -> WayFigures:
+    for direction in get_args(Direction):
         # A new connection of TCP takes some round trips to carry all that is sent, which is no figure of the link.
         delay_ms = summary["driving_delay_ms"][direction]
+        figures |= {f"{direction}_{name}_ms": delay_ms[name] for name in ("mean", "sd", "p50", "p99")}
+        figures[f"{direction}_samples"] = summary["messages"][received[direction]]
         lost = _lost_share(summary["link"][direction]["achieved"]) if loss_shares is None else loss_shares[direction]
-        samples = int(summary["messages"][received[direction]])
-        return WayFigures(delay_ms["mean"], delay_ms["sd"], delay_ms["p50"], delay_ms["p99"], samples, lost)
-
-    contact = summary["first_contact"]
-    return TrialFigures(
-        to_robot=way("to_robot"),
-        to_operator=way("to_operator"),
-        first_contact=None if contact is None else contact["with"],
-        contact_speed_mm_s=None if contact is None else contact["speed_mm_s"],
-        min_distance_mm=summary["min_distance_mm"],
-        stiffness_max=summary["stiffness"]["r2"]["max"] or 0.0,
-        tick_p99_us=summary["tick_us"]["p99"],
-        stops=len(summary["stops"]),
-    )
+        figures[f"{direction}_lost_percent"] = None if lost is None else 100.0 * lost
+    return figures
 
 
 def _lost_share(achieved: Mapping[str, Any]) -> float | None:

@@ -1,18 +1,17 @@
 """Trials in containers: the sides in networks of their own, and the router's link between them."""
 
 import json
-import os
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
-from typing import Final
+from collections.abc import Mapping
+from contextlib import ExitStack
+from typing import Any, Final
 
 from common.emulation.spec import Direction
 from feelahead.both_sides.processes import StartedSide
 from feelahead.both_sides.real_time import START_S, run_for
 from feelahead.both_sides.summary import merge_summaries
-from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
+from feelahead.both_sides.trial import Trial, figures_of
 from feelahead.containers.engine import Engine
 from feelahead.containers.netem import Counted, count_packets
 
@@ -22,23 +21,15 @@ _BUILD_LIMIT_S: Final = 1500.0
 _SIDES: Final = ("robot", "operator")
 
 
-@contextmanager
-def open_medium() -> Iterator["ContainerMedium"]:
-    """Build the images where they are not built; nothing is left of the containers at the end.
-
-    ConfigurationError where there is no engine, EngineError where an image cannot be built.
-    """
-    with ExitStack() as stack:
-        yield ContainerMedium(stack, os.getpid())
-
-
 class ContainerMedium:
     """Two networks and a router for each link, which stay; both sides again for each trial."""
 
-    name = "containers"
-
     def __init__(self, stack: ExitStack, number: int) -> None:
-        """`stack` removes it all at the end; `number`: for names that no other run of ours uses."""
+        """Build the images where they are not built.
+
+        `stack` removes it all at the end; `number`: for names that no other run of ours uses. ConfigurationError where
+        there is no engine, EngineError where an image cannot be built.
+        """
         self._stack = stack
         self._number = number
         self._cables: dict[str, Engine] = {}
@@ -46,7 +37,7 @@ class ContainerMedium:
         sys.stderr.write("building the images, minutes the first time\n")
         Engine(PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
 
-    def run(self, trial: Trial) -> TrialFigures:
+    def run(self, trial: Trial) -> dict[str, Any]:
         """Do it in real time; SideFailedError where a side fails, EngineError where the engine does.
 
         Where there is no netem for this link, the sides emulate it as on loopback, and standard error says so.

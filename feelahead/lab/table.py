@@ -36,6 +36,10 @@ class Table:
         """The figures of one column; rows without it, or with None, are left out."""
         return [row[name] for row in self.rows if row.get(name) is not None]
 
+    def lines(self, *names: str) -> Iterator[list[Any]]:
+        """The figures of some columns, row by row; None where a row has none."""
+        return ([row.get(name) for name in names] for row in self.rows)
+
     def where(self, **equal: Any) -> "Table":
         """The rows whose columns have these values."""
         return Table(row for row in self.rows if all(row.get(name) == value for name, value in equal.items()))

@@ -7,6 +7,7 @@ from typing import Final, Literal
 from common.emulation.clauses import LinkModel
 from common.protocol.uniform_field import uniform_field
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.lab.table import Row
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
@@ -22,7 +23,7 @@ from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import TrueContact
 
 Arm = Literal["off", "mechanical", "reacting"]
-"""off: nothing is felt. mechanical: triggers stiffen, and whoever pulls them takes no notice. reacting: they do."""
+"""off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""
 _SAME_CONTACT_S: Final = 0.1
 """A contact with a thing that comes back within this time is the same one."""
 _LOOK_S: Final = 0.05
@@ -32,7 +33,7 @@ _SETTLES_S: Final = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """What is done; with the same seed, two that differ in `arm` alone are a pair."""
+    """The task; with the same seed, two that differ in `arm` alone are a pair."""
 
     scene: SceneName
     link: str
@@ -41,29 +42,9 @@ class Trial:
     duration_s: float
     link_model: LinkModel = "datagram"
     tick_period_s: float = TICK_PERIOD_S
-    """Of the robot side"""
+    """The robot side's"""
     camera_sd_m: float = CameraSettings().sd_m
-    """Of the camera's error along each axis, which the law knows"""
-
-
-@dataclass(frozen=True)
-class Result:
-    """What came of it."""
-
-    hits: int
-    """Contacts of the gripper with anything but the target, and of what it holds with obstacles"""
-    hit_first: str | None
-    fastest_hit_mm_s: float | None
-    grasped: bool
-    lifted_mm: float
-    placed: bool
-    finished_s: float | None
-    """From arming until it is placed and the hand has drawn back; None where that did not happen in time."""
-    placing_speed_mm_s: float | None
-    felt_before_s: float | None
-    """How long before it touched what it stands on, rumble or a stiff trigger was in the hand without a break."""
-    felt_before_mm: float | None
-    tilt_deg: float | None
+    """Standard deviation of the camera's error along each axis, which the law knows"""
 
 
 class _Silent:
@@ -84,7 +65,7 @@ class _Silent:
 
 
 class _Watch:
-    """What truly happens, tick by tick."""
+    """Truth, tick by tick."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
         self.hits = 0
@@ -150,10 +131,13 @@ class _Watch:
         return stiff or device.rumble.left > 0.0
 
 
-def run_trial(trial: Trial, seed: int) -> Result:
-    """Run it until the person is done, or for its duration from the start; the same trial gives the same result.
+def run_trial(trial: Trial, seed: int) -> Row:
+    """Run it until the person is done, or for its duration from the start; the same trial gives the same row.
 
     The seed draws the scene, the errors of camera and encoders, the link and the person.
+    hits: contacts of the gripper with anything but the target, and of the held thing with obstacles.
+    finished_s: from arming until the thing is placed and the hand has drawn back; None where time ran out.
+    felt_before_s: for how long rumble or a stiff trigger was felt without a break before the thing touched its place.
     """
     watch = _Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person
@@ -170,16 +154,14 @@ def run_trial(trial: Trial, seed: int) -> Result:
     task = loopback.summary()["task"]
     placing = watch.placing.summary(armed_s)
     finished = placing["placed"] and done_s is not None and armed_s is not None
-    return Result(
-        hits=watch.hits,
-        hit_first=watch.hit_first,
-        fastest_hit_mm_s=None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
-        grasped=task["time_to_grasp_s"] is not None,
-        lifted_mm=task["lifted_mm"],
-        placed=placing["placed"],
-        finished_s=done_s - armed_s if finished and done_s is not None and armed_s is not None else None,
-        placing_speed_mm_s=placing["contact_speed_mm_s"],
-        felt_before_s=placing["felt_before_s"],
-        felt_before_mm=placing["felt_before_mm"],
-        tilt_deg=placing["tilt_deg"],
-    )
+    return {
+        "hits": watch.hits,
+        "hit_first": watch.hit_first,
+        "fastest_hit_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
+        "grasped": task["time_to_grasp_s"] is not None,
+        "lifted_mm": task["lifted_mm"],
+        "placed": placing["placed"],
+        "finished_s": (done_s or 0.0) - (armed_s or 0.0) if finished else None,
+        "placing_speed_mm_s": placing["contact_speed_mm_s"],
+        **{name: placing[name] for name in ("felt_before_s", "felt_before_mm", "tilt_deg")},
+    }

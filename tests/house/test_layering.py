@@ -107,6 +107,10 @@ LIBRARIES = {
     "llvmlite": ("robot_side/compiled",),
     "foxglove": ("common/recording",),
     "mcap": ("common/recording",),
+    # A wall clock that jumps by an hour must not be there to trip over; a recording's stamps are that clock's.
+    "datetime": ("feelahead/recordings",),
+    "calendar": (),
+    "common.clock.wall_clock_offset_s": ("common/recording",),
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",

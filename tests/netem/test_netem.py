@@ -10,10 +10,11 @@ from common.arrays import FloatArray
 from common.emulation.profile import LinkProfile
 from feelahead.lab.link.samples import (
     LinkSample,
-    compare,
+    band_of,
+    compare_one,
     independent_delays,
     judge,
-    measure_band,
+    pair_of_runs,
     play,
     read_link_sample,
 )
@@ -76,8 +77,10 @@ def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[st
         apart = zip(("mean", "sd"), np.abs(ours - theirs), (STREAM_MEAN_MS, STREAM_SD_MS), strict=False)
         missed = [f"{name} {far_ms:.2f} ms apart" for name, far_ms, most in apart if case.judged and far_ms > most]
     else:
-        results = compare(profile, kept, SEEDS, size_bytes, _nothing)
-        band = None if independent_delays(profile) else measure_band(profile, kept, PAIRS, size_bytes, _nothing)
+        results = [compare_one(profile, kept, seed, size_bytes) for seed in range(SEEDS)]
+        pairs = () if independent_delays(profile) else range(PAIRS)
+        found = [pair_of_runs(profile, kept, pair, size_bytes) for pair in pairs]
+        band = band_of(found) if found else None
         goals = judge(profile, kept, results, band)
         said = [f"{goal.claim}: {goal.value}, {goal.compare} {goal.limit}" for goal in goals]
         print(f"{case.name}: {'; '.join(said)}")
@@ -88,7 +91,3 @@ def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[st
 def _figures_ms(sample: LinkSample) -> FloatArray:
     """Mean, standard deviation and 99 % quantile of the delays."""
     return 1e3 * np.array([sample.mean_s, sample.sd_s, np.quantile(sample.arrived_s, 0.99)])
-
-
-def _nothing() -> None:
-    pass

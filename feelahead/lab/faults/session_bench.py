@@ -10,12 +10,12 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry, Tune, Watch
 from common.protocol.session import SessionState
-from feelahead.lab.faults.watched_arm import WatchedArm
-from robot_side.arm.port import Arm
+from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import build_robot_side
 from robot_side.core import RobotSide
 from robot_side.operators.safety import SafetySettings
 from robot_side.settings import RobotSettings
+from robot_side.simulation.joint_reference import MotionLimits
 
 TICK_S = 0.001
 COMMAND_PERIOD_TICKS = 4
@@ -24,6 +24,59 @@ QUICK = RobotSettings(safety=SafetySettings(healthy_s=0.1))
 """Arms after a tenth of a second, because nobody learns anything from a longer one."""
 CRUISE = 0.4
 """Travel of R2 at which the built-in arm advances at 0.1 m/s."""
+_EVEN_TICKS = 20
+_MOVING_RAD_S = 0.05
+_DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
+
+
+class WatchedArm:
+    """An arm that remembers commands and its own measured speed."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.speeds_rad_s: list[tuple[float, float]] = []
+        """(when, the largest joint speed) of each state."""
+        self.told_to_move = 0
+        """Commands that were not to stand still."""
+        self.not_finite = 0
+        """Commands that held NaN or infinity."""
+        self._arm = arm
+        self.joint_count = arm.joint_count
+        self.command_gripper = arm.command_gripper
+        self._accepted_s: list[float] = []
+        """When the newest of those commands was accepted, for each state."""
+        self._newest_s = 0.0
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Do as the arm does."""
+        if np.any(joint_velocity_rad_s):
+            self.told_to_move += 1
+            self._newest_s = valid_until_s - QUICK.safety.gap_s
+        self.not_finite += not np.isfinite(joint_velocity_rad_s).all()
+        self._arm.command(joint_velocity_rad_s, valid_until_s)
+
+    def state(self, now_s: float) -> ArmState:
+        """Do as the arm does."""
+        state = self._arm.state(now_s)
+        if not self.speeds_rad_s or state.time_s > self.speeds_rad_s[-1][0]:
+            self.speeds_rad_s.append((state.time_s, float(np.abs(state.joint_velocities_rad_s).max())))
+            self._accepted_s.append(self._newest_s)
+        return state
+
+    def decelerations_s(self) -> list[float]:
+        """Return when each deceleration began after an even stretch, since the newest command was accepted."""
+        found, since = [], 0
+        for place, (measured_s, speed) in enumerate(self.speeds_rad_s):
+            before = [past for _, past in self.speeds_rad_s[max(since, place - _EVEN_TICKS) : place]]
+            if len(before) == _EVEN_TICKS and _slowed(max(before), speed) and not _slowed(max(before), min(before)):
+                # It has slowed down for a while by now, at a rate that is known.
+                onset_s = measured_s - (max(before) - speed) / _DECELERATION_RAD_S2
+                found.append(onset_s - self._accepted_s[place])
+                since = place
+        return found
+
+
+def _slowed(from_rad_s: float, to_rad_s: float) -> bool:
+    return from_rad_s > _MOVING_RAD_S and to_rad_s < 0.95 * from_rad_s
 
 
 class Operator:
@@ -42,7 +95,7 @@ class Operator:
 
     @property
     def state(self) -> SessionState:
-        """The state of its session as last heard."""
+        """The session's state as last heard."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
@@ -64,7 +117,7 @@ class Operator:
 
 
 class Bench:
-    """The robot side, its messages to each operator, and the motion of its arm."""
+    """The robot side, messages to each operator, and the arm's motion."""
 
     def __init__(self, settings: RobotSettings = QUICK) -> None:
         self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)
@@ -80,7 +133,7 @@ class Bench:
         self._under_way: deque[tuple[float, Operator, StiffnessUpdate | Hello | LeaseNotice]] = deque()
 
     def _watch(self, arm: Arm) -> Arm:
-        self.arm = WatchedArm(arm, QUICK.safety.gap_s)
+        self.arm = WatchedArm(arm)
         return self.arm
 
     @property
@@ -173,3 +226,11 @@ class Bench:
         """Arm, and advance at an even speed."""
         self.arm_it(operator)
         self.drive(duration_s, operator, r2=CRUISE)
+
+
+def cruising() -> tuple[Bench, Operator]:
+    """Make a robot side whose arm an operator moves at an even speed."""
+    bench = Bench()
+    operator = bench.join(2)
+    bench.cruise(operator)
+    return bench, operator

@@ -13,6 +13,7 @@ from feelahead.lab.hostile.raw_zmtp import GREETING, RawConnection, frame, messa
 _STRANGERS = 8
 _HANGING = 128
 """Connections that never finish their handshake, at any time."""
+_VIEWERS = 20
 
 
 def payload(generator: random.Random) -> bytes:
@@ -54,6 +55,7 @@ class Attacker:
         self._generator = random.Random(seed)  # noqa: S311  # repeatable, not secret
         self._strangers: list[RawConnection] = []
         self._hanging: list[RawConnection] = []
+        self._viewers: list[RawConnection] = []
         kinds: list[tuple[str, int, Callable[[], None]]] = [
             ("payload", 780, self._send_payload),
             ("frames", 60, self._send_frames),
@@ -74,8 +76,21 @@ class Attacker:
             self.refused += 1
         self.sent[name] += 1
 
+    def watch(self) -> None:
+        """Subscribe to all views, from several connections, and never read."""
+        for _ in range(_VIEWERS):
+            viewer = RawConnection.introduced(self._view_port, b"SUB", buffer_bytes=2048)
+            viewer.send(message(b"\x01"))
+            self._viewers.append(viewer)
+
+    def leave(self) -> None:
+        """Watch no more."""
+        while self._viewers:
+            self._viewers.pop().close()
+
     def close(self) -> None:
         """Hang up everywhere."""
+        self.leave()
         for connection in (*self._strangers, *self._hanging):
             connection.close()
 

@@ -1,70 +1,20 @@
-"""Sockets reduced to what a measurement needs: bare UDP, bare ZeroMQ, and the robot side's.
+"""An end of ZeroMQ's sockets with nothing around them, which shows what waking and Python cost by themselves."""
 
-Bare ones show what waking and Python cost by themselves, and what ZeroMQ's own threads add to it.
-"""
-
+import math
 import select
-import socket
-from typing import Protocol
+from collections.abc import Iterator
 
 import zmq
 
-from common.sockets.robot import RobotSockets
+from common.clock import MonotonicClock
 
 
-class Link(Protocol):
-    """One end's sockets, reduced to what a measurement needs."""
+class BareEnd:
+    """A ROUTER that binds over TCP on loopback, or a DEALER that connects to `address`."""
 
-    def receive(self) -> list[bytes]:
-        """Take everything that has arrived, oldest first."""
-        ...
-
-    def send(self, payload: bytes) -> bool:
-        """Send at once; False when that cannot be done, or the peer is unknown."""
-        ...
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; say whether it has."""
-        ...
-
-
-class DatagramLink:
-    """A UDP socket on loopback that talks to `address`, or to the peer that spoke last."""
-
-    def __init__(self, address: tuple[str, int] | None = None) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._socket.bind(("127.0.0.1", 0))
-        self._peer = address
-        self.address = self._socket.getsockname()
-        self.close = self._socket.close
-
-    def receive(self) -> list[bytes]:
-        """Take everything that has arrived, oldest first."""
-        received: list[bytes] = []
-        while True:
-            try:
-                payload, self._peer = self._socket.recvfrom(65536)
-            except (BlockingIOError, ConnectionRefusedError):
-                return received
-            received.append(payload)
-
-    def send(self, payload: bytes) -> bool:
-        """Send at once; False when that cannot be done, or the peer is unknown."""
-        try:
-            return self._peer is not None and self._socket.sendto(payload, self._peer) > 0
-        except (BlockingIOError, ConnectionRefusedError):
-            return False
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; say whether it has."""
-        return bool(select.select([self._socket], [], [], timeout_s)[0])
-
-
-class BareZeroMQLink:
-    """A ROUTER that binds over TCP on loopback, or a DEALER that connects to `address`, with nothing around it."""
-
-    def __init__(self, address: str | None = None) -> None:
+    def __init__(self, size_bytes: int, address: str | None = None) -> None:
+        self.sent = 0
+        self._payload = bytes(size_bytes)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket = self._context.socket(zmq.ROUTER if address is None else zmq.DEALER)
         self._socket.setsockopt(zmq.LINGER, 0)
@@ -81,52 +31,38 @@ class BareZeroMQLink:
         """Hang up."""
         self._context.destroy(linger=0)
 
-    def receive(self) -> list[bytes]:
-        """Take everything that has arrived, oldest first."""
-        received: list[bytes] = []
+    def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
+        """Send at start_s + k period_s and take what comes, until `end_s`; yield the time of each turn."""
+        clock, due_s = MonotonicClock(), start_s
+        while (now_s := clock.now()) < end_s:
+            yield now_s
+            if now_s >= due_s:
+                self.sent += self._send()
+                # A late end makes up for nothing, as the sides do.
+                due_s += period_s * max(1, math.floor((now_s - due_s) / period_s))
+            if not self._readable():
+                select.select([self._descriptor], [], [], max(0.0, due_s - clock.now()))
+            self._receive()
+        yield now_s
+
+    def _receive(self) -> None:
         while self._readable():
             if self._routes:
                 self._peer = self._socket.recv(zmq.NOBLOCK)
-            received.append(self._socket.recv(zmq.NOBLOCK))
-        return received
+            self._socket.recv(zmq.NOBLOCK)
 
-    def send(self, payload: bytes) -> bool:
+    def _send(self) -> bool:
         """Send at once; False when that cannot be done, or the peer is unknown."""
         try:
             if self._routes:
                 if self._peer is None:
                     return False
                 self._socket.send(self._peer, zmq.NOBLOCK | zmq.SNDMORE)
-            self._socket.send(payload, zmq.NOBLOCK)
+            self._socket.send(self._payload, zmq.NOBLOCK)
         except zmq.Again:
             return False
         return True
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for something to arrive; say whether it has."""
-        if not self._readable():
-            select.select([self._descriptor], [], [], timeout_s)
-        return self._readable()
-
     def _readable(self) -> bool:
         # The descriptor tells of changes only, and a send may have taken notice of one.
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & int(zmq.POLLIN))
-
-
-class RobotLink:
-    """The robot side's sockets, talking to the peer that spoke last."""
-
-    def __init__(self, sockets: RobotSockets) -> None:
-        self._sockets, self._peer = sockets, b""
-        self.wait = sockets.wait
-
-    def receive(self) -> list[bytes]:
-        """Take everything that has arrived, oldest first."""
-        received = self._sockets.receive()
-        if received:
-            self._peer = received[-1][0]
-        return [payload for _, payload in received]
-
-    def send(self, payload: bytes) -> bool:
-        """Send at once; False when that cannot be done."""
-        return self._sockets.send(self._peer, payload)

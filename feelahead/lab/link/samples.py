@@ -16,6 +16,7 @@ from common.emulation.profile import LinkProfile
 from common.emulation.trace import read_samples
 from common.errors import ConfigurationError
 from feelahead.lab.goals import Goal
+from feelahead.lab.table import Row
 
 STALL_S = 1e-3
 """A delay that exceeds the model's greatest by more than this is the host's doing, not the link's."""
@@ -122,20 +123,6 @@ def distance(one: LinkSample, other: LinkSample) -> float:
 
 
 @dataclass(frozen=True)
-class SeedResult:
-    """One run of the model beside the recording."""
-
-    seed: int
-    distance: float | None
-    """Kolmogorov-Smirnov D; None where nothing varies."""
-    mean_error_ms: float
-    sd_error_ms: float
-    late_share: float
-    loss_share: float
-    mean_burst: float
-
-
-@dataclass(frozen=True)
 class Band:
     """The range in which the model's own runs differ."""
 
@@ -155,7 +142,7 @@ FIGURES: dict[str, Callable[[LinkSample], float]] = {
 
 
 def independent_delays(profile: LinkProfile) -> bool:
-    """Say whether each delay is drawn by itself: a run then has the model's distribution up to sampling error.
+    """Say whether each delay is drawn by itself, so that a run has the model's distribution.
 
     netem's correlation of delays does not count: it leaves them independent.
     """
@@ -173,30 +160,18 @@ def needs_band(profile: LinkProfile) -> bool:
     return profile.loss is not None or not independent_delays(profile)
 
 
-def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> SeedResult:
-    """Run the model with the recording's send times and this seed."""
+def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> Row:
+    """Run the model with the recording's send times and this seed; distance: D, None where nothing varies."""
     run = _run(profile, reference, seed, size_bytes)
     varies = profile.jitter_s > 0.0 or profile.trace is not None
-    return SeedResult(
-        seed,
-        distance(run, reference) if varies else None,
-        1e3 * (run.mean_s - reference.mean_s),
-        1e3 * (run.sd_s - reference.sd_s),
-        run.late_share,
-        run.loss_share,
-        run.mean_burst,
-    )
-
-
-def compare(
-    profile: LinkProfile, reference: LinkSample, seeds: int, size_bytes: int, advance: Callable[[], object]
-) -> list[SeedResult]:
-    """Compare the seeds 0 to `seeds` − 1; `advance` is called after each."""
-    results = []
-    for seed in range(seeds):
-        results.append(compare_one(profile, reference, seed, size_bytes))
-        advance()
-    return results
+    return {
+        "distance": distance(run, reference) if varies else None,
+        "mean_error_ms": 1e3 * (run.mean_s - reference.mean_s),
+        "sd_error_ms": 1e3 * (run.sd_s - reference.sd_s),
+        "late_share": run.late_share,
+        "loss_share": run.loss_share,
+        "mean_burst": run.mean_burst,
+    }
 
 
 def pair_of_runs(
@@ -215,22 +190,14 @@ def band_of(pairs: Sequence[tuple[float, Sequence[Sequence[float]]]]) -> Band:
     return Band(len(pairs), float(np.quantile([apart for apart, _ in pairs], 0.99)), ranges)
 
 
-def measure_band(
-    profile: LinkProfile, reference: LinkSample, pairs: int, size_bytes: int, advance: Callable[[], object]
-) -> Band:
-    """Measure the band by `pairs` pairs of runs; `advance` is called after each."""
-    found = []
-    for pair in range(pairs):
-        found.append(pair_of_runs(profile, reference, pair, size_bytes))
-        advance()
-    return band_of(found)
+def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[Row], band: Band | None) -> list[Goal]:
+    """Hold independent delays against fixed limits, and those that depend on the past against the model's own band.
 
-
-def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[SeedResult], band: Band | None) -> list[Goal]:
-    """Hold independent delays against fixed limits, and those that depend on the past against the model's own band."""
+    results: of `compare_one`.
+    """
 
     def median(name: str) -> float:
-        values = [value for result in results if (value := getattr(result, name)) is not None]
+        values = [value for result in results if (value := result[name]) is not None]
         return float(np.median(values)) if values else math.nan
 
     goals = []

@@ -4,22 +4,35 @@ feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
-from typing import Annotated, Any
+from dataclasses import dataclass, field
+from typing import Annotated, Final
 
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.table import Table as Shown
-from rich.text import Text
 
 from common.emulation.clauses import LinkModel
 from feelahead.lab.approaches.links import require_young_loop
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.trial import Trial, run_trial
 from operator_side.simulated_person.settings import PersonSettings
 from robot_side.simulation.built_in_scenes import SceneName
+
+_COLUMNS: Final = {
+    "seed": ("seed", 0),
+    "grasped": ("grasped", 0),
+    "lifted_mm": ("lifted, mm", 0),
+    "placed": ("placed", 0),
+    "felt_before_s": ("felt before touch, s", 2),
+    "felt_before_mm": ("mm", 0),
+    "placing_speed_mm_s": ("touched at, mm/s", 0),
+    "tilt_deg": ("tilt, °", 1),
+    "hits": ("hits", 0),
+    "finished_s": ("finished, s", 1),
+}
+"""Figures with their headings and digits."""
 
 
 @dataclass(frozen=True)
@@ -56,49 +69,26 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
     """Run the person's whole task once."""
-    yield asdict(run_trial(cell, seed))
+    yield run_trial(cell, seed)
 
 
 def show(_: DemoSettings, table: Table) -> Iterator[Shown]:
     """Make a table for each link: a row for each seed, and how many of them did it."""
     for (link,), runs in table.groups("link"):
-        shown = Shown(title=Text(f"link: {link or 'none'}"), box=MARKDOWN)
-        for heading in (
-            *("seed", "grasped", "lifted, mm", "placed", "felt before touch, s", "mm", "touched at, mm/s", "tilt, °"),
-            *("hits", "finished, s"),
-        ):
-            shown.add_column(heading, justify="right")
-        for one in runs:
-            shown.add_row(
-                str(one["seed"]),
-                _yes(one["grasped"]),
-                f"{one['lifted_mm']:.0f}",
-                _yes(one["placed"]),
-                _number(one["felt_before_s"], 2),
-                _number(one["felt_before_mm"], 0),
-                _number(one["placing_speed_mm_s"], 0),
-                _number(one["tilt_deg"], 1),
-                str(one["hits"]),
-                _number(one["finished_s"], 1),
-            )
-        shown.add_section()
-        shown.add_row(
-            f"of {len(runs)}",
-            str(sum(runs.values("grasped"))),
-            str(sum(lifted > 50.0 for lifted in runs.values("lifted_mm"))),
-            str(sum(runs.values("placed"))),
-            str(sum(early > 0.0 for early in runs.values("felt_before_s"))),
-            *("", "", "", str(sum(runs.values("hits")))),
-            str(len(runs.values("finished_s"))),
-        )
-        yield shown
+        lines = [[_said(one[name], digits) for name, (_, digits) in _COLUMNS.items()] for one in runs]
+        total = {name: str(sum(runs.values(name))) for name in ("grasped", "placed", "hits")} | {
+            "seed": f"of {len(runs)}",
+            "lifted_mm": str(sum(lifted > 50.0 for lifted in runs.values("lifted_mm"))),
+            "felt_before_s": str(sum(early > 0.0 for early in runs.values("felt_before_s"))),
+            "finished_s": str(len(runs.values("finished_s"))),
+        }
+        lines.append([total.get(name, "") for name in _COLUMNS])
+        yield shown(f"link: {link or 'none'}", (heading for heading, _ in _COLUMNS.values()), lines)
 
 
-def _yes(done: bool) -> str:
-    return "yes" if done else "NO"
-
-
-def _number(value: Any, digits: int) -> str:
+def _said(value: float | None, digits: int) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "NO"
     return "-" if value is None else f"{value:.{digits}f}"
 
 

@@ -7,7 +7,7 @@ a claim about people.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import product
 from statistics import fmean, median
 from typing import Annotated
@@ -102,7 +102,7 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
     """Run one trial."""
-    yield asdict(run_trial(cell.trial, seed))
+    yield run_trial(cell.trial, seed)
 
 
 def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:

@@ -5,11 +5,10 @@ feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture
 
 import atexit
 import functools
-import tempfile
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
-from importlib import import_module
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from pathlib import Path
 from statistics import fmean, median
@@ -17,33 +16,35 @@ from typing import Annotated, Final, Literal
 
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.table import Table as Shown
 
+from common.command.command_line import parse_settings
 from common.command.live_view import LINK_UP
 from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
-from common.errors import ConfigurationError, FeelaheadError
+from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from feelahead.both_sides.processes import SideProcess
-from feelahead.both_sides.real_time import LINK_S, START_S, run_for
-from feelahead.both_sides.summary import merge_summaries, read_summary
-from feelahead.both_sides.trial import Trial, TrialFigures, figures_of
+from feelahead.both_sides.real_time import LINK_S, run_for, started
+from feelahead.both_sides.summary import merge_summaries
+from feelahead.both_sides.trial import Trial, figures_of
+from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
 
 Medium = Literal["virtual", "loopback", "containers"]
-_CONTAINERS: Final = "feelahead.containers.medium"
 _DIRECTIONS: Final = ("to_robot", "to_operator")
 _LOOK_S: Final = 0.01
 _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
 """Figures on which the media should agree, each with its name, unit and margin."""
 _COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
 _WIDE: Final = 0.7
-"""Of the room that a link has in the figure, for its media."""
+"""The share of a link's room in the figure that its media take."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,13 @@ class LatencySettings(Sweep):
     media: tuple[Literal["virtual", "loopback"], ...] = ("virtual", "loopback")
     """virtual: in this process, as fast as it goes. loopback: two processes on 127.0.0.1, in real time."""
     compose: bool = False
-    """And in containers, with the kernel's netem between them."""
+    """Run it in containers, too, with the kernel's netem between them."""
     model: LinkModel = "stream"
-    """How a link is emulated: in order and losing nothing, as TCP does, or as datagrams."""
+    """stream keeps the order and loses nothing, as TCP does; datagram loses and reorders."""
     force: Annotated[float, Meta(ge=0.0, le=20.0), tyro.conf.arg(metavar="N")] = 3.0
     """Newtons on R2: 2 is a light pull, 3.7 a normal one."""
     duration: Annotated[float, Meta(ge=2.0, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
-    """Of each trial, from the moment that the link is up; the pull begins after 1.3 s and a round trip or two."""
+    """Length of each trial from when the link is up; the pull begins after 1.3 s and a round trip or two."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -103,19 +104,15 @@ def cells(settings: LatencySettings) -> Iterator[Cell]:
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
     """Run one trial; delays in milliseconds, losses in per cent."""
-    figures = _MEDIA[cell.medium](replace(cell.trial, seed=seed))
-    row: Row = asdict(figures)
-    for direction in _DIRECTIONS:
-        way = row.pop(direction)
-        share = way.pop("loss_share")
-        way["lost_percent"] = None if share is None else 100.0 * share
-        row |= {f"{direction}_{name}": value for name, value in way.items()}
-    yield row
+    yield _MEDIA[cell.medium](replace(cell.trial, seed=seed))
 
 
-def in_virtual_time(trial: Trial) -> TrialFigures:
+def in_virtual_time(trial: Trial) -> Row:
     """Run both cores and the emulated link in this process, as fast as it goes."""
-    both = Loopback(LoopbackSettings(trial.robot_settings(), trial.operator_settings()))
+    link = trial.link_arguments()
+    robot = parse_settings(RobotSettings, "feelahead-robot", [*trial.robot_arguments(), *link])
+    operator = parse_settings(OperatorSettings, "feelahead-operator", [*trial.operator_arguments(), *link])
+    both = Loopback(LoopbackSettings(robot, operator))
     while both.operator.status(both.clock.now())["link"] != LINK_UP:
         if both.clock.now() > LINK_S:
             raise FeelaheadError(f"no link within {LINK_S:g} s over --link {trial.link!r}")
@@ -124,70 +121,46 @@ def in_virtual_time(trial: Trial) -> TrialFigures:
     return figures_of(both.summary())
 
 
-def on_loopback(trial: Trial) -> TrialFigures:
-    """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for what it sends."""
-    with tempfile.TemporaryDirectory(prefix="feelahead-latency-") as folder:
-        summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
-        link = trial.link_arguments()
-        ours = ["--bind=tcp://127.0.0.1:0", *trial.robot_arguments(), *link, f"--summary={summaries['robot']}"]
-        with SideProcess("robot_side", "robot", ours) as robot:
-            heard = robot.wait_for("listening", START_S)
-            theirs = [f"--connect={heard['control']}", f"--view-connect={heard['view']}", *trial.operator_arguments()]
-            theirs += [*link, f"--summary={summaries['operator']}"]
-            with SideProcess("operator_side", "operator", theirs) as operator:
-                run_for(robot, operator, trial.duration_s)
-        robot_said, operator_said = (read_summary(path) for path in summaries.values())
-        return figures_of(merge_summaries(robot_said, operator_said, []))
-
-
-def in_containers(trial: Trial) -> TrialFigures:
-    """Run both sides in containers, in real time; the router between them has the link."""
-    figures: TrialFigures = _containers()(trial)
-    return figures
-
-
-_MEDIA: Final[Mapping[Medium, Callable[[Trial], TrialFigures]]] = {
-    "virtual": in_virtual_time,
-    "loopback": on_loopback,
-    "containers": in_containers,
-}
+def on_loopback(trial: Trial) -> Row:
+    """Run both sides as processes on 127.0.0.1, in real time; each emulates the link for its own messages."""
+    link = trial.link_arguments()
+    with started([*trial.robot_arguments(), *link], [*trial.operator_arguments(), *link]) as both:
+        run_for(both.robot, both.operator, trial.duration_s)
+        return figures_of(merge_summaries(*both.summaries(), []))
 
 
 @functools.cache
-def _containers() -> Callable[[Trial], TrialFigures]:
+def _containers() -> ContainerMedium:
     """Open the containers once, and leave nothing of them at the end of the process."""
-    try:
-        module = import_module(_CONTAINERS)
-    except ImportError as error:
-        raise ConfigurationError(f"--compose: {error}; valid: in a clone of the repository") from error
     stack = ExitStack()
     atexit.register(stack.close)
-    opened: Callable[[Trial], TrialFigures] = stack.enter_context(module.open_medium()).run
-    return opened
+    return ContainerMedium(stack, os.getpid())
+
+
+_MEDIA: Final[Mapping[Medium, Callable[[Trial], Row]]] = {
+    "virtual": in_virtual_time,
+    "loopback": on_loopback,
+    "containers": lambda trial: _containers().run(trial),
+}
 
 
 def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
     """Make a table of figures, and one of how far the media agree."""
-    shown = Shown(title="latency: a constant finger towards a wall", box=MARKDOWN)
-    for heading in (
+    headings = (
         *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
         *("to operator, ms", "sd", "p50", "p99", "lost, %"),
         *("contacts", "mm/s, median (most)", "nearest, mm", "stiffness", "tick p99, us", "stops"),
-    ):
-        shown.add_column(heading, justify="left" if heading in ("link", "haptics", "medium") else "right")
-    for (link, haptics, medium), group in table.groups("link", "haptics", "medium"):
+    )
+    lines = []
+    for kind, group in table.groups("link", "haptics", "medium"):
         speeds = group.values("contact_speed_mm_s")
-        shown.add_row(
-            *(link, haptics, medium, str(len(group))),
-            *(cell for direction in _DIRECTIONS for cell in _delays(group, direction)),
-            f"{len(speeds)}/{len(group)}",
-            f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else "",
-            _mean(group.values("min_distance_mm"), 1),
-            _mean(group.values("stiffness_max"), 2),
-            _mean(group.values("tick_p99_us"), 0),
-            str(sum(group.values("stops"))),
+        line = [*kind, str(len(group)), *(cell for direction in _DIRECTIONS for cell in _delays(group, direction))]
+        line += [f"{len(speeds)}/{len(group)}", f"{median(speeds):.0f} ({max(speeds):.0f})" if speeds else ""]
+        rest = (("min_distance_mm", 1), ("stiffness_max", 2), ("tick_p99_us", 0))
+        lines.append(
+            [*line, *(_mean(group.values(name), digits) for name, digits in rest), str(sum(group.values("stops")))]
         )
-    yield shown
+    yield shown("latency: a constant finger towards a wall", headings, lines)
     if len({row["medium"] for row in table}) > 1:
         yield agreement(table)
 
@@ -208,23 +181,22 @@ def agreement(table: Table) -> Shown:
     """Compare each pair of media: two one-sided tests, by Welch's interval over seeds, against a margin."""
     margins = ", ".join(f"{name} within ±{margin:g} {unit}" for _, name, unit, margin in _COMPARED)
     title = f"do the media agree? {margins}: the whole 95 % interval (Welch, over seeds) has to lie within"
-    shown = Shown(title=title, box=MARKDOWN)
-    for heading in ("link", "media", "direction", "seeds", *(name for _, name, _, _ in _COMPARED)):
-        shown.add_column(heading)
+    lines = []
     for (link,), group in table.groups("link"):
-        for first, second in combinations(dict.fromkeys(row["medium"] for row in group), 2):
+        for media in combinations(dict.fromkeys(row["medium"] for row in group), 2):
             for direction in _DIRECTIONS:
                 samples = [
-                    [by_seed(group.where(medium=medium), f"{direction}_{name}") for medium in (first, second)]
+                    [by_seed(group.where(medium=medium), f"{direction}_{name}") for medium in media]
                     for name, *_ in _COMPARED
                 ]
                 verdicts = (
                     verdict(one, other, margin, unit)
                     for (one, other), (_, _, unit, margin) in zip(samples, _COMPARED, strict=True)
                 )
-                seeds = f"{len(samples[0][0])}, {len(samples[0][1])}"
-                shown.add_row(link, f"{first} - {second}", direction, seeds, *verdicts)
-    return shown
+                lines.append(
+                    [link, " - ".join(media), direction, ", ".join(str(len(of)) for of in samples[0]), *verdicts]
+                )
+    return shown(title, ("link", "media", "direction", "seeds", *(name for _, name, _, _ in _COMPARED)), lines)
 
 
 def by_seed(group: Table, name: str) -> list[float]:

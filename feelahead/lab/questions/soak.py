@@ -4,38 +4,35 @@ feelahead try soak --minutes 10 --virtual
 feelahead try soak --minutes 10 --observers 8
 
 Virtual: both cores in one process, as fast as they go. Real: both sides with a simulated person, over loopback. The
-person grasps, lifts, and then rests; their messages keep flowing. The first two observers are processes like the
-owner's; the others are driven by this one, because a process each would be too much for two cores.
+person grasps, lifts, and then rests; messages keep flowing. This process drives the observers, because one each would
+be too much for two cores.
 
 The summaries' statistics keep up to 100 000 samples each: 0.8 MB for each over the first minutes. The limit allows it.
 """
 
 import secrets
-import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Final
 
-import numpy as np
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 from rich.text import Text
 
 from common.clock import MonotonicClock, clock_domain
+from common.command.live_view import LINK_UP
 from common.emulation.spec import LinkSpec
 from common.sockets.operator import OperatorSockets
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.real_time import LINK_S, START_S
-from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.both_sides.real_time import LINK_S, START_S, end, started
+from feelahead.both_sides.summary import merge_summaries
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from operator_side.core import OperatorSide
@@ -47,16 +44,12 @@ SAMPLES: Final = 20
 _SETTLED: Final = 0.1
 """The first tenth of the run fills what is bounded: it counts as the start from then on."""
 _FLAT_MB: Final = 10.0
-_MOST_PROCESSES: Final = 2
-"""Observers with processes of their own: each takes a tenth of a core."""
 _LIGHT: Final = "this process"
-"""The row of the observers that live in the asking process."""
+"""The row of the observers."""
 _ROBOT: Final = "robot side"
 _OWNER: Final = "operator side"
 _PERIOD_S: Final = 0.02
 """The robot side tells observers as often what they may feel."""
-_ALONE_S: Final = 30.0
-"""Ticks are looked at for at most this time before the observers come, and at most for a tenth of the run."""
 _GAP: Final = "no command for"
 
 
@@ -69,7 +62,7 @@ class SoakSweep(Sweep):
     virtual: bool = False
     """In virtual time, in one process."""
     observers: Annotated[int, Meta(ge=0, le=MOST_OBSERVERS), tyro.conf.arg(metavar="N")] = 0
-    """Number of others that watch: two as processes, the rest from within this one."""
+    """Number of others that watch, from within this process."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 20ms 5ms"
     """Emulated link, in netem's words."""
 
@@ -103,8 +96,7 @@ def run(cell: Soak, seed: int) -> Iterator[Row]:
         if "process" in row:
             samples.setdefault(row["process"], []).append(row)
         if "stops" in row:
-            light = max(cell.observers - _MOST_PROCESSES, 1)
-            row["flat"] = all(flat(rows, light if name == _LIGHT else 1) for name, rows in samples.items())
+            row["flat"] = all(flat(rows, cell.observers if name == _LIGHT else 1) for name, rows in samples.items())
         yield row
 
 
@@ -119,18 +111,30 @@ def _virtual(cell: Soak, seed: int) -> Iterator[Row]:
 
 
 def _real(cell: Soak, seed: int) -> Iterator[Row]:
-    with tempfile.TemporaryDirectory(prefix="feelahead-soak-") as folder, Processes(cell, seed, Path(folder)) as all_of:
-        all_of.wait(min(_ALONE_S, _SETTLED * 60.0 * cell.minutes))
-        yield all_of.ticks("alone")
-        if cell.observers:
-            all_of.bring_observers()
+    own = [f"--seed={seed}", f"--link={cell.link}"]
+    with started(own, own) as both, ExitStack() as stack:
+        while both.operator.wait_for("status", START_S).get("link") != LINK_UP:
+            both.robot.check()
+        sides = _Running(both.robot, both.operator)
+        sides.bring(
+            [
+                (
+                    stack.enter_context(OperatorSockets(both.control, both.view)),
+                    OperatorSide(secrets.randbits(53), clock_domain(), haptics=False),
+                )
+                for _ in range(cell.observers)
+            ]
+        )
         for step in range(SAMPLES + 1):
             minutes = cell.minutes * step / SAMPLES
             if step:
-                all_of.wait(60.0 * cell.minutes / SAMPLES)
-            yield from (_sample(name, process, minutes) for name, process in all_of.process_ids())
-        yield all_of.ticks(f"with {all_of.watching} observers")
-        yield _end(all_of.end())
+                sides.wait(60.0 * cell.minutes / SAMPLES)
+            yield _sample(_ROBOT, both.robot.process_id, minutes)
+            yield _sample(_OWNER, both.operator.process_id, minutes)
+            if cell.observers:
+                yield _sample(_LIGHT, "self", minutes)
+        end(both.robot, both.operator)
+        yield _end(merge_summaries(*both.summaries(), []))
 
 
 def _sample(process: str, number: int | str, minutes: float) -> Row:
@@ -144,108 +148,43 @@ def _end(summary: dict[str, Any]) -> Row:
     return counts | delay_ms | {"messages": summary["messages"], "why": dict(reasons), "said": summary["errors"]}
 
 
-class Processes:
-    """Robot side and owner from the opening of the context to its end, observers from `bring_observers` on."""
+class _Running:
+    """Both sides' processes, and observers within this one."""
 
-    def __init__(self, cell: Soak, seed: int, folder: Path) -> None:
+    def __init__(self, robot: SideProcess, owner: SideProcess) -> None:
         self.watching = 0
         """Number of observers that the robot side spoke of last."""
-        self._cell, self._seed, self._folder = cell, seed, folder
-        self._stack = ExitStack()
+        self._robot, self._owner = robot, owner
         self._clock, self._pause = MonotonicClock(), threading.Event()
-        self._sides: dict[str, SideProcess] = {}
-        self._light: Sequence[tuple[OperatorSockets, OperatorSide]] = ()
-        self._ticks_us: list[tuple[float, float]] = []
+        self._observers: Sequence[tuple[OperatorSockets, OperatorSide]] = ()
 
-    def __enter__(self) -> "Processes":
-        with self._stack as stack:
-            self._start(_ROBOT, "robot_side.main", ["--bind=tcp://127.0.0.1:0"])
-            heard = self._sides[_ROBOT].wait_for("listening", START_S)
-            self._endpoints = heard["control"], heard["view"]
-            self._start_operator(_OWNER)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def bring_observers(self) -> None:
-        """Start all that were asked for; SideFailedError when the robot side does not take them all in."""
-        processes = min(self._cell.observers, _MOST_PROCESSES)
-        for number in range(1, processes + 1):
-            self._start_operator(f"observer {number}", number)
-        self._light = [
-            (
-                self._stack.enter_context(OperatorSockets(*self._endpoints)),
-                OperatorSide(secrets.randbits(53), clock_domain(), haptics=False),
-            )
-            for _ in range(self._cell.observers - processes)
-        ]
-        end_s = self._clock.now() + START_S
-        while self.watching < self._cell.observers or any(
-            side.lease is None or side.screen is None for _, side in self._light
-        ):
+    def bring(self, observers: Sequence[tuple[OperatorSockets, OperatorSide]]) -> None:
+        """Wait until the robot side has taken all of them in; SideFailedError when it does not."""
+        self._observers = observers
+        end_s = self._clock.now() + LINK_S
+        while self.watching < len(observers) or any(side.lease is None or side.screen is None for _, side in observers):
             if self._clock.now() > end_s:
-                raise SideFailedError(f"the robot side knows of {self.watching} observers after {START_S:g} s")
+                raise SideFailedError(f"the robot side knows of {self.watching} observers after {LINK_S:g} s")
             self.wait(_PERIOD_S)
-        self._ticks_us.clear()
 
     def wait(self, seconds: float) -> None:
         """Let time pass while all take their turns; SideFailedError when a side fails."""
         end_s = self._clock.now() + seconds
         while (now_s := self._clock.now()) < end_s:
-            for sockets, core in self._light:
+            for sockets, core in self._observers:
                 for payload in sockets.receive():
                     core.receive(payload, now_s)
                 for _, payload in sockets.receive_view():
                     core.receive_view(payload, now_s)
                 for payload in core.motion(now_s):
                     sockets.send(payload)
-            for name, side in self._sides.items():
-                side.check()
-                for event in side.events():
-                    if name == _ROBOT and event["event"] == "status":
-                        self.watching = event["observers"]
-                        self._ticks_us.append((event["tick_us"], event["tick_p99_us"]))
+            self._owner.check()
+            self._owner.events()
+            self._robot.check()
+            for event in self._robot.events():
+                if event["event"] == "status":
+                    self.watching = event["observers"]
             self._pause.wait(min(end_s - now_s, _PERIOD_S))
-
-    def ticks(self, when: str) -> Row:
-        """Give the medians of the ticks' medians and p99 since this was last asked for; nobody judges them."""
-        median_us, p99_us = np.median(self._ticks_us, axis=0) if self._ticks_us else (None, None)
-        self._ticks_us.clear()
-        return {"when": when, "tick_us": median_us, "tick_p99_us": p99_us}
-
-    def process_ids(self) -> Iterator[tuple[str, int | str]]:
-        """Name every process."""
-        yield from ((name, side.process_id) for name, side in self._sides.items())
-        if self._light:
-            yield _LIGHT, "self"
-
-    def end(self) -> dict[str, Any]:
-        """End all, and merge the robot side's and the owner's summaries, with everybody's errors."""
-        # All at once, and the robot side last: none is to take the other's end for a fault of the link.
-        for side in reversed(self._sides.values()):
-            side.interrupt()
-        for side in reversed(self._sides.values()):
-            side.stop()
-            side.check()
-        robot, owner, *others = (read_summary(self._folder / f"{name}.json") for name in self._sides)
-        return merge_summaries(robot, owner, [error for other in others for error in other["errors"]])
-
-    def _start_operator(self, name: str, number: int = 0) -> None:
-        control, view = self._endpoints
-        self._start(
-            name, "operator_side", [f"--connect={control}", f"--view-connect={view}", "--device=simulated"], number
-        )
-        end_s = self._clock.now() + LINK_S
-        # Until the robot side has said where it stands.
-        while (status := self._sides[name].wait_for("status", START_S)).get("owner") is None:
-            if self._clock.now() > end_s:
-                raise SideFailedError(f"the {name} has no link after {LINK_S:g} s: {status['link']}")
-
-    def _start(self, name: str, module: str, arguments: Sequence[str], number: int = 0) -> None:
-        own = [f"--seed={self._seed + number}", f"--summary={self._folder / name}.json", f"--link={self._cell.link}"]
-        self._sides[name] = self._stack.enter_context(SideProcess(module, name, [*arguments, *own]))
 
 
 def flat(samples: Sequence[Row], sides: int = 1) -> bool:
@@ -259,18 +198,12 @@ def flat(samples: Sequence[Row], sides: int = 1) -> bool:
 
 def show(_settings: SoakSweep, table: Table) -> Iterator[RenderableType]:
     """Show start, settled, middle and end of each process, then the rest in words."""
-    shown = Shown(title="soak", box=MARKDOWN)
-    for heading in ("process", "at, min", "resident, MB", "descriptors"):
-        shown.add_column(heading, justify="left" if heading == "process" else "right")
-    for (_, name), rows in Table(row for row in table if "process" in row).groups("seed", "process"):
-        for index in (0, int(_SETTLED * len(rows)), len(rows) // 2, len(rows) - 1):
-            one = rows.rows[index]
-            shown.add_row(name, f"{one['at_min']:.1f}", f"{one['mb']:.1f}", str(one["descriptors"]))
-    yield shown
+    lines: list[list[Any]] = []
+    for _, rows in Table(row for row in table if "process" in row).groups("seed", "process"):
+        all_of = list(rows.lines("process", "at_min", "mb", "descriptors"))
+        lines += [all_of[index] for index in (0, int(_SETTLED * len(rows)), len(rows) // 2, len(rows) - 1)]
+    yield shown("soak", ("process", "at, min", "resident, MB", "descriptors"), lines)
     for row in table:
-        if row.get("tick_us") is not None:
-            ticks = f"median {row['tick_us']:.0f} us, p99 {row['tick_p99_us']:.0f} us"
-            yield Text(f"tick of the robot side {row['when']}: {ticks}")
         if "messages" in row:
             stops = ", ".join(f"{count} x {reason}" for reason, count in row["why"].items()) or "none"
             yield Text(f"messages {row['messages']}")

@@ -11,33 +11,22 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
-import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
-from rich.table import Table as Shown
 
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from feelahead.both_sides.memory import resident_mb
-from feelahead.both_sides.processes import SideProcess
-from feelahead.both_sides.real_time import START_S, run_for
-from feelahead.both_sides.summary import read_summary
+from feelahead.both_sides.real_time import run_for, started
 from feelahead.lab.goals import Goal
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.tick.timed_robot import AWAY, COLUMNS, PROGRAM, STAGES
-from robot_side.main import TICK_PERIOD_S
 
 _SETTLING_S: Final = 1.0
 """Both sides have met and each kernel has run by then."""
 _LEAST_TICKS: Final = 500
 _QUICK_S: Final = 4.0
-_WARMING: Final = 2_000
-"""Ticks until tables have grown to what the scene needs."""
-_POINTS: Final = 10
-_GROWTH_MB: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -51,8 +40,6 @@ class TickSweep(Sweep):
     """Length of each case."""
     objects: tuple[Annotated[int, Meta(ge=1, le=1_000_000)], ...] = (10, 1_000, 10_000, 100_000)
     """Numbers of objects around the table, perceived besides the demo's. --quick: 1 000 at most."""
-    allocations: Annotated[Annotated[int, Meta(ge=100, le=100_000_000)] | None, tyro.conf.arg(metavar="N")] = None
-    """Instead: whether memory stays flat over N ticks in virtual time; on Linux."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +50,11 @@ class Case:
     seconds: float
     stages: bool = False
     objects: int = 0
-    moving: int = 0
     only: bool = False
-    allocations: int = 0
 
 
 def cells(settings: TickSweep) -> Iterator[Case]:
     """Lay out the demo, an empty scene, and the numbers of objects."""
-    if settings.allocations is not None:
-        yield Case("memory", 0.0, allocations=settings.allocations)
-        return
     seconds = _QUICK_S if settings.quick else settings.seconds
     yield Case("demo, each stage timed", seconds, stages=True)
     yield Case("demo", seconds)
@@ -80,29 +62,18 @@ def cells(settings: TickSweep) -> Iterator[Case]:
     counts = [count for count in settings.objects if not (settings.quick and count > 1_000)]
     for count in counts:
         yield Case(f"{count} objects", seconds, objects=count)
-    for count in counts:
-        if count >= 1_000:
-            yield Case(f"{count} objects, 100 move", seconds, objects=count, moving=100)
 
 
 def run(cell: Case, seed: int) -> Iterator[Row]:
     """Run one case; a row for each stage, and for the sums."""
-    if cell.allocations:
-        yield from _memory(cell.allocations)
-        return
-    names = ("stages", "objects", "moving", "only")
+    names = ("stages", "objects", "only")
     with tempfile.TemporaryDirectory() as folder:
-        log, summary = Path(folder) / "ticks.npy", Path(folder) / "robot.json"
-        ours = [f"--log={log}", f"--summary={summary}", *(f"--{name}={getattr(cell, name)}" for name in names)]
-        with SideProcess(
-            PROGRAM, "robot", [*ours, f"--seed={seed}", "--bind=tcp://127.0.0.1:0", "--no-cameras"]
-        ) as robot:
-            heard = robot.wait_for("listening", START_S)
-            theirs = ["--device=simulated", f"--connect={heard['control']}", f"--view-connect={heard['view']}"]
-            with SideProcess("operator_side", "operator", [*theirs, f"--seed={seed}"]) as operator:
-                run_for(robot, operator, cell.seconds + _SETTLING_S)
+        log, flags = Path(folder) / "ticks.npy", [f"--{name}={getattr(cell, name)}" for name in names]
+        ours = [f"--log={log}", *flags, f"--seed={seed}", "--no-cameras"]
+        with started(ours, [f"--seed={seed}"], PROGRAM) as both:
+            run_for(both.robot, both.operator, cell.seconds + _SETTLING_S)
+            overruns = both.summaries()[0].get("overruns")
         ticks = np.load(log)
-        overruns = read_summary(summary).get("overruns")
     kept = ticks[ticks[:, 0] >= ticks[0, 0] + _SETTLING_S] if len(ticks) else ticks
     if len(kept) < _LEAST_TICKS:
         raise FeelaheadError(f"{len(kept)} ticks in {cell.seconds:g} s: this machine is too busy to measure")
@@ -124,56 +95,24 @@ def rows(ticks: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]
     thread_s, now_s = ticks[:, COLUMNS.index("thread_s")], ticks[:, 0]
     share = float((thread_s[-1] - thread_s[0]) / (now_s[-1] - now_s[0]))
     for name, values in found.items():
-        p10, p50, p99 = (float(value) for value in np.quantile(values, (0.1, 0.5, 0.99)))
-        row: Row = {
-            "part": name,
-            "p10_us": p10,
-            "p50_us": p50,
-            "p99_us": p99,
-            "mean_us": float(values.mean()),
-        }
+        p10, p50, p99 = np.quantile(values, (0.1, 0.5, 0.99))
+        row: Row = {"part": name, "p10_us": p10, "p50_us": p50, "p99_us": p99, "mean_us": values.mean()}
         yield row | ({"ticks": len(ticks), "share": share, "overruns": overruns} if name == "tick" else {})
 
 
-def _memory(ticks: int) -> Iterator[Row]:
-    """Run both sides in this process; say at even points how much is resident."""
-    both = Loopback(LoopbackSettings())
-    for point in range(_POINTS + 1):
-        done = _WARMING + point * max(ticks // _POINTS, 1)
-        both.run_until((done - 0.5) * TICK_PERIOD_S)
-        yield {"ticks": done, "resident_mb": resident_mb()}
-
-
-def show(settings: TickSweep, table: Table) -> Iterator[RenderableType]:
+def show(_: TickSweep, table: Table) -> Iterator[RenderableType]:
     """Show the demo's stages, and each case's sums."""
     machine = f"us of processor time; {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"
-    if settings.allocations is not None:
-        yield _shown("resident while ticks go by, both sides in one process", ("ticks", "resident_mb"), table)
-        return
     stages = table.where(case="demo, each stage timed")
-    yield _shown(f"the demo's tick at 1 kHz, {machine}", ("part", "p10_us", "p50_us", "p99_us", "mean_us"), stages)
-    sums = [row for row in table if row["part"] in ("look to message", "tick without physics", "tick")]
+    columns: tuple[str, ...] = ("part", "p10_us", "p50_us", "p99_us", "mean_us")
+    yield shown(f"the demo's tick at 1 kHz, {machine}", columns, stages.lines(*columns))
+    sums = Table(row for row in table if row["part"] in ("look to message", "tick without physics", "tick"))
     columns = ("case", "part", "p50_us", "p99_us", "share", "overruns")
-    yield _shown(f"by objects perceived, {machine}", columns, Table(sums))
+    yield shown(f"by objects perceived, {machine}", columns, sums.lines(*columns))
 
 
-def _shown(title: str, columns: tuple[str, ...], found: Table) -> Shown:
-    shown = Shown(title=title, box=MARKDOWN)
-    for name in columns:
-        shown.add_column(name.replace("_", " "), justify="left" if name in ("case", "part") else "right")
-    for row in found:
-        values = (row.get(name) for name in columns)
-        shown.add_row(*("" if one is None else f"{one:.4g}" if isinstance(one, float) else str(one) for one in values))
-    return shown
-
-
-def goals(settings: TickSweep, table: Table) -> Iterator[Goal]:
+def goals(_: TickSweep, table: Table) -> Iterator[Goal]:
     """Hold the figures against their limits."""
-    if settings.allocations is not None:
-        resident = table.values("resident_mb")
-        # The first stretch fills what is bounded.
-        yield Goal("resident memory grows by, MB", resident[-1] - resident[1], _GROWTH_MB)
-        return
 
     def quantile(case: str, part: str, name: str = "p50_us") -> float | None:
         found = table.where(case=case, part=part).values(name)

@@ -1,11 +1,10 @@
 """Many objects that a camera perceives, and that no physics knows: around the table, out of the gripper's way."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
 from robot_side.objects.movers import OF_OBJECTS, Movers
 from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
@@ -13,73 +12,43 @@ MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """The middle of the built-in table's things."""
 NEAREST_M, FARTHEST_M = 0.6, 3.0
 _SIZES_M: Final = (0.005, 0.03)
-_FASTEST_M_S: Final = 0.2
-_KINDS: Final = 3
 
 
-@dataclass(frozen=True)
-class Crowd:
-    """Random objects of one primitive each, evenly in directions and distances."""
-
-    count: int
-    moving: int = 0
-    seed: int = 1
-    centers_m: FloatArray = field(init=False)
-    """(n, 3) at the time 0"""
-    radii_m: FloatArray = field(init=False)
-    """(n,) of a sphere around each"""
-    kinds: IntArray = field(init=False)
-    """(n,) into spheres, boxes, tetrahedra"""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.moving <= self.count:
-            raise ValueError(f"--moving {self.moving}: valid: 0 to --objects")
-        generator = np.random.default_rng(self.seed)
-        away = generator.normal(size=(self.count, 3))
-        away /= np.linalg.norm(away, axis=1)[:, None]
-        apart_m = generator.uniform(NEAREST_M, FARTHEST_M, self.count)
-        object.__setattr__(self, "centers_m", MIDDLE_M + apart_m[:, None] * away)
-        object.__setattr__(self, "radii_m", generator.uniform(*_SIZES_M, self.count))
-        object.__setattr__(self, "kinds", np.arange(self.count) % _KINDS)
-
-    def at(self, time_s: float, count: int) -> FloatArray:
-        """Place the first centres (count, 3): the first `moving` go to and fro."""
-        moving, centers_m = min(self.moving, count), self.centers_m[:count].copy()
-        centers_m[:moving, 0] += _FASTEST_M_S * np.sin(time_s + np.arange(moving))
-        return centers_m
-
-    def seen(self, time_s: float, count: int) -> PerceivedObjects:
-        """Make a frame of the first `count` of them."""
-        at, radii_m, kinds = self.at(time_s, count), self.radii_m[:count], self.kinds[:count]
-        spheres, boxes, tetrahedra = (np.flatnonzero(kinds == kind) for kind in range(_KINDS))
-        edge = 1.0 / np.sqrt(3.0)
-        corners = edge * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
-        return PerceivedObjects(
-            time_s=time_s,
-            names=tuple(f"crowd {k}" for k in range(count)),
-            roles=(Role.OBSTACLE,) * count,
-            sphere_centers_m=at[spheres],
-            sphere_radii_m=radii_m[spheres],
-            sphere_object=spheres,
-            box_centers_m=at[boxes],
-            box_rotations=np.tile(np.eye(3), (len(boxes), 1, 1)),
-            box_half_sizes_m=np.repeat(edge * radii_m[boxes, None], 3, axis=1),
-            box_object=boxes,
-            tetrahedron_vertices_m=at[tetrahedra, None] + radii_m[tetrahedra, None, None] * corners,
-            tetrahedron_object=tetrahedra,
-            half_space_normals=np.empty((0, 3)),
-            half_space_offsets_m=np.empty(0),
-            half_space_object=np.empty(0, dtype=np.int64),
-        )
+def crowd(count: int, time_s: float, seed: int = 1) -> PerceivedObjects:
+    """Make a frame of random objects of one primitive each, evenly in directions and distances."""
+    generator = np.random.default_rng(seed)
+    away = generator.normal(size=(count, 3))
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    at = MIDDLE_M + generator.uniform(NEAREST_M, FARTHEST_M, count)[:, None] * away
+    radii_m = generator.uniform(*_SIZES_M, count)
+    spheres, boxes, tetrahedra = (np.arange(kind, count, 3) for kind in range(3))
+    edge = 1.0 / np.sqrt(3.0)
+    corners = edge * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
+    return PerceivedObjects(
+        time_s=time_s,
+        names=tuple(f"crowd {k}" for k in range(count)),
+        roles=(Role.OBSTACLE,) * count,
+        sphere_centers_m=at[spheres],
+        sphere_radii_m=radii_m[spheres],
+        sphere_object=spheres,
+        box_centers_m=at[boxes],
+        box_rotations=np.tile(np.eye(3), (len(boxes), 1, 1)),
+        box_half_sizes_m=np.repeat(edge * radii_m[boxes, None], 3, axis=1),
+        box_object=boxes,
+        tetrahedron_vertices_m=at[tetrahedra, None] + radii_m[tetrahedra, None, None] * corners,
+        tetrahedron_object=tetrahedra,
+        half_space_normals=np.empty((0, 3)),
+        half_space_offsets_m=np.empty(0),
+        half_space_object=np.empty(0, dtype=np.int64),
+    )
 
 
 class CrowdedCamera:
-    """An ObjectSource that sees the crowd, too."""
+    """An ObjectSource that sees a crowd of things that stand still, too."""
 
-    def __init__(self, camera: ObjectSource, crowd: Crowd, *, only: bool = False) -> None:
+    def __init__(self, camera: ObjectSource, count: int, *, only: bool = False) -> None:
         """only: the crowd alone is seen."""
-        self._camera, self._crowd, self._only = camera, crowd, only
-        self._before: PerceivedObjects | None = None
+        self._camera, self._count, self._only = camera, count, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
         self._own_movers: SomeObjects | None = None
@@ -87,34 +56,32 @@ class CrowdedCamera:
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the camera's frame with the crowd of that time; the same one until there is a newer one."""
+        """Return the camera's frame with the crowd; the same one until there is a newer one."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
-            self._before, self._own = self._own, own
-            self._shown = self._with_crowd(own)
+            before, self._own = self._own, own
+            self._shown = self._with_crowd(own, before)
         return self._shown
 
     def set_role(self, name: str, role: Role) -> None:
         """Set it for one of the camera's own."""
         self._camera.set_role(name, role)
 
-    def _with_crowd(self, own: PerceivedObjects) -> PerceivedObjects:
-        crowd = self._crowd
-        if own.since is None or self._only:
-            return self._whole(_without_objects(own) if self._only else own)
+    def _with_crowd(self, own: PerceivedObjects, before: PerceivedObjects | None) -> PerceivedObjects:
+        if self._only:
+            return joined(_without_objects(own), crowd(self._count, own.time_s))
+        if own.since is None:
+            return joined(own, crowd(self._count, own.time_s))
         movers, moved = own.since
         if self._movers is None or self._own_movers is not movers:
             # The frame that was shown whole is the one that has a table, and whose roles are known.
-            shown = self._shown if self._before is movers.first else None
-            first, moving = shown or self._whole(movers.first), len(movers.first.names) + np.arange(crowd.moving)
-            self._own_movers, self._movers = movers, Movers(first, np.concatenate([movers.things, moving]))
+            shown = self._shown if before is movers.first else None
+            first = shown or joined(movers.first, crowd(self._count, movers.first.time_s))
+            self._own_movers, self._movers = movers, Movers(first, movers.things)
             self._roles = movers.first.roles, first.roles
         if self._roles[0] is not own.roles:
-            self._roles = own.roles, own.roles + (Role.OBSTACLE,) * crowd.count
-        return self._movers.frame(joined(moved, crowd.seen(own.time_s, crowd.moving)), self._roles[1])
-
-    def _whole(self, own: PerceivedObjects) -> PerceivedObjects:
-        return joined(own, self._crowd.seen(own.time_s, self._crowd.count))
+            self._roles = own.roles, own.roles + (Role.OBSTACLE,) * self._count
+        return self._movers.frame(moved, self._roles[1])
 
 
 def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:

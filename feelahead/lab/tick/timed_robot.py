@@ -1,7 +1,6 @@
 """A robot side that writes down the cost of each tick: `python -m ... --log=FILE.npy` and its own flags.
 
---objects=N puts N more perceived objects around, which physics knows nothing of; --moving of them move; --only takes
-the scene's own objects away.
+--objects=N puts N more perceived objects around, which physics knows nothing of; --only takes the scene's own away.
 """
 
 import time
@@ -15,7 +14,7 @@ import tyro
 
 import robot_side.main
 from common.command.command_line import parse_settings, run_command
-from feelahead.lab.tick.crowd import Crowd, CrowdedCamera
+from feelahead.lab.tick.crowd import CrowdedCamera
 from robot_side.assembly import Assembled, assemble
 from robot_side.outgoing_messages import Outgoing
 
@@ -44,12 +43,10 @@ class TimedSettings:
     """The file for the figures: a row a tick, see COLUMNS."""
     objects: int = 0
     """Number of further objects."""
-    moving: int = 0
-    """Number of them that move."""
     stages: tyro.conf.FlagConversionOff[bool] = True
     """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
-    """Without the scene's own."""
+    """Leave out the scene's own."""
 
 
 def command(arguments: Sequence[str]) -> int:
@@ -72,7 +69,7 @@ def _timed(settings: TimedSettings, ticks: list[tuple[float, ...]]) -> object:
         assembled = assemble(*arguments, **others)  # type: ignore[arg-type]
         core = assembled.core
         if settings.objects or settings.only:
-            core._camera = CrowdedCamera(core._camera, Crowd(settings.objects, settings.moving), only=settings.only)
+            core._camera = CrowdedCamera(core._camera, settings.objects, only=settings.only)
         took_s = np.zeros(len(STAGES))
         for stage, (part, name) in enumerate(_PLACES):
             if settings.stages or STAGES[stage] in AWAY:

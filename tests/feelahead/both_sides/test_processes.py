@@ -5,13 +5,19 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from common.errors import ConfigurationError
+from common.sockets.authentication import make_key_pair
+from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
+from robot_side.main import KEYS_PERIOD_S
+from robot_side.operators.safety import SafetySettings
 
 pytestmark = pytest.mark.processes
 
@@ -27,12 +33,18 @@ def demo(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def wait_for_link(side: SideProcess) -> dict[str, Any]:
+def wait_until(side: SideProcess, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the side's first status from now on for which `condition` holds."""
+    side.events()
     for _ in range(5000):
         status = side.wait_for("status", LIMIT_S)
-        if status.get("link") == "up":
+        if condition(status):
             return status
-    return pytest.fail("the link never came up")
+    return pytest.fail(f"the last status of the {side.name} side is {status}")
+
+
+def wait_for_link(side: SideProcess) -> dict[str, Any]:
+    return wait_until(side, lambda status: status.get("link") == "up")
 
 
 def robot(*arguments: str) -> SideProcess:
@@ -100,6 +112,52 @@ def test_a_killed_operator_is_noticed_and_another_one_takes_over() -> None:
         with operator(listening) as second:
             assert wait_for_link(second)["state"] == "disarmed"
         robot_side.check()
+
+
+@pytest.mark.parametrize("name", ["operator", "robot"])
+def test_a_side_that_stood_still_disarms_and_what_was_held_back_is_discarded(tmp_path: Path, name: str) -> None:
+    """SIGSTOP in full motion, then SIGCONT: armed again only after a healthy second, and by nothing that is old."""
+    path = tmp_path / "robot.json"
+    with robot(f"--summary={path}") as robot_side:
+        with operator(robot_side.wait_for("listening", LIMIT_S)) as operator_side:
+            wait_until(robot_side, lambda status: status["state"] == "armed" and (status["R2_pulled"] or 0.0) > 0.05)
+            process = robot_side.process_id if name == "robot" else operator_side.process_id
+            os.kill(process, signal.SIGSTOP)
+            time.sleep(2.0)
+            os.kill(process, signal.SIGCONT)
+            resumed_s = time.monotonic()
+            stopped = wait_until(robot_side, lambda status: status["state"] != "armed")
+            assert str(stopped["stopped_because"]).startswith(("no command for", "nothing heard for the lease limit"))
+            wait_until(robot_side, lambda status: status["state"] == "armed")
+            assert time.monotonic() - resumed_s > SafetySettings().healthy_s
+        assert robot_side.stop(LIMIT_S) == 0
+    if name == "robot":  # by its age, or because its lease has ended meanwhile
+        lease = json.loads(path.read_text())["lease"]
+        assert lease["discarded_by_age"] + lease["commands_of_non_owners"] > 0
+
+
+def test_an_unknown_key_moves_nothing_and_a_revoked_one_is_thrown_out(tmp_path: Path) -> None:
+    assert KEYS_PERIOD_S <= 0.5  # out within a second
+    folder, theirs, path = KeyFolder(tmp_path / "robot"), KeyFolder(tmp_path / "anna"), tmp_path / "robot.json"
+    (robot_key, robot_secret), (anna_key, anna_secret) = make_key_pair(), make_key_pair()
+    folder.write_pair("robot", robot_key, robot_secret)
+    theirs.write_pair("operator", anna_key, anna_secret)
+    moved: list[int] = []
+    for allowed in (False, True):
+        with robot(f"--keys={folder.path}", f"--summary={path}") as robot_side:
+            listening = robot_side.wait_for("listening", LIMIT_S)
+            with operator(listening, f"--keys={theirs.path}", f"--robot-key={robot_key}") as operator_side:
+                if allowed:
+                    wait_for_link(operator_side)
+                    folder.revoke("anna")
+                wait_until(operator_side, lambda status: f"feelahead keys allow NAME {anna_key}" in status["link"])
+                assert [operator_side.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5)] == [False] * 5
+            assert robot_side.stop(LIMIT_S) == 0
+        figures = json.loads(path.read_text())
+        assert figures["strangers"]["refused"] > 0
+        moved.append(figures["messages"]["motion_received"])
+        folder.allow("anna", anna_key)
+    assert moved[0] == 0 < moved[1]
 
 
 def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:

@@ -1,4 +1,4 @@
-"""The router without any network: the cable that it finds, and what it tells the kernel."""
+"""The router without any network: the cable that it finds, and its words for the kernel."""
 
 import re
 from collections.abc import Mapping
@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec
 from feelahead.containers.cable import Cable, End, find_cable
 from feelahead.containers.netem import BeyondNetemError, Counted, count_packets, netem_words
@@ -50,7 +49,7 @@ def test_the_robots_end_is_the_one_that_reaches_it(order: int) -> None:
 
 @pytest.mark.parametrize("sides", [[], SIDES[:1], SIDES[1:], [SIDES[1], interface("eth0", 5)]])
 def test_half_a_cable_is_none(sides: list[dict[str, Any]]) -> None:
-    """As while a network is taken away, or before an address is there."""
+    """A network is being taken away, or has no address yet."""
     assert find_cable([LO, *sides], ROBOT) is None
 
 
@@ -78,16 +77,17 @@ def test_the_rules_pass_on_the_two_ports_only() -> None:
     assert rules.count("{ 5555, 5556 }") == 2
 
 
-def test_each_direction_gets_its_own_words() -> None:
-    said = words("to_robot: delay 20ms; to_operator: delay 50ms 10ms distribution normal loss 1% limit 2000")
-    assert said["to_robot"] == "delay 20ms"
-    assert LinkProfile.parse(said["to_operator"]) == LinkProfile.parse(
-        "delay 50ms 10ms distribution normal loss 1% limit 2000"
-    )
-
-
-def test_nothing_asked_for_is_no_delay() -> None:
-    assert words("") == {"to_robot": "delay 0ms", "to_operator": "delay 0ms"}
+@pytest.mark.parametrize(
+    ("spec", "to_robot", "to_operator"),
+    [
+        ("to_robot: delay 20ms; to_operator: delay 50ms loss 1%", "delay 20ms", "delay 50ms loss 1%"),
+        ("", "delay 0ms", "delay 0ms"),
+        # Nothing sends video here, and what is not sent needs no netem.
+        ("delay 5ms; video: rate 2mbit", "delay 5ms", "delay 5ms"),
+    ],
+)
+def test_each_direction_gets_its_own_words(spec: str, to_robot: str, to_operator: str) -> None:
+    assert words(spec) == {"to_robot": to_robot, "to_operator": to_operator}
 
 
 @pytest.mark.parametrize(
@@ -104,20 +104,12 @@ def test_what_netem_cannot_do_is_left_to_the_sides(spec: str, why: str) -> None:
         words(spec)
 
 
-def test_a_clause_of_video_changes_nothing() -> None:
-    """Nothing sends video yet, and what is not sent needs no netem."""
-    assert words("delay 5ms; video: rate 2mbit")["to_operator"] == "delay 5ms"
-
-
 def test_the_share_that_was_lost_is_of_what_came_since() -> None:
     assert Counted(990, 10).lost_share_since(Counted(0, 0)) == 0.01
     assert Counted(1089, 11).lost_share_since(Counted(990, 10)) == 0.01
-    assert Counted(990, 10).lost_share_since(Counted(990, 10)) is None
-
-
-def test_what_was_set_up_anew_meanwhile_tells_nothing() -> None:
-    assert Counted(5, 0).lost_share_since(Counted(990, 0)) is None
-    assert Counted(2000, 0).lost_share_since(Counted(990, 10)) is None
+    # Nothing came, or it was set up again meanwhile.
+    for now, before in (((990, 10), (990, 10)), ((5, 0), (990, 0)), ((2000, 0), (990, 10))):
+        assert Counted(*now).lost_share_since(Counted(*before)) is None
 
 
 def test_the_locks_of_the_images_are_parts_of_the_lock() -> None:

@@ -1,22 +1,117 @@
-"""Two machines on a cable for tests, which are skipped where the system grants none."""
+"""Two machines on a cable, as far as the network goes: a namespace each, and a virtual Ethernet link between them.
+
+Needs root and iproute2's `ip`: tests are skipped without.
+"""
 
 import contextlib
+import os
+import shutil
+import subprocess
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
-from feelahead.lab.faults import two_machines as cable
-from feelahead.lab.faults.two_machines import Machine, NotPermittedError
+_PREFIX_BITS = 24
+_FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
+"""Folders of the namespaces, and of the files that `ip` puts into their places in each."""
 
-__all__ = ["Machine", "two_machines"]
+
+@dataclass
+class Machine:
+    """One of the two."""
+
+    namespace: str
+    device: str
+    """The machine's end of the cable."""
+    address: str
+
+    @property
+    def surroundings(self) -> list[str]:
+        """The command that runs a program there."""
+        return ["ip", "netns", "exec", self.namespace]
+
+    @property
+    def own_files(self) -> Path:
+        """The folder whose files replace those of /etc for programs that start there afterwards."""
+        return Path("/etc/netns") / self.namespace
+
+    def unplug(self) -> None:
+        """Pull the cable out: neither end has a carrier any more."""
+        self.set_link("down")
+
+    def plug_in(self) -> None:
+        """Plug it in again."""
+        self.set_link("up")
+
+    def set_link(self, *words: str) -> None:
+        """Run `ip link set DEVICE`."""
+        _ip("-n", self.namespace, "link", "set", self.device, *words)
+
+    def readdress(self, address: str) -> None:
+        """Another address instead of the present one, as a new lease of DHCP brings it."""
+        _ip("-n", self.namespace, "address", "flush", "dev", self.device)
+        self.address = address
+        _ip("-n", self.namespace, "address", "add", f"{address}/{_PREFIX_BITS}", "dev", self.device)
 
 
 @contextlib.contextmanager
-def two_machines(*addresses: str) -> Iterator[tuple[Machine, Machine]]:
-    """Yield the robot's and the operator's machine; skip the test where they cannot be had."""
-    with contextlib.ExitStack() as stack:
+def two_machines(robot: str = "198.18.0.1", operator: str = "198.18.0.2") -> Iterator[tuple[Machine, Machine]]:
+    """Yield the robot's and the operator's, with these addresses; skip the test where they cannot be had."""
+    if shutil.which("ip") is None or os.geteuid() != 0:
+        pytest.skip("network namespaces need root and iproute2 (apt install iproute2)")
+    machines = one, other = (
+        Machine(f"feelahead-robot-{os.getpid()}", "robot0", robot),
+        Machine(f"feelahead-operator-{os.getpid()}", "operator0", operator),
+    )
+    try:
+        _delete_left_behind()
         try:
-            machines = stack.enter_context(cable.two_machines(*addresses))
-        except NotPermittedError as error:
+            _connect(*machines)
+        except AssertionError as error:
             pytest.skip(str(error))
-        yield machines
+        yield one, other
+    finally:
+        for machine in machines:
+            _delete(machine.namespace)
+
+
+def _connect(one: Machine, other: Machine) -> None:
+    for machine in (one, other):
+        _ip("netns", "add", machine.namespace)
+    _ip("-n", one.namespace, "link", "add", one.device, "type", "veth", "peer", "name", other.device)
+    _ip("-n", one.namespace, "link", "set", other.device, "netns", other.namespace)
+    for machine in (one, other):
+        machine.readdress(machine.address)
+        machine.plug_in()
+        _ip("-n", machine.namespace, "link", "set", "lo", "up")
+
+
+def _delete_left_behind() -> None:
+    """Delete namespaces of runs that were killed: the names end with a process that is no more."""
+    for folder in _FOLDERS:
+        for left in folder.glob("feelahead-*-*"):
+            owner = left.name.rpartition("-")[2]
+            if owner.isdigit() and not Path("/proc", owner).exists():
+                _delete(left.name)
+
+
+def _delete(namespace: str) -> None:
+    _run_ip("netns", "del", namespace)
+    for files in Path("/etc/netns").glob(namespace):
+        shutil.rmtree(files, ignore_errors=True)
+        with contextlib.suppress(OSError):  # others have theirs there
+            files.parent.rmdir()
+
+
+def _ip(*arguments: str) -> None:
+    """AssertionError when it fails."""
+    failed = _run_ip(*arguments)
+    assert failed is None, failed
+
+
+def _run_ip(*arguments: str) -> str | None:
+    """Why it failed; None when it did not."""
+    done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
+    return None if done.returncode == 0 else f"ip {' '.join(arguments)}: {done.stderr.strip()}"

@@ -3,32 +3,29 @@
 import math
 import random
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 from common.protocol.codec import encode
-from feelahead.lab.faults.fault import Outcome, virtual
-from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
+from feelahead.lab.faults.fault import Outcome, fault
+from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, cruising
 
 T_S = QUICK.safety.gap_s
 _AGE_LIMIT_S = QUICK.safety.age_s + QUICK.safety.jitter_s
 _RESTING_RAD_S = 0.005
-_STEADY_DELAY_S = 0.5
 
 
-@virtual("stream stops", "decelerate from the measured state, hold; explicit re-arm", "deceleration from T to T + 5 ms")
+@fault("stream stops", "decelerate from the measured state, hold; explicit re-arm", "deceleration from T to T + 5 ms")
 def stream_stops() -> Outcome:
     """Kill -9, a half-open connection and a pulled cable all look like this from within."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     accepted_s = bench.now_s - 3 * TICK_S  # the last of the commands, one each four ticks
     bench.silence(T_S + 0.3)
     speeds = dict(bench.arm.speeds_rad_s)
     before, at_limit = (
         speeds[min(speeds, key=lambda when_s: abs(when_s - at_s))] for at_s in (accepted_s, accepted_s + T_S)
     )
-    onsets_s = [one.after_s for one in bench.arm.decelerations]
+    onsets_s = bench.arm.decelerations_s()
     stood = bench.speed_rad_s < _RESTING_RAD_S
     told = bench.arm.told_to_move
     bench.drive(0.3, operator, r2=CRUISE)
@@ -41,44 +38,44 @@ def stream_stops() -> Outcome:
     )
 
 
-@virtual("nobody ticks", "the arm stops by its own valid_until", "deceleration from T to T + 5 ms")
+@fault("nobody ticks", "the arm stops by its own valid_until", "deceleration from T to T + 5 ms")
 def ticks_stop() -> Outcome:
     """The second line of defence: nobody ticks any more, and the arm goes on by itself for a second."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, _ = cruising()
     start_s = bench.now_s
     for millisecond in range(1, 1001):
         bench.arm.state(start_s + millisecond * TICK_S)
-    onsets_s = [one.after_s for one in bench.arm.decelerations]
+    onsets_s = bench.arm.decelerations_s()
     safe = _begins_at_limit(onsets_s) and bench.speed_rad_s < _RESTING_RAD_S
     return Outcome(safe, f"deceleration at {_milliseconds(onsets_s)}; then it stands")
 
 
-@virtual("gap shorter than T", "hold the last command", "no deceleration before T")
+@fault("gap shorter than T", "hold the last command", "no deceleration before T")
 def short_gap() -> Outcome:
     """Gaps up to T, one after the other."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     least = math.inf
     for gap_ms in (50, 90, 99):
         before = bench.speed_rad_s
         bench.silence(1e-3 * gap_ms - TICK_S)
         least = min(least, bench.speed_rad_s / before)
         bench.drive(0.03, operator, r2=CRUISE)
-    safe = not bench.arm.decelerations and bench.state == "armed" and least > 0.98
-    return Outcome(safe, f"{len(bench.arm.decelerations)} decelerations; least speed {100.0 * least:.1f} %")
+    slowed = len(bench.arm.decelerations_s())
+    safe = not slowed and bench.state == "armed" and least > 0.98
+    return Outcome(safe, f"{slowed} decelerations; least speed {100.0 * least:.1f} %")
 
 
-@virtual("backlog after a pause", "discarded by age", "0 applied older than 100 ms + jitter")
+@fault("backlog after a pause", "discarded by age", "0 applied older than 100 ms + jitter")
 def backlog() -> Outcome:
     """A queue that grows under the stream; then a pause of two seconds, and all that was held back at once."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
-    # Half a millisecond more for each millisecond, up to 600 ms.
-    _drive_late(bench, operator, 1.2, lambda step: 0.5e-3 * step)
+    bench, operator = cruising()
+    under_way: deque[tuple[float, bytes]] = deque()
+    for step in range(1200):
+        bench.tick()
+        if step % 4 == 0:  # half a millisecond later for each millisecond, up to 600 ms
+            under_way.append((bench.now_s + 0.5e-3 * step, operator.command(bench.now_s, r2=CRUISE)))
+        while under_way and under_way[0][0] <= bench.now_s:
+            bench.robot.receive(operator.peer, under_way.popleft()[1], bench.now_s)
     bench.silence(0.2)
     bench.cruise(operator)
     held = []
@@ -95,15 +92,13 @@ def backlog() -> Outcome:
     return Outcome(safe, f"{old} applied, {bench.robot.session.safety.discarded_by_age} discarded by age")
 
 
-@virtual("robot side stopped and resumed", "disarmed", "0 old commands applied")
+@fault("robot side stopped and resumed", "disarmed", "0 old commands applied")
 def robot_stopped() -> Outcome:
     """The robot side neither ticks nor receives for a while; then all that came meanwhile is there at once."""
     measured, safe = [], True
     # Within the lease and beyond it.
     for pause_s in (0.5, 2.0):
-        bench = Bench()
-        operator = bench.join(2)
-        bench.cruise(operator)
+        bench, operator = cruising()
         last = operator.link.stamp(bench.now_s).sequence
         held = []
         for step in range(round(pause_s / TICK_S)):
@@ -120,12 +115,10 @@ def robot_stopped() -> Outcome:
     return Outcome(safe, ", ".join(measured))
 
 
-@virtual("replay, duplicate, reorder", "(epoch, sequence) strictly increasing", "0 applied")
+@fault("replay, duplicate, reorder", "(epoch, sequence) strictly increasing", "0 applied")
 def replay() -> Outcome:
     """Everything that the owner sends comes twice, in any order within a window, and once more from elsewhere."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     generator = random.Random(1)  # noqa: S311
     recorded: list[bytes] = []
     window: deque[bytes] = deque()
@@ -156,20 +149,18 @@ def replay() -> Outcome:
     return Outcome(safe, f"{back} of {len(order)} applied twice or late; the replay kept no lease: {gone}")
 
 
-@virtual("steady 500 ms each way", "the arm moves normally", "speed within 2 %")
+@fault("steady 500 ms each way", "the arm moves normally", "speed within 2 %")
 def steady_delay() -> Outcome:
     """500 ms each way; not a fault at all."""
-    speeds = [_mean_speed(delay_s) for delay_s in (0.0, _STEADY_DELAY_S)]
+    speeds = [_mean_speed(delay_s) for delay_s in (0.0, 0.5)]
     ratio = speeds[1] / speeds[0]
     return Outcome(0.98 < ratio < 1.02, f"speed {100.0 * ratio:.1f} % of that without delay, no stop")
 
 
-@virtual("answers no longer arrive", "disarmed at max_delay", "2 s")
+@fault("answers no longer arrive", "disarmed at max_delay", "2 s")
 def old_loop() -> Outcome:
     """The way back breaks off, so that the operator echoes the same stamp for ever."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     bench.operators.clear()
     start_s = bench.now_s
     bench.drive(2.3, operator, r2=CRUISE)
@@ -200,20 +191,8 @@ def _mean_speed(delay_s: float) -> float:
             bench.robot.receive(operator.peer, there.popleft()[1], bench.now_s)
     if bench.robot.session.safety.stops or bench.state != "armed":
         return 0.0
-    last_s = bench.now_s
-    steady = [speed for when_s, speed in bench.arm.speeds_rad_s if speed > _RESTING_RAD_S and when_s < last_s]
+    steady = [speed for _, speed in bench.arm.speeds_rad_s if speed > _RESTING_RAD_S]
     return sum(steady[100:400]) / 300
-
-
-def _drive_late(bench: Bench, operator: Operator, duration_s: float, lateness_s: Callable[[int], float]) -> None:
-    """Hold R2 evenly, each command under way for a time that depends on the millisecond of sending."""
-    under_way: deque[tuple[float, bytes]] = deque()
-    for step in range(round(duration_s / TICK_S)):
-        bench.tick()
-        if step % 4 == 0:
-            under_way.append((bench.now_s + lateness_s(step), operator.command(bench.now_s, r2=CRUISE)))
-        while under_way and under_way[0][0] <= bench.now_s:
-            bench.robot.receive(operator.peer, under_way.popleft()[1], bench.now_s)
 
 
 def _begins_at_limit(onsets_s: Sequence[float]) -> bool:

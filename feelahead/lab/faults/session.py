@@ -7,14 +7,12 @@ from typing import Any
 from unittest import mock
 
 import msgpack
-import msgspec
 import numpy as np
 
 from common.protocol.codec import decode, encode
-from common.protocol.messages import Header
 from common.protocol.session import SessionState
-from feelahead.lab.faults.fault import Outcome, virtual
-from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Bench, Operator
+from feelahead.lab.faults.fault import Outcome, fault
+from feelahead.lab.faults.session_bench import CRUISE, QUICK, TICK_S, Operator, cruising
 from robot_side.operators.lease import MOST_AWAY, MOST_OBSERVERS
 
 _LEASE_S = QUICK.safety.lease_s
@@ -22,12 +20,10 @@ _HOUR_S = 3600.0
 _WALL_CLOCK_S = 1.8e9
 
 
-@virtual("operator restarts", "new epoch, disarmed", "step at most one tick of the speed limit")
+@fault("operator restarts", "new epoch, disarmed", "step at most one tick of the speed limit")
 def operator_restarts() -> Outcome:
     """Killed in full motion; its successor pulls R2 from the start, over the same connection."""
-    bench = Bench()
-    old = bench.join(2)
-    bench.cruise(old)
+    bench, old = cruising()
     before = np.array([speed for _, speed in bench.arm.speeds_rad_s])
     largest_step = float(np.abs(np.diff(before)).max())
     new = bench.join(3)
@@ -37,7 +33,7 @@ def operator_restarts() -> Outcome:
     # What the old one had sent comes late.
     bench.send(old, r2=1.0)
     bench.tick(5)
-    after = np.array([speed for _, speed in list(bench.arm.speeds_rad_s)[start:]])
+    after = np.array([speed for _, speed in bench.arm.speeds_rad_s[start:]])
     moved = 3 in bench.moved_by or float(after[50:].max()) > 0.005
     step = float(np.abs(np.diff(after)).max())
     bench.say_hello(old)
@@ -48,14 +44,10 @@ def operator_restarts() -> Outcome:
     return Outcome(safe, f"disarmed, moved by the new epoch: {moved}; largest change of speed {step:.4f} rad/s a tick")
 
 
-@virtual(
-    "two operators", "a lease; others observe", "0 commands from a non-owner; a dead owner's lease ends within 1 s"
-)
+@fault("two operators", "a lease; others observe", "0 commands from a non-owner; a dead owner's lease ends within 1 s")
 def two_operators() -> Outcome:
     """The second one sends whatever could work: no token, the owner's, tokens to come; and stops, and presses."""
-    bench = Bench()
-    owner = bench.join(2)
-    bench.cruise(owner)
+    bench, owner = cruising()
     other = bench.join(3, b"other")
     for step in range(400):
         bench.tick()
@@ -84,113 +76,12 @@ def two_operators() -> Outcome:
     )
 
 
-@virtual("lease handed over", "disarmed, under a new token", "0 commands under the old token")
-def hand_over() -> Outcome:
-    """The create button in full motion; both keep their triggers pulled and press to arm at once."""
-    bench = Bench()
-    owner = bench.join(2)
-    other = bench.join(3, b"other")
-    third = bench.join(4, b"third")
-    bench.cruise(owner)
-    token = owner.token
-    late = owner.command(bench.now_s, r2=1.0)
-    bench.send(owner, r2=CRUISE, hand_over=True)
-    bench.tick(2)
-    passed = (owner.state, other.state, third.state) == (
-        SessionState.OBSERVING,
-        SessionState.DISARMED,
-        SessionState.OBSERVING,
-    )
-    disarmed = bench.state == "disarmed" and other.token > token
-    bench.drive(0.2, other, r2=CRUISE, arm=True)
-    bench.send(owner, r2=CRUISE, token=token)
-    bench.send(owner, r2=CRUISE, token=other.token)
-    bench.tick(5)
-    still = bench.moved_by == {2} and bench.state == "disarmed"
-    bench.cruise(other)
-    # Back to the first by way of the third; a command of its first lease comes only now.
-    bench.send(other, hand_over=True)
-    bench.tick(2)
-    bench.send(third)
-    bench.send(third, hand_over=True)
-    bench.tick(2)
-    counted = bench.robot.session.not_owners
-    bench.robot.receive(owner.peer, _renumbered(late, owner, bench.now_s), bench.now_s)
-    fenced = owner.state is SessionState.DISARMED and bench.robot.session.not_owners == counted + 1
-    safe = passed and disarmed and still and fenced and bench.moved_by == {2, 3}
-    return Outcome(safe, f"to who waited longest, disarmed; the old token's command refused: {fenced}")
-
-
-def _renumbered(payload: bytes, operator: Operator, now_s: float) -> bytes:
-    """Give the command a newer sequence number, so that nothing but its token tells that it is old."""
-    return encode(msgspec.structs.replace(decode(payload), header=operator.link.stamp(now_s)))
-
-
-@virtual("arming too early, pulled, blind", "disarmed until healthy", "never armed")
-def wrong_arming() -> Outcome:
-    """The arming button in every way that must not arm, each for longer than the healthy second."""
-    bench = Bench()
-    operator = bench.join(2)
-    healthy_s = QUICK.safety.healthy_s
-    bench.drive(healthy_s - 0.02, operator)
-    bench.drive(0.012, operator, arm=True)
-    early = bench.state
-    bench.drive(2.0 * healthy_s, operator, arm=True)
-    held = bench.state
-    bench.drive(2.0 * healthy_s, operator, r2=CRUISE)
-    bench.drive(0.02, operator, r2=CRUISE, arm=True)
-    pulled = bench.state
-    silent = bench.join(3, b"without echoes")
-    bench.silence(_LEASE_S + 0.1)
-    bench.say_hello(silent)
-    bench.tick()
-    for step in range(round(2e3 * healthy_s)):
-        bench.tick()
-        if step % 4 == 0:
-            stamp = silent.link.stamp(bench.now_s)
-            header = Header(stamp.epoch, stamp.sequence, stamp.sent_s)
-            bench.send(silent, header=header, arm=step > 1.5e3 * healthy_s)
-    unknown = bench.state
-    bench.cruise(silent)
-    states = [early, held, pulled, unknown]
-    safe = all(state == "disarmed" for state in states)
-    return Outcome(safe, f"too early {early}, held all along {held}, pulled {pulled}, loop age unknown {unknown}")
-
-
-@virtual("owner comes back", "owner or observer, disarmed", "never armed")
-def comes_back() -> Outcome:
-    """A break shorter than the lease, then a longer one, then one in which somebody else came."""
-    bench = Bench()
-    owner = bench.join(2)
-    bench.cruise(owner)
-    token = owner.token
-    bench.silence(_LEASE_S - 0.1)
-    bench.send(owner)
-    bench.tick(5)
-    resumed = owner.state is SessionState.DISARMED and owner.token == token
-    bench.silence(_LEASE_S + 0.1)
-    free = bench.robot.session.lease.owner is None
-    bench.send(owner, r2=1.0)
-    bench.tick(60)
-    renewed = owner.state is SessionState.DISARMED and owner.token > token
-    bench.silence(_LEASE_S + 0.1)
-    other = bench.join(3, b"other")
-    bench.send(owner, r2=1.0)
-    bench.tick(60)
-    observes = owner.state is SessionState.OBSERVING and other.state is SessionState.DISARMED
-    bench.cruise(other)
-    safe = resumed and free and renewed and observes
-    return Outcome(safe, "owner; later owner under a new token; at last observer: disarmed each time")
-
-
-@virtual("wall clock jumps an hour", "no effect", "0 trips")
+@fault("wall clock jumps an hour", "no effect", "0 trips")
 def wall_clock_jumps() -> Outcome:
     """The wall clock runs an hour ahead, then an hour back, in the middle of the motion."""
     traces = []
     for jump_s in (0.0, _HOUR_S, -_HOUR_S):
-        bench = Bench()
-        operator = bench.join(2)
-        bench.cruise(operator)
+        bench, operator = cruising()
         shown_s = _WALL_CLOCK_S + jump_s
         with mock.patch("time.time", lambda shown_s=shown_s: shown_s):
             bench.drive(0.2, operator, r2=CRUISE)
@@ -202,12 +93,10 @@ def wall_clock_jumps() -> Outcome:
     )
 
 
-@virtual("NaN, inf, wrong size, out of range", "the whole message rejected and counted", "0 reach the controller")
+@fault("NaN, inf, wrong size, out of range", "the whole message rejected and counted", "0 reach the controller")
 def bad_messages() -> Outcome:
     """A good command with one part replaced, as it would come over the wire."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     before = bench.robot.session.rejected
     accepted = set(bench.applied)
     spoilt = list(_spoilt_parts())
@@ -253,12 +142,10 @@ def _spoil(payload: bytes, place: tuple[int, ...], value: Any) -> bytes:
     return bytes(msgpack.packb([version, content]))
 
 
-@virtual("emergency stop", "stopped until armed again, by anybody", "0 commands applied")
+@fault("emergency stop", "stopped until armed again, by anybody", "0 commands applied")
 def emergency_stop() -> Outcome:
     """Pressed once in full motion; the operator goes on pulling, leaves, and another one comes."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     bench.send(operator, r2=CRUISE, emergency_stop=True)
     told = bench.arm.told_to_move
     bench.drive(0.5, operator, r2=CRUISE)
@@ -272,12 +159,10 @@ def emergency_stop() -> Outcome:
     return Outcome(stopped and latched, "stopped at once; latched until the next operator armed")
 
 
-@virtual("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded")
+@fault("reconnect storm, 50/s", "control unaffected", "no stop; memory bounded")
 def reconnect_storm() -> Outcome:
     """50 strangers a second for four seconds, each with another epoch, while the owner drives."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
+    bench, operator = cruising()
     known = 0
     for step in range(4000):
         bench.tick()
