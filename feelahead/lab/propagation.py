@@ -121,7 +121,7 @@ def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray
     def share_along(configuration: FloatArray) -> float:
         pose = gripper.at(configuration)
         jacobian = pose.tool_jacobian[:3]
-        return linear_sd_m(jacobian, 1.0, pose.tool_rotation[:, 2]) ** 2 / np.linalg.norm(jacobian, 2) ** 2
+        return linear_sd_m(jacobian, 1.0, pose.tool_rotation[:, 2]) / float(np.linalg.norm(jacobian, 2))
 
     found = {"home": gripper.home_rad}
     found |= {f"random {number}": row for number, row in enumerate(gripper.drawn(count, seed, 1), 1)}

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from common.arrays import FloatArray
-from common.reaction import HORIZON_S, REACTION_S
+from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, FieldLaw, make_law
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, lateness_s, stood
@@ -40,7 +40,6 @@ LINKS: Final = {
 """Each way."""
 _ALARM_APPROACHES: Final = 10
 """False alarms are looked for in this many approaches where a contact is ahead, in all where none is."""
-_MOVING_M_S: Final = 0.01
 _RESAMPLED: Final = 2000
 _LEAST_APPROACHES: Final = 10
 """A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
@@ -138,16 +137,14 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
         scene = _scene(cell.scene)
         encoder = EncoderSettings(sigma_rad=cell.encoder_factor * EncoderSettings().sigma_rad)
         staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
-        margin_m = mean_way_m([one.replay for one in staged]) if "margin" in pulls.laws else None
         for probability in pulls.probabilities:
             for name in pulls.laws:
-                counts, law = _Counts(), make_law(name, probability, margin_m, pulls.spoil)
+                counts, law = _Counts(), make_law(name, probability, pulls.spoil)
                 _count_covered(counts, law, cell, staged, probability)
                 _count_alarms(counts, law, cell, staged, probability)
-                row: Row = {"kind": "cell", "cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
+                row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
                 row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
-                row |= {"law": name, "probability": probability} | _figures(counts, staged, probability)
-                yield row | {"margin_mm": None if margin_m is None else 1e3 * margin_m}
+                yield row | {"law": name, "probability": probability} | _figures(counts, staged, probability)
 
 
 @cache
@@ -206,19 +203,6 @@ def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence
             counts.alarms += alarms.count
             counts.alarm_s += alarms.alarm_s
             counts.judged_s += alarms.judged_s
-
-
-def mean_way_m(replays: Sequence[Replay]) -> float:
-    """Average the distance at which the law swept is felt while the tool moves: v (t_d + h) + v²/2a."""
-    found = []
-    for replay in replays:
-        record = replay.record
-        for row in range(0, len(record.pose_time_s), 5):
-            speed = abs(replay.approach_speed_m_s[row])
-            if speed > _MOVING_M_S:
-                braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(float(record.pose_time_s[row])))
-                found.append(speed * (float(record.loop_age_s[row]) + HORIZON_S) + braking_m)
-    return float(np.mean(found)) if found else 0.0
 
 
 def draws_needed(probability: float) -> int:

@@ -10,7 +10,6 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import Header, StiffnessUpdate
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.lab.approaches.margin_law import MarginLaw
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
@@ -94,8 +93,6 @@ class Pipeline:
 
     law: Law
     probability: float
-    margin_m: float | None = None
-    """The distance of the law `margin`."""
     spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
@@ -124,8 +121,7 @@ class Pipeline:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
-        law: RobotLaw = PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
-        return MarginLaw(law, self.margin_m or 0.0) if self.law == "margin" else law
+        return PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
 
     def _situation(self, draw: Draw, row: int) -> Situation:
         replay, record = draw.replay, draw.replay.record
@@ -174,8 +170,8 @@ def _message(sensed: Sensed, row: int) -> StiffnessUpdate:
     )
 
 
-def make_law(law: Law, probability: float, margin_m: float | None = None, spoil: Spoil = "nothing") -> FieldLaw:
-    """Make `law` at P; margin_m is the distance of the law `margin` alone."""
+def make_law(law: Law, probability: float, spoil: Spoil = "nothing") -> FieldLaw:
+    """Make `law` at P."""
     if law in ("none", "full"):
         return Constant(MAX_STRENGTH if law == "full" else 0)
-    return Pipeline(law, probability, margin_m if law == "margin" else None, spoil)
+    return Pipeline(law, probability, spoil)
