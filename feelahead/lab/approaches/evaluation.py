@@ -14,7 +14,7 @@ from scipy.stats import bootstrap
 
 from common.arrays import FloatArray
 from common.reaction import REACTION_S
-from feelahead.lab.approaches.felt_by import Draw, FieldLaw, make_law
+from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, lateness_s, stood
 from feelahead.lab.approaches.laws import Law
@@ -24,6 +24,7 @@ from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
+from operator_side.dualsense.effects.official import MAX_STRENGTH
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.camera import CameraError
 from robot_side.simulation.posed_scene import PosedScene
@@ -139,9 +140,9 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
         staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
         for probability in pulls.probabilities:
             for name in pulls.laws:
-                counts, law = _Counts(), make_law(name, probability, pulls.spoil)
-                _count_covered(counts, law, cell, staged, probability)
-                _count_alarms(counts, law, cell, staged, probability)
+                counts, law = _Counts(), Judged(name, probability, pulls.spoil)
+                _count_covered(counts, law, cell, staged)
+                _count_alarms(counts, law, cell, staged)
                 row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
                 row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
                 yield row | {"law": name, "probability": probability} | _figures(counts, staged, probability)
@@ -166,10 +167,10 @@ def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
     return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
 
 
-def _count_covered(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
     """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
     useful = [one for one in staged if one.avoidable]
-    least = math.ceil(draws_needed(probability) / max(1, len(useful)))
+    least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
     for one in useful:
         # Every place as often as any other, at each P.
         each = len(one.avoidable) * math.ceil(least / len(one.avoidable))
@@ -177,20 +178,21 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequenc
         for number in range(each):
             collision, last_release_s = one.avoidable[number % len(one.avoidable)]
             draw = one.draw(collision.shift_m, cell, number)
-            judged = stood(law, draw, last_release_s)
-            hits += judged.covered
+            strength = stood(law, draw, last_release_s)
+            covered = strength == MAX_STRENGTH
+            hits += covered
             if one.replay.knows_aside(last_release_s - REACTION_S):
                 counts.reported += 1
-                counts.reported_hits += judged.covered
-            counts.strength += judged.strength
+                counts.reported_hits += covered
+            counts.strength += strength
             if number < len(one.avoidable):
-                late_s = 0.0 if judged.covered else lateness_s(law, draw, last_release_s, collision.touch_s)
+                late_s = 0.0 if covered else lateness_s(law, draw, last_release_s, collision.touch_s)
                 counts.late_s.append(late_s)
         counts.hits.append(hits)
         counts.draws.append(each)
 
 
-def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
     passed = cell.scene in PASSED
     for one in staged if passed else staged[:_ALARM_APPROACHES]:
         places = [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
@@ -199,8 +201,8 @@ def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence
             touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
             places = [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
         for shift_m, until_s in places:
-            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s, probability)
-            counts.alarms += alarms.count
+            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s)
+            counts.alarms += alarms.number
             counts.alarm_s += alarms.alarm_s
             counts.judged_s += alarms.judged_s
 

@@ -48,7 +48,7 @@ def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
 SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
     f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)
 }
-"""Those that take long for each pair, by name."""
+"""Methods that take long for each pair, by name."""
 
 
 def _face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:

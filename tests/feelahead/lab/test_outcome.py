@@ -279,7 +279,7 @@ def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], cou
 def test_the_gripper_stands_when_it_has_been_slow_for_a_second(last_m_s: list[float], *, standing: bool) -> None:
     speeds_m_s = [0.2] * 100 + last_m_s
     rows = len(speeds_m_s)
-    times_s, still = SAMPLE_S * np.arange(rows), np.zeros(rows)
+    times_s, still = np.linspace(0.0, SAMPLE_S * (rows - 1), rows), np.zeros(rows)
     trace = Trace(times_s, np.array(speeds_m_s), still, still, np.zeros((rows, 10), dtype=np.int64))
     assert stands(trace) is standing
 

@@ -144,6 +144,9 @@ def test_the_driver_reads_pairs_and_writes_volumes(tmp_path: Path, monkeypatch: 
         _, pairs = frozen_class(solid, "random", 5)
         pairs.radii[2] = 100.0
         corners = package_corners(pairs)
+        # In the package's order, right-handed.
+        sides = [corners[:, k] - corners[:, 0] for k in ((1, 2, 3) if solid == "tetrahedron" else (1, 3, 4))]
+        assert np.all(np.einsum("ni,ni->n", np.cross(sides[0], sides[1]), sides[2]) >= 0.0), solid
         expected = pairs.centers[:, 0] + 10 * pairs.radii + 100 * corners[:, 0, 1] + 1000 * corners[:, -1, 2]
         expected[2] = np.nan
         times_ns, volumes = peer.turn(pairs)
@@ -151,14 +154,6 @@ def test_the_driver_reads_pairs_and_writes_volumes(tmp_path: Path, monkeypatch: 
         assert (times_ns >= 0.0).all()
     header.write_text("#error this is not the header")
     assert CompiledHeader(header).missing.startswith("does not compile: ")
-
-
-def test_corners_for_the_package_are_in_its_order() -> None:
-    for solid, grid in (("box", False), ("box", True), ("tetrahedron", False)):
-        corners = package_corners(frozen_class(solid, "random", 20, grid=grid)[1])
-        second, third = (2, 3) if solid == "tetrahedron" else (3, 4)
-        sides = [corners[:, k] - corners[:, 0] for k in (1, second, third)]
-        assert np.all(np.einsum("ni,ni->n", np.cross(sides[0], sides[1]), sides[2]) >= 0.0), solid
 
 
 def test_what_takes_turns_counts_by_the_least_time_of_each_part() -> None:
