@@ -181,20 +181,6 @@ def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_ef
     assert strong.contact_speed_mm_s <= 40.0
 
 
-# Not onto it
-
-
-@approaches
-def test_who_does_not_pull_stops_where_they_are() -> None:
-    outcome = ended(force_n=0.0, duration_s=1.2)
-    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
-    assert outcome.stops_at_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.way_left_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.least_gap_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.reversals == 0
-    assert outcome.ended_s == pytest.approx(1.2)
-
-
 # The same again
 
 

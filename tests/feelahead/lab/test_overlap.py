@@ -14,7 +14,7 @@ import feelahead.main
 from common.arrays import FloatArray
 from common.clock import VirtualClock
 from common.errors import ConfigurationError
-from feelahead.lab.questions.overlap import OverlapSweep, goals
+from feelahead.lab.questions.overlap import HEADER, KERNEL, OURS, OverlapSweep, goals
 from feelahead.lab.reference import published
 from feelahead.lab.reference.approximations import monte_carlo, satellite_points, satellites
 from feelahead.lab.reference.classes import frozen_class
@@ -86,24 +86,14 @@ def test_goals_take_the_worst_class_and_the_ratio_to_the_package() -> None:
     def row(part: str, case: str, method: str = "ours", **figures: Any) -> Row:
         return {"part": part, "solid": "box", "case": case, "grid": False, "method": method, **figures}
 
-    counts: dict[str, Any] = {
-        "false_zeros": 0,
-        "negative": 1,
-        "undefined": 0,
-        "asymmetry": 0.0,
-        "shrinking": 0.0,
-        "pairs": 7,
-    }
+    counts: dict[str, Any] = dict.fromkeys(("false_zeros", "undefined", "asymmetry", "shrinking"), 0)
     rows = [
         row("accuracy", "random", volume=2e-16, direction=0.0),
         row("accuracy", "face depth 1e-6", volume=3e-15, direction=0.0, shallow=1e-8),
         row("accuracy", "face depth 1e-9", volume=0.0, direction=0.0, shallow=1.0),
-        *(row("adversarial", case, **counts) for case in ("random", "far away")),
-        row("speed", "random", "ours, checked", ns=100.0),
-        row("speed", "random", "ours, kernel", ns=50.0),
-        row("speed", "random", "overlap, C++", ns=1300.0),
-        row("mesh", "0.1", triangles=50.0, ns=1000.0),
-        row("mesh", "0.2", triangles=60.0, ns=9000.0),
+        *(row("adversarial", case, negative=1, pairs=7, **counts) for case in ("random", "far away")),
+        *(row("speed", "random", method, ns=ns) for method, ns in ((OURS, 100.0), (KERNEL, 50.0), (HEADER, 1300.0))),
+        *(row("mesh", "0.1", triangles=triangles, ns=20.0 * triangles) for triangles in (50.0, 60.0)),
     ]
     found = {goal.claim: (goal.value, goal.verdict) for goal in goals(OverlapSweep(), Table(rows))}
     assert found["worst error over every class, of the sphere"] == (3e-15, "missed")
