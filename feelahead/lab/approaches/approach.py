@@ -136,13 +136,13 @@ def robot_settings(approach: Approach) -> RobotSettings:
     )
 
 
-def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
+def run_approach(approach: Approach) -> Outcome:
     """Run it to its contact, or to its end; the same settings give the same outcome.
 
-    `pull` replaces R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
-    used; a robot that is not armed in time, or that touches before the pull, is an outcome that `failed`.
+    ConfigurationError for a model or a link that cannot be used; a robot that is not armed in time, or that touches
+    before the pull, is an outcome that `failed`.
     """
-    run = PullRun(approach, pull)
+    run = PullRun(approach)
     try:
         began_s = run.arm()
     except FeelaheadError as error:

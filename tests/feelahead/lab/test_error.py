@@ -150,8 +150,6 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
     poses = slice(0, None, 10)
     count = len(ticks[poses])
     return RecordedApproach(
-        pull="bell",
-        link="",
         seed=0,
         began_s=BEGAN_S,
         pose_time_s=ticks[poses],
