@@ -13,7 +13,6 @@ LAW_COLOURS: Final = {
     "swept": "#0072b2",
     "swept_robot": "#56b4e9",
     "paper": "#d55e00",
-    "margin": "#cc79a7",
     "none": "#777777",
     "full": "#009e73",
 }

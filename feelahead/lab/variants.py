@@ -1,24 +1,23 @@
-"""Look ahead as it is, and as one thing is set otherwise, over the same recorded ticks: costs, and ways apart."""
+"""The same recorded ticks, with the gripper covered by fewer spheres or more: what a look costs, and ways apart."""
 
 import math
 import time
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.protocol.messages import TriggerField
-from feelahead.lab.approaches.ticks import Recorded, with_cover, with_hulls
-from robot_side.ahead.law import Sensed, Situation
-from robot_side.ahead.looks import Looks
+from feelahead.lab.approaches.ticks import Recorded, with_cover
 from robot_side.ahead.scene_table import scene_table
-from robot_side.ahead.swept_law import SweptLaw
 from robot_side.compiled.warm_up import warm_up
 from robot_side.settings import RobotSettings
 
 COVER_M: Final = RobotSettings().cover_m
+COVERS_M: Final = (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)
+"""How far spheres may stand out of the gripper: fewer of them for more. The last is the finest."""
 WAYS: Final = tuple(
     f"{side} {kind} {strength}" for side in ("R2", "L2") for kind in ("fast", "slow") for strength in ("first", "full")
 )
@@ -30,22 +29,8 @@ _CHUNK: Final = 250
 
 
 @dataclass(frozen=True)
-class Variant:
-    """The look ahead, as it is but for what is given here."""
-
-    knob: str = "as it is"
-    value: str = ""
-    late_ticks: int = 0
-    """A look is felt by that many ticks later, shortened by what the tool has moved along since."""
-    cover_m: float = COVER_M
-    """The gripper's spheres stand out this far: fewer of them for more"""
-    hulls: bool = False
-    """Meshes count as their convex hulls, each object's as one."""
-
-
-@dataclass(frozen=True)
 class Replayed:
-    """One way of looking, over the ticks of one run."""
+    """One cover, over the ticks of one run."""
 
     took_us: FloatArray
     """(t,) processor time of the law, the least of all times that the tick was gone through"""
@@ -78,77 +63,35 @@ def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
     return {"mean": float(apart.mean()), "p95": float(np.quantile(np.abs(apart), 0.95)), **ends}
 
 
-def replay(recorded: Recorded, variants: list[Variant], times: int) -> list[Replayed]:
-    """Ask each variant the same ticks, in turns of a chunk, `times` times over."""
+def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Replayed]:
+    """Ask the law the same ticks with each cover, in turns of a chunk, `times` times over."""
     warm_up()
-    ticks = [with_cover(recorded, one.cover_m) if one.cover_m != COVER_M else recorded.ticks for one in variants]
-    ticks = [with_hulls(recorded) if one.hulls else own for one, own in zip(variants, ticks, strict=True)]
+    ticks = [with_cover(recorded, cover_m) if cover_m != COVER_M else recorded.ticks for cover_m in covers_m]
     count = len(recorded.ticks)
-    took_s, felt = np.full((len(variants), count), math.inf), np.empty((len(variants), count, len(WAYS) + 1))
-    looks = np.zeros(len(variants))
+    took_s, felt = np.full((len(ticks), count), math.inf), np.empty((len(ticks), count, len(WAYS) + 1))
     for _ in range(times):
-        laws = [LateLaw(recorded.new_law(), variant.late_ticks) for variant in variants]
+        laws = [recorded.new_law() for _ in ticks]
         for first in range(0, count, _CHUNK):
             for number, (law, own) in enumerate(zip(laws, ticks, strict=True)):
-                for place in range(first, min(first + _CHUNK, count)):
-                    tick = own[place]
-                    # A new frame is taken over equally often, however one looks.
+                for place, tick in enumerate(own[first : first + _CHUNK], first):
+                    # A new frame is taken over equally often, whatever the cover.
                     scene_table(tick.situation.objects)
                     began_s = time.thread_time()
                     sensed = law.sense(tick.situation, tick.now_s)
                     took_s[number, place] = min(took_s[number, place], time.thread_time() - began_s)
                     felt[number, place] = *_ends(sensed.r2), *_ends(sensed.l2), sensed.horizon_m
-        looks[:] = [law.law.ahead.counts.fields for law in laws]
     passed_s = recorded.ticks[-1].now_s - recorded.ticks[0].now_s
-    spheres = [len(own[0].situation.pose.sphere_radii_m) for own in ticks]
     return [
-        Replayed(1e6 * took_s[k], felt[k, :, :-1], felt[k, :, -1], spheres[k], float(looks[k]) / passed_s)
-        for k in range(len(variants))
+        Replayed(
+            took_us=1e6 * took_s[number],
+            ways_m=felt[number, :, :-1],
+            horizon_m=felt[number, :, -1],
+            spheres=len(own[0].situation.pose.sphere_radii_m),
+            looks_per_s=float(law.ahead.counts.fields) / passed_s,
+        )
+        for number, (law, own) in enumerate(zip(laws, ticks, strict=True))
     ]
 
 
 def _ends(felt: TriggerField) -> tuple[float, ...]:
     return felt.fast_m[0], felt.fast_m[-1], felt.slow_m[0], felt.slow_m[_FULL_SLOW]
-
-
-class LateLaw:
-    """A law, whose looks become known some ticks later."""
-
-    def __init__(self, law: SweptLaw, late_ticks: int) -> None:
-        self.law = law
-        self._late = _LateLooks(late_ticks) if late_ticks else None
-        if self._late is not None:
-            law.turns.looks = self._late
-
-    def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick."""
-        if self._late is not None:
-            self._late.tick()
-        return self.law.sense(situation, now_s)
-
-
-class _LateLooks(Looks):
-    """Takes looks in some ticks later; the very first look from a place at once."""
-
-    def __init__(self, ticks: int) -> None:
-        super().__init__()
-        self._ticks, self._now = ticks, 0
-        self._waiting: deque[tuple[int, int, int, float, tuple[Any, ...]]] = deque()
-
-    def add(self, side: int, place: int, now_s: float, *seen: Any) -> None:
-        """Take a look in, later."""
-        if self.looked_s[side][place] < 0.0:
-            super().add(side, place, now_s, *seen)
-            return
-        self.looked_s[side][place] = now_s
-        self._waiting.append((self._now + self._ticks, side, place, now_s, seen))
-
-    def tick(self) -> None:
-        """Let a tick pass."""
-        self._now += 1
-        while self._waiting and self._waiting[0][0] <= self._now:
-            _, side, place, then_s, seen = self._waiting.popleft()
-            if place < len(looked_s := self.looked_s[side]):
-                newest_s = looked_s[place]
-                super().add(side, place, then_s, *seen)
-                looked_s[place] = newest_s

@@ -65,8 +65,6 @@ class PullingHands:
         """`grip`: close the gripper first, and pull once it holds something."""
         self.phase: Phase = "rest"
         self.pull_began_s: float | None = None
-        self.let_go_s: float | None = None
-        """From then on nothing is pulled or deflected any more; None for never."""
         self._device = device
         self._pull = pull
         self._grips = grip
@@ -114,8 +112,7 @@ class PullingHands:
     def _follow_pull(self, now_s: float) -> None:
         if self.pull_began_s is None:
             self.pull_began_s = now_s
-        gone = self.let_go_s is not None and now_s >= self.let_go_s
-        hands = Hands() if gone else self._pull(now_s - self.pull_began_s)
+        hands = self._pull(now_s - self.pull_began_s)
         self._act(hands, Action.CLOSE_GRIPPER if self._grips else None)
 
     def _act(self, hands: Hands, action: Action | None = None) -> None:

@@ -94,23 +94,3 @@ class PosedScene:
 def let_through(scene: Scene) -> None:
     """Nothing touches anything from now on: the gripper goes through what stands in the way."""
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-
-
-def move_objects(scene: Scene, shift_m: FloatArray) -> None:
-    """Put every object `shift_m` (3,) from where the scene has it, before anything moves.
-
-    ValueError for an object that moves on joints.
-    """
-    model = scene.model
-    geoms = np.array([geom for thing in scene.objects for geom in thing.geoms], dtype=np.int64)
-    roots = np.unique(model.body_rootid[model.geom_bodyid[geoms]])
-    if model.body_dofnum[np.isin(model.body_rootid, roots[roots != 0])].any():
-        raise ValueError("scene: some of its objects move on joints; valid: objects that stand fixed")
-    model.body_pos[roots[roots != 0]] += shift_m
-    model.geom_pos[geoms[model.geom_bodyid[geoms] == 0]] += shift_m
-    model.geom_sameframe[geoms[model.geom_bodyid[geoms] == 0]] = 0
-    # MuJoCo's tree of a body's geoms was built where they stood, and would miss contacts with those that moved.
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-    # And where things may sleep it looks but once where those are that stand fixed.
-    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    mujoco.mj_forward(model, scene.data)

@@ -3,27 +3,21 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
-from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from common.protocol.messages import Vector2
-from common.reaction import REACTION_S
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.lab.approaches.margin_law import MarginLaw
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.lab.approaches.spoilt import Spoil, controller
 from operator_side.dualsense.effects.official import MAX_STRENGTH
-from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import Pull, PullingHands, constant_force
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.settings import Assist, CameraSettings, RobotSettings
-from robot_side.simulation.posed_scene import move_objects
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
@@ -53,26 +47,13 @@ class Approach:
     assist: Assist = "none"
     camera_sd_m: float | None = None
     """σ_c; None for the settings' own."""
-    margin_m: float | None = None
-    """The distance of the law `margin`."""
 
 
 class PullRun:
     """Both sides, their link and a hand that pulls, run step by step."""
 
-    def __init__(
-        self,
-        approach: Approach,
-        pull: Pull | None = None,
-        shift_m: FloatArray | None = None,
-        *,
-        lets_go: bool = False,
-    ) -> None:
-        """Build both sides in the scene, with every object moved by shift_m (3,).
-
-        `pull` replaces the constant force. `lets_go`: the hand lets go 0.25 s after it has felt full strength in the
-        zone of its finger.
-        """
+    def __init__(self, approach: Approach, pull: Pull | None = None) -> None:
+        """Build both sides in the scene; `pull` replaces the constant force."""
         self.approach = approach
         self.onset: ContactOnset | None = None
         """The first contact since the pull began."""
@@ -86,8 +67,6 @@ class PullRun:
             compensation=compensation_of(approach.law),
         )
         scene = load_scene(robot.model, robot.site, robot.roles)
-        if shift_m is not None:
-            move_objects(scene, shift_m)
         self.truth = TrueContact(scene)
         device = controller(approach.strongest_n / MAX_STRENGTH, "full" if approach.law == "full" else approach.spoil)
         self.hands = PullingHands(
@@ -99,17 +78,8 @@ class PullRun:
             device=device,
             person=lambda _: self.hands,
             after_robot_tick=self._after_robot_tick,
-            other_law=partial(MarginLaw, margin_m=approach.margin_m or 0.0) if approach.law == "margin" else None,
         )
-        self._scene = scene
-        self._lets_go = lets_go
         self._next_s = -math.inf
-
-    @property
-    def tool_position_m(self) -> FloatArray:
-        """Position (3,) of the true tool in the world frame."""
-        position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
-        return position
 
     @property
     def disarmed_because(self) -> str | None:
@@ -140,8 +110,6 @@ class PullRun:
             return
         self.onset = onset
         strengths, travel = run.device.effects[1].zone_strengths, run.device.travel[1]
-        if self._lets_go and hands.let_go_s is None and strengths[zone_of(travel)] == MAX_STRENGTH:
-            hands.let_go_s = now_s + REACTION_S
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             speed_m_s, gap_m = self.truth.approach()[1], self.truth.gap_m(run.robot.held)
@@ -168,13 +136,13 @@ def robot_settings(approach: Approach) -> RobotSettings:
     )
 
 
-def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
+def run_approach(approach: Approach) -> Outcome:
     """Run it to its contact, or to its end; the same settings give the same outcome.
 
-    `pull` replaces R2 pressed with the constant force. ConfigurationError for a model or a link that cannot be
-    used; a robot that is not armed in time, or that touches before the pull, is an outcome that `failed`.
+    ConfigurationError for a model or a link that cannot be used; a robot that is not armed in time, or that touches
+    before the pull, is an outcome that `failed`.
     """
-    run = PullRun(approach, pull)
+    run = PullRun(approach)
     try:
         began_s = run.arm()
     except FeelaheadError as error:
@@ -182,17 +150,6 @@ def run_approach(approach: Approach, pull: Pull | None = None) -> Outcome:
     for _ in run.go_on(began_s + approach.duration_s):
         pass
     return _outcome(run)
-
-
-def time_to_goal_s(approach: Approach, pull: Pull, goal_m: float) -> float | None:
-    """Measure how long the pull takes to bring the tool `goal_m` ahead; None where it touches or is late."""
-    run = PullRun(approach, pull)
-    began_s = run.arm()
-    axis, start_m = run.truth.approach()[0], run.tool_position_m
-    for now_s in run.go_on(began_s + approach.duration_s):
-        if (run.tool_position_m - start_m) @ axis >= goal_m:
-            return now_s - began_s
-    return None
 
 
 def _outcome(run: PullRun) -> Outcome:

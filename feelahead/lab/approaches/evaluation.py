@@ -13,8 +13,8 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from common.arrays import FloatArray
-from common.reaction import HORIZON_S, REACTION_S
-from feelahead.lab.approaches.felt_by import Draw, FieldLaw, make_law
+from common.reaction import REACTION_S
+from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, lateness_s, stood
 from feelahead.lab.approaches.laws import Law
@@ -24,6 +24,7 @@ from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
+from operator_side.dualsense.effects.official import MAX_STRENGTH
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.camera import CameraError
 from robot_side.simulation.posed_scene import PosedScene
@@ -40,7 +41,6 @@ LINKS: Final = {
 """Each way."""
 _ALARM_APPROACHES: Final = 10
 """False alarms are looked for in this many approaches where a contact is ahead, in all where none is."""
-_MOVING_M_S: Final = 0.01
 _RESAMPLED: Final = 2000
 _LEAST_APPROACHES: Final = 10
 """A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
@@ -138,16 +138,14 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
         scene = _scene(cell.scene)
         encoder = EncoderSettings(sigma_rad=cell.encoder_factor * EncoderSettings().sigma_rad)
         staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
-        margin_m = mean_way_m([one.replay for one in staged]) if "margin" in pulls.laws else None
         for probability in pulls.probabilities:
             for name in pulls.laws:
-                counts, law = _Counts(), make_law(name, probability, margin_m, pulls.spoil)
-                _count_covered(counts, law, cell, staged, probability)
-                _count_alarms(counts, law, cell, staged, probability)
-                row: Row = {"kind": "cell", "cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
+                counts, law = _Counts(), Judged(name, probability, pulls.spoil)
+                _count_covered(counts, law, cell, staged)
+                _count_alarms(counts, law, cell, staged)
+                row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
                 row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
-                row |= {"law": name, "probability": probability} | _figures(counts, staged, probability)
-                yield row | {"margin_mm": None if margin_m is None else 1e3 * margin_m}
+                yield row | {"law": name, "probability": probability} | _figures(counts, staged, probability)
 
 
 @cache
@@ -169,10 +167,10 @@ def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
     return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
 
 
-def _count_covered(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
     """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
     useful = [one for one in staged if one.avoidable]
-    least = math.ceil(draws_needed(probability) / max(1, len(useful)))
+    least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
     for one in useful:
         # Every place as often as any other, at each P.
         each = len(one.avoidable) * math.ceil(least / len(one.avoidable))
@@ -180,20 +178,21 @@ def _count_covered(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequenc
         for number in range(each):
             collision, last_release_s = one.avoidable[number % len(one.avoidable)]
             draw = one.draw(collision.shift_m, cell, number)
-            judged = stood(law, draw, last_release_s)
-            hits += judged.covered
+            strength = stood(law, draw, last_release_s)
+            covered = strength == MAX_STRENGTH
+            hits += covered
             if one.replay.knows_aside(last_release_s - REACTION_S):
                 counts.reported += 1
-                counts.reported_hits += judged.covered
-            counts.strength += judged.strength
+                counts.reported_hits += covered
+            counts.strength += strength
             if number < len(one.avoidable):
-                late_s = 0.0 if judged.covered else lateness_s(law, draw, last_release_s, collision.touch_s)
+                late_s = 0.0 if covered else lateness_s(law, draw, last_release_s, collision.touch_s)
                 counts.late_s.append(late_s)
         counts.hits.append(hits)
         counts.draws.append(each)
 
 
-def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence[_Staged], probability: float) -> None:
+def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
     passed = cell.scene in PASSED
     for one in staged if passed else staged[:_ALARM_APPROACHES]:
         places = [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
@@ -202,23 +201,10 @@ def _count_alarms(counts: _Counts, law: FieldLaw, cell: Placed, staged: Sequence
             touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
             places = [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
         for shift_m, until_s in places:
-            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s, probability)
-            counts.alarms += alarms.count
+            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s)
+            counts.alarms += alarms.number
             counts.alarm_s += alarms.alarm_s
             counts.judged_s += alarms.judged_s
-
-
-def mean_way_m(replays: Sequence[Replay]) -> float:
-    """Average the distance at which the law swept is felt while the tool moves: v (t_d + h) + v²/2a."""
-    found = []
-    for replay in replays:
-        record = replay.record
-        for row in range(0, len(record.pose_time_s), 5):
-            speed = abs(replay.approach_speed_m_s[row])
-            if speed > _MOVING_M_S:
-                braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(float(record.pose_time_s[row])))
-                found.append(speed * (float(record.loop_age_s[row]) + HORIZON_S) + braking_m)
-    return float(np.mean(found)) if found else 0.0
 
 
 def draws_needed(probability: float) -> int:

@@ -3,14 +3,13 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.protocol.messages import Header, StiffnessUpdate
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.lab.approaches.margin_law import MarginLaw
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
@@ -65,44 +64,26 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
     )
 
 
-class FieldLaw(Protocol):
-    """One law at one P."""
-
-    def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Compute strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at rising times (t,) of the operator side."""
-        ...
-
-
 @dataclass(frozen=True)
-class Constant:
-    """A constant strength in every zone: 0 for no haptics, 8 for always full."""
+class Judged:
+    """One law at one P, in the shipped pipeline.
 
-    strength: int
-
-    def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Return the constant strength."""
-        del draw
-        return np.full((len(times_s), 2, ZONE_COUNT), self.strength, dtype=np.int64)
-
-
-@dataclass(frozen=True)
-class Pipeline:
-    """The shipped pipeline: the field by the pose before the message left, the zones by the time they are felt.
-
-    Nothing is rendered between these times, so that a strength falls as from one to the next.
+    The field is by the pose before the message left, the zones by the time they are felt. Nothing is rendered between
+    these times, so that a strength falls as from one to the next.
     """
 
     law: Law
     probability: float
-    margin_m: float | None = None
-    """The distance of the law `margin`."""
     spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Sense and render at each of these times."""
+        """Compute strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at rising times (t,) of the operator side."""
+        always = MAX_STRENGTH if self.law == "full" else 0
+        strengths = np.full((len(times_s), 2, ZONE_COUNT), always, dtype=np.int64)
+        if self.law in ("none", "full"):
+            return strengths
         record = draw.replay.record
         law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
-        strengths = np.zeros((len(times_s), 2, ZONE_COUNT), dtype=np.int64)
         for number, time_s in enumerate(times_s):
             felt_s = float(time_s) - (SPOILING_DELAY_S if self.spoil == "delayed" else 0.0)
             tick = record.tick_row(felt_s)
@@ -124,8 +105,7 @@ class Pipeline:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
-        law: RobotLaw = PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
-        return MarginLaw(law, self.margin_m or 0.0) if self.law == "margin" else law
+        return PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
 
     def _situation(self, draw: Draw, row: int) -> Situation:
         replay, record = draw.replay, draw.replay.record
@@ -172,10 +152,3 @@ def _message(sensed: Sensed, row: int) -> StiffnessUpdate:
         rumble=sensed.rumble,
         state="armed",
     )
-
-
-def make_law(law: Law, probability: float, margin_m: float | None = None, spoil: Spoil = "nothing") -> FieldLaw:
-    """Make `law` at P; margin_m is the distance of the law `margin` alone."""
-    if law in ("none", "full"):
-        return Constant(MAX_STRENGTH if law == "full" else 0)
-    return Pipeline(law, probability, margin_m if law == "margin" else None, spoil)

@@ -1,15 +1,14 @@
 """Criteria of coverage: full strength in time, its lateness, and false alarms."""
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S, REACTION_S
-from feelahead.lab.approaches.felt_by import Draw, FieldLaw
+from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.meeting import shifted
 from feelahead.lab.approaches.replay import Replay
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
@@ -31,25 +30,18 @@ _ASIDE = 1e-3
 _TRAVEL = TriggerTravel()
 
 
-@dataclass(frozen=True)
-class Stood:
-    """The strength of one law for one draw."""
+def stood(law: Judged, draw: Draw, last_release_s: float) -> int:
+    """Return the strength, 0 to 8, in the zone that the finger reaches, 0.25 s before the last moment to let go.
 
-    covered: bool
-    """Full strength stood in the zone that the finger reaches, 0.25 s before the last moment to let go."""
-    strength: int
-    """The strength there then, 0 to 8."""
-
-
-def stood(law: FieldLaw, draw: Draw, last_release_s: float) -> Stood:
-    """Judge `law` by the definition above."""
+    Full strength is what covers the draw.
+    """
     at_s = last_release_s - REACTION_S
-    strengths = law.felt(draw, np.array([at_s]))[0, _R2]
-    strength = int(strengths[reached_zone(draw.replay, at_s, last_release_s)])
-    return Stood(strength == MAX_STRENGTH, strength)
+    record = draw.replay.record
+    reached = record.travel[record.tick_row(at_s) : record.tick_row(last_release_s) + 1, _R2].max()
+    return int(law.felt(draw, np.array([at_s]))[0, _R2, zone_of(float(reached))])
 
 
-def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float) -> float:
+def lateness_s(law: Judged, draw: Draw, last_release_s: float, touch_s: float) -> float:
     """Measure how late full strength first stands in the zone under the finger; infinite for never.
 
     Every 10 ms is looked at, from 0.25 s before the last moment to let go until the touch.
@@ -62,33 +54,23 @@ def lateness_s(law: FieldLaw, draw: Draw, last_release_s: float, touch_s: float)
     return float(times[int(np.argmax(full))] - due_s) if full.any() else math.inf
 
 
-def reached_zone(replay: Replay, from_s: float, to_s: float) -> int:
-    """Find the deepest of the ten zones that R2 reaches between two moments."""
-    record = replay.record
-    rows = slice(record.tick_row(from_s), record.tick_row(to_s) + 1)
-    return zone_of(float(record.travel[rows, _R2].max()))
-
-
 def zone_speed_m_s(zone: int) -> float:
     """Work out the speed that a zone's middle commands: the calibrated travel there times the full speed."""
     raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
     return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
 
 
-@dataclass(frozen=True)
-class Alarms:
+class Alarms(NamedTuple):
     """Strength of 4 or more under the finger without a cause."""
 
-    count: int
+    number: int
     """Number of unbroken stretches."""
     alarm_s: float
     judged_s: float
     """Time in which R2 was pulled."""
 
 
-def false_alarms(
-    law: FieldLaw, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float, probability: float
-) -> Alarms:
+def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float) -> Alarms:
     """Judge every 20 ms from the pull's beginning until `until_s`, before the contact if there is one.
 
     An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear: what is under way,
@@ -111,7 +93,7 @@ def false_alarms(
             joints, _ = replay.joints_at(time_s)
             there_m = shifted(shift_m, replay, draw.speed_m_s, time_s)
             posed.put(joints, record.finger_positions[record.pose_row(time_s)], there_m)
-            margin_m = statistical_distance_m(draw, time_s, probability) + CLEAR_M
+            margin_m = statistical_distance_m(draw, time_s, law.probability) + CLEAR_M
             alarmed[number] = _stays_clear(draw, posed, time_s, zone, margin_m)
     starts = int(np.count_nonzero(alarmed & ~np.concatenate([[False], alarmed[:-1]])))
     return Alarms(starts, ALARM_STEP_S * float(alarmed.sum()), ALARM_STEP_S * float(pulled.sum()))

@@ -5,11 +5,11 @@ from typing import Final, Literal, get_args
 from common.protocol.messages import Compensation
 from robot_side.ahead.law import LawName
 
-Law = Literal["swept", "swept_robot", "paper", "margin", "none", "full"]
+Law = Literal["swept", "swept_robot", "paper", "none", "full"]
 """swept: ways along each trigger, rendered over its travel (docs/feel.md), with the operator side's commands under way.
 swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the plain law (§4.2),
-the total overlap over a fixed share of the enlarged gripper. margin: the ways of swept, felt within a fixed distance at
-every speed. none: no haptics. full: always the strongest effect on both triggers, whatever is ahead."""
+the total overlap over a fixed share of the enlarged gripper. none: no haptics. full: always the strongest effect on
+both triggers, whatever is ahead."""
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
 
 

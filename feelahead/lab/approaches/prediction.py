@@ -7,8 +7,9 @@ from itertools import pairwise
 from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
-from common.arrays import BoolArray, FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.table import Row, Table
 from operator_side.feel.commands_under_way import CommandsUnderWay
@@ -38,30 +39,18 @@ class ToolPath:
         poses = [pose_at(joints) for joints in record.joint_positions_rad]
         able = [along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s) for pose in poses]
         self.time_s = record.pose_time_s
-        self._positions_m = np.array([pose.tool_position_m for pose in poses])
-        self._axes = np.array([pose.tool_rotation[:, 2] for pose in poses])
-        self._velocities_m_s = np.array(
-            [pose.tool_jacobian[:3] @ rates for pose, rates in zip(poses, record.joint_velocities_rad_s, strict=True)]
-        )
-        self._speeds_m_s: FloatArray = np.einsum("ki,ki->k", self._velocities_m_s, self._axes)
-        self._full_speeds_m_s = np.array([one.full_speed_m_s for one in able])
-        self._acceleration_m_s2 = np.array([one.acceleration_m_s2 for one in able])
+        axes = np.array([pose.tool_rotation[:, 2] for pose in poses])
+        rates = zip(poses, record.joint_velocities_rad_s, strict=True)
+        velocities_m_s = np.array([pose.tool_jacobian[:3] @ of_joints for pose, of_joints in rates])
+        self._axes = make_interp_spline(self.time_s, axes, k=1)
+        self._positions_m = CubicHermiteSpline(self.time_s, [pose.tool_position_m for pose in poses], velocities_m_s)
+        speeds_m_s = np.einsum("ki,ki->k", velocities_m_s, axes)
+        ability = [
+            (speed, one.full_speed_m_s, one.acceleration_m_s2) for speed, one in zip(speeds_m_s, able, strict=True)
+        ]
+        self.ability = make_interp_spline(self.time_s, ability, k=1)
+        """At times (k,): the speed along the approach axis, v_max and the least acceleration there (k, 3)."""
         self._within_reach: BoolArray = np.array([one.within_reach for one in able])
-
-    def speeds_m_s(self, times_s: FloatArray) -> FloatArray:
-        """Interpolate speeds (k,) along the approach axis."""
-        speeds: FloatArray = np.interp(times_s, self.time_s, self._speeds_m_s)
-        return speeds
-
-    def full_speeds_m_s(self, times_s: FloatArray) -> FloatArray:
-        """Interpolate v_max (k,) of the arm in its pose at these times."""
-        speeds: FloatArray = np.interp(times_s, self.time_s, self._full_speeds_m_s)
-        return speeds
-
-    def accelerations_m_s2(self, times_s: FloatArray) -> FloatArray:
-        """Interpolate a (k,), the least that the joints give along the approach axis."""
-        accelerations: FloatArray = np.interp(times_s, self.time_s, self._acceleration_m_s2)
-        return accelerations
 
     def within_reach(self, from_s: FloatArray, to_s: FloatArray) -> BoolArray:
         """Tell (k,) whether full speed was within the arm's reach throughout each of these times."""
@@ -73,32 +62,10 @@ class ToolPath:
 
     def ways_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
         """Measure ways (k,) of the tool along the axis that it had at the beginning."""
-        row, part = self._place(from_s)
-        axes = (1.0 - part) * self._axes[row] + part * self._axes[row + 1]
+        axes = self._axes(from_s)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), _LEAST_SPEED)
-        moved = self._positions_at(to_s) - self._positions_at(from_s)
-        ways: FloatArray = np.einsum("ki,ki->k", moved, axes)
+        ways: FloatArray = np.einsum("ki,ki->k", self._positions_m(to_s) - self._positions_m(from_s), axes)
         return ways
-
-    def _place(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Find the row before each time, and the part (k, 1) of the step to the next one."""
-        row: IntArray = np.searchsorted(self.time_s, times_s, side="right").astype(np.int64) - 1
-        row = np.clip(row, 0, len(self.time_s) - 2)
-        return row, ((times_s - self.time_s[row]) / (self.time_s[row + 1] - self.time_s[row]))[:, None]
-
-    def _positions_at(self, times_s: FloatArray) -> FloatArray:
-        """Interpolate positions (k, 3) by cubic Hermite splines."""
-        row, u = self._place(times_s)
-        step_s = (self.time_s[row + 1] - self.time_s[row])[:, None]
-        here, there = self._positions_m[row], self._positions_m[row + 1]
-        leaving, arriving = step_s * self._velocities_m_s[row], step_s * self._velocities_m_s[row + 1]
-        cubic: FloatArray = (
-            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * here
-            + u * (1.0 - u) ** 2 * leaving
-            + u * u * (3.0 - 2.0 * u) * there
-            + u * u * (u - 1.0) * arriving
-        )
-        return cubic
 
 
 @dataclass(frozen=True)
@@ -188,14 +155,13 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
     path = ToolPath(record, pose_at, limits, full_speed_m_s)
     at = moments(record)
     way_m = path.ways_m(at.reported_s, at.arrives_s)
-    speed_m_s = path.speeds_m_s(at.reported_s)
-    full_m_s, here_m_s2 = path.full_speeds_m_s(at.reported_s), path.accelerations_m_s2(at.reported_s)
+    speed_m_s, full_m_s, here_m_s2 = path.ability(at.reported_s).T
     own_m, own_m_s = predicted(record, at, speed_m_s, full_m_s, here_m_s2)
     errors = {
         "operator": way_m - own_m,
         "robot": way_m - speed_m_s * at.loop_age_quantile_s,
         "momentary": way_m - speed_m_s * at.loop_age_s,
-        "speed at the end": path.speeds_m_s(at.arrives_s) - own_m_s,
+        "speed at the end": path.ability(at.arrives_s)[:, 0] - own_m_s,
     }
     within = path.within_reach(at.reported_s, at.arrives_s)
     known = {"loop_age_s": at.loop_age_s, "way_m": way_m, "within_reach": within}

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.arming import wait_for_pull
@@ -34,8 +33,6 @@ TICK_S = 0.001
 class RecordedApproach:
     """A pull on both sides, on their one virtual clock; it begins at `began_s`."""
 
-    pull: PullKind
-    link: str
     seed: int
     began_s: float
     pose_time_s: FloatArray
@@ -80,19 +77,14 @@ class RecordedApproach:
 
 
 def record_approach(
-    pull: PullKind,
-    link: str,
-    seed: int,
-    duration_s: float = 4.0,
-    scene_name: str = "empty",
-    link_model: LinkModel = "datagram",
+    pull: PullKind, link: str, seed: int, duration_s: float = 4.0, scene_name: str = "empty"
 ) -> RecordedApproach:
     """Record the pull of this kind and seed from the home pose of a frozen scene, whose objects let it through.
 
     FeelaheadError where the robot is not armed in time, or its arm is stopped on the way.
     """
-    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, link_model=link_model, seed=seed)
-    operator = OperatorSettings(link=link, link_model=link_model, seed=seed, haptics=False)
+    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed)
+    operator = OperatorSettings(link=link, seed=seed, haptics=False)
     scene = load_scene(robot.model, robot.site, robot.roles)
     let_through(scene)
     device = SimulatedDualSense()
@@ -109,7 +101,7 @@ def record_approach(
     run.run_until(began_s + duration_s)
     if run.robot.session.safety.stops:
         raise FeelaheadError(f"the arm was stopped over --link {link!r}: {run.robot.session.safety.stops[-1][1]}")
-    return notes.record(pull, link, seed, began_s)
+    return notes.record(seed, began_s)
 
 
 class _Notes:
@@ -142,7 +134,7 @@ class _Notes:
             row["joint_velocities_rad_s"] = data.qvel[robot.arm_velocities].copy()
             self._poses.append(row | {"finger_positions": data.qpos[robot.finger_positions].copy()})
 
-    def record(self, pull: PullKind, link: str, seed: int, began_s: float) -> RecordedApproach:
+    def record(self, seed: int, began_s: float) -> RecordedApproach:
         """Return the record from a second before the pull on; of commands also the earlier ones."""
         from_s = began_s - 1.0
         poses = [row for row in self._poses if row["pose_time_s"] >= from_s]
@@ -150,4 +142,4 @@ class _Notes:
         columns = {
             name: np.array([row[name] for row in rows]) for rows in (poses, ticks, self._commands) for name in rows[0]
         }
-        return RecordedApproach(pull=pull, link=link, seed=seed, began_s=began_s, **columns)
+        return RecordedApproach(seed=seed, began_s=began_s, **columns)

@@ -17,13 +17,8 @@ from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.assembly import assemble
 from robot_side.core import RobotSide
-from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap.meshes.mesh import Mesh
-from robot_side.overlap.meshes.mesh_library import MeshLibrary
-from robot_side.overlap.meshes.mesh_shapes import convex_hull_mesh
 from robot_side.settings import RobotSettings
 from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.scene import Scene, load_scene
 
 DEMO: Final = "demo"
@@ -130,40 +125,3 @@ def _covered(tick: Tick, kinematics: MujocoKinematics, first: int) -> Tick:
     names = "sphere_centers_m", "sphere_radii_m", "sphere_on_finger"
     pose = replace(pose, **{name: joined(name) for name in names})
     return replace(tick, situation=replace(tick.situation, pose=pose))
-
-
-def with_hulls(recorded: Recorded) -> tuple[Tick, ...]:
-    """Return the ticks, had the meshes of each object been seen as their convex hull."""
-    # A frame stays the same object for as long as there is no newer one.
-    frames = {id(tick.situation.objects): tick.situation.objects for tick in recorded.ticks}
-    seen = dict(zip(frames, as_hulls(scene_of(recorded.name), list(frames.values())), strict=True))
-    return tuple(
-        replace(tick, situation=replace(tick.situation, objects=seen[id(tick.situation.objects)]))
-        for tick in recorded.ticks
-    )
-
-
-def as_hulls(scene: Scene, frames: list[PerceivedObjects]) -> list[PerceivedObjects]:
-    """Replace the meshes of each object, which do not move against each other, by their hull."""
-    objects, rows = np.unique(frames[0].mesh_object, return_index=True)
-    hulls, data = [], scene.data
-    for geoms in (scene.objects[thing].geoms for thing in objects.tolist()):
-        turned, first_m = data.geom_xmat[geoms[0]].reshape(3, 3), data.geom_xpos[geoms[0]]
-        in_world = [
-            mesh_vertices(scene.model, geom) @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-            for geom in geoms
-        ]
-        hull = convex_hull_mesh((np.concatenate(in_world) - first_m) @ turned)
-        hulls.append(Mesh(hull.vertices, hull.triangles))
-    library = MeshLibrary(hulls)
-    return [
-        replace(
-            seen,
-            mesh_library=library,
-            mesh_index=np.arange(len(rows)),
-            mesh_positions_m=np.ascontiguousarray(seen.mesh_positions_m[rows]),
-            mesh_rotations=np.ascontiguousarray(seen.mesh_rotations[rows]),
-            mesh_object=objects,
-        )
-        for seen in frames
-    ]

@@ -27,6 +27,7 @@ from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from robot_side.settings import Assist
@@ -180,21 +181,16 @@ def sentence(row: Row) -> str:
 def comparison(table: Table) -> Shown:
     """Make a row for each scene, link and force, and a column for each law; each entry is over the seeds."""
     laws = list(dict.fromkeys(_law(row) for row in table))
-    several_effects = len(set(table.values("strongest_n"))) > 1
     names = scene_names(map(Path, table.values("model")))
-    shown = Shown(
-        title="contacts of runs, median contact speed; else where it stopped",
-        caption=Text("mm/s, or mm off, [least to greatest] over the seeds; ? undecided; R the most reversals"),
-    )
-    for heading in ("scene", "link", "N", *(("effect, N",) if several_effects else ())):
-        shown.add_column(heading, overflow="fold")
-    for law in laws:
-        shown.add_column(in_words(law))
-    for (model, link, force_n, strongest_n), rows in table.groups("model", "link", "force_n", "strongest_n"):
-        effect = (f"{strongest_n:g}",) if several_effects else ()
-        ends = (_ends([row for row in rows if _law(row) == law]) for law in laws)
-        shown.add_row(*map(Text, (names[Path(model)], link or "none", f"{force_n:g}", *effect, *ends)))
-    return shown
+    entries = [
+        (
+            *(names[Path(model)], link or "none", f"{force_n:g}", f"{strongest_n:g}"),
+            *(_ends([row for row in rows if _law(row) == law]) for law in laws),
+        )
+        for (model, link, force_n, strongest_n), rows in table.groups("model", "link", "force_n", "strongest_n")
+    ]
+    title = "contacts of runs, median mm/s [least to greatest]; mm off where it stopped; ? undecided; R most reversals"
+    return shown(title, ("scene", "link", "N", "effect, N", *map(in_words, laws)), entries)
 
 
 def draw(settings: ApproachSettings, table: Table, path: Path) -> None:

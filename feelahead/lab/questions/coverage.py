@@ -3,26 +3,24 @@
 feelahead bench coverage --quick --laws swept none
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.console import RenderableType
 from rich.table import Table as Shown
-from rich.text import Text
 
 from feelahead.lab.approaches.approach import compile_kernels
-from feelahead.lab.approaches.closed_loop import KINDS, RACED, check, race
 from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 
@@ -32,10 +30,8 @@ _NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
 """Left to `try approach`: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
 """Approaches of each motion, and places of the objects for each."""
-_CHECKED_AT_ONCE: Final = 12
 _MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
-_Count = Annotated[Annotated[int, Meta(ge=0)] | None, tyro.conf.arg(metavar="N")]
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
 """The greatest takes 100 000 draws a cell."""
 
@@ -46,19 +42,14 @@ class CoverageSettings(Sweep):
 
     Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
     the finger reaches until then. False alarm: strength of 4 or more under the finger, while that zone's stopping path
-    from the true pose stays D_σ(P) + 15 mm clear. Slowdown: the time to a goal in the free over that without haptics.
-    Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P. --quick: a
-    few cells in three minutes, instead of all in two hours.
+    from the true pose stays D_σ(P) + 15 mm clear. Pulls are recorded open loop over the emulated link, and judged for
+    every scene, camera draw, law and P. --quick: a few cells in two minutes, instead of all in two hours.
     """
 
     laws: tuple[Law, ...] = LAWS
     """The laws that are set side by side."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
-    checked: _Count = None
-    """Number of approaches that are run again in full physics, closed loop; 300 unless given, 6 with --quick."""
-    raced: _Count = None
-    """Number of seeds for the time to a goal; 10 unless given, 2 with --quick; 0 leaves it out."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
     """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
     spoil: Spoil = "nothing"
@@ -85,24 +76,6 @@ class CoverageSettings(Sweep):
             Pulls(*motion, tuple(cells), sizes, chosen, self.laws, self.spoil) for motion, cells in found.items()
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
-
-
-@dataclass(frozen=True)
-class Race:
-    """The time to a goal in one scene under one law, over the time without haptics."""
-
-    scene: str
-    law: Law
-    count: int
-    spoil: Spoil
-
-
-@dataclass(frozen=True)
-class Checks:
-    """Approaches that are run again in full physics."""
-
-    first: int
-    count: int
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
@@ -134,55 +107,33 @@ def quick_cells() -> Iterator[tuple[PullKind, str, Placed]]:
         yield "bell", "200 ms", Placed(name)
 
 
-def cells(settings: CoverageSettings) -> Iterator[Pulls | Race | Checks]:
-    """Lay out motions, races and checks."""
-    raced = settings.raced if settings.raced is not None else (2 if settings.quick else 10)
-    checked = settings.checked if settings.checked is not None else (6 if settings.quick else 300)
-    yield from settings.pulls()
-    if raced:
-        yield from (Race(scene, law, raced, settings.spoil) for scene in RACED for law in settings.laws)
-    for first in range(0, checked, _CHECKED_AT_ONCE):
-        yield Checks(first, min(_CHECKED_AT_ONCE, checked - first))
-
-
-def run(cell: Pulls | Race | Checks, seed: int) -> Iterator[Row]:
-    """Make rows of kind `cell`, `slowdown` or `check`."""
-    if isinstance(cell, Pulls):
-        yield from evaluate(cell, seed)
-    elif isinstance(cell, Race):
-        first = cell.count * seed
-        yield {"kind": "slowdown"} | race(cell.scene, cell.law, range(first, first + cell.count), cell.spoil)
-    else:
-        yield from ({"kind": "check"} | asdict(one) for one in check(cell.first, cell.count, seed))
+def run(cell: Pulls, seed: int) -> Iterator[Row]:
+    """Record one motion, and judge its cells."""
+    yield from evaluate(cell, seed)
 
 
 def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
-    """Make tables by cell, by pull and by law, and say how the checks ended."""
-    found = Table(sorted(table.where(kind="cell"), key=lambda row: row["cell"]))
-    yield _by_cell(found, settings.laws, "covered: full strength stood in time", _covered)
-    yield _by_cell(found, settings.laws, "false alarms a minute (share of the time in which R2 is pulled)", _alarms)
-    yield from (by_pull(found, law) for law in settings.laws)
-    yield by_law(table, settings.laws)
-    yield from check_lines(table)
-
-
-def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Any) -> Shown:
-    shown = Shown(
-        title=title,
-        caption="n: draws (approaches). Share [95 % interval], * where it holds. Apart: unavoidable / not found",
+    """Make tables by cell, by pull and by law."""
+    found = Table(sorted(table, key=lambda row: row["cell"]))
+    yield _by_cell(
+        found, settings.laws, "covered: full strength stood in time, share [95 %], * where it holds", _covered
     )
-    for heading in ("scene", "pull", "link", "camera", "P", "n", "apart", "minutes", *laws):
-        shown.add_column(heading)
-    for (scene, pull, link, camera_mm, encoders, probability), rows in found.groups(*_CELL):
-        worse = f", encoders x{encoders:g}" if encoders != 1.0 else ""
-        some, entries = rows.rows[0], [entry(row) for law in laws for row in rows.where(law=law)]
+    yield _by_cell(found, settings.laws, "false alarms a minute (share of the time in which R2 is pulled)", _alarms)
+    yield "n: draws (approaches). apart: places in which no release avoids the contact / that were not found"
+    yield from (by_pull(found, law) for law in settings.laws)
+    yield "once reported: draws in which the operator side had a report of the drift or turn in time"
+    yield by_law(found, settings.laws)
+
+
+def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row], str]) -> Shown:
+    rows = []
+    for (scene, pull, link, camera_mm, encoders, probability), of_cell in found.groups(*_CELL):
+        some, entries = of_cell.rows[0], [entry(row) for law in laws for row in of_cell.where(law=law)]
         if any(entries):
-            apart = f"{some['unavoidable']} / {some['not_found']}"
-            of = f"{some['draws']} ({some['approaches']})", apart, f"{some['judged_s'] / 60.0:.1f}"
-            shown.add_row(
-                *map(Text, (scene, pull, link, f"{camera_mm:g} mm{worse}", f"{probability:g}", *of, *entries))
-            )
-    return shown
+            camera = f"{camera_mm:g} mm{f', encoders x{encoders:g}' if encoders != 1.0 else ''}"
+            count = f"{some['draws']} ({some['approaches']})", f"{some['unavoidable']} / {some['not_found']}"
+            rows.append((scene, pull, link, camera, probability, *count, some["judged_s"] / 60.0, *entries))
+    return shown(title, ("scene", "pull", "link", "camera", "P", "n", "apart", "minutes", *laws), rows)
 
 
 def _covered(row: Row) -> str:
@@ -198,45 +149,37 @@ def _alarms(row: Row) -> str:
 
 def by_pull(found: Table, law: str) -> Shown:
     """Make a row for each pull, link and P, over scenes, cameras and encoders; Markdown, for docs/feel.md."""
-    shown = Shown(title=f"{law}, by pull and link", box=MARKDOWN)
-    shown.caption = "once reported: draws in which the operator side had a report of the drift or turn in time"
-    for heading in ("pull", "link", "P", "cells that hold", "covered", "least", "covered, once reported"):
-        shown.add_column(heading)
-    shown.add_column("false alarms a minute")
-    shown.add_column("most")
     order = PULL_KINDS.index, list(LINKS).index
     mine = sorted(found.where(law=law), key=lambda row: (order[0](row["pull"]), order[1](row["link"])))
+    entries = []
     for key, rows in Table(mine).groups("pull", "link", "probability"):
         known, pulled = rows.values("coverage"), rows.values("alarms_per_min")
-        least = _where(rows, "coverage", min(known)) if known else ""
-        most = _where(rows, "alarms_per_min", max(pulled)) if pulled else ""
+        least = _where(rows, "coverage", min(known), ".3f") if known else ""
+        most = _where(rows, "alarms_per_min", max(pulled), ".1f") if pulled else ""
         means = mean(rows, "coverage"), least, mean(rows, "reported_coverage"), mean(rows, "alarms_per_min", ".1f")
-        shown.add_row(*map(str, key), f"{sum(rows.values('holds'))} of {len(known)}", *means, most)
-    return shown
+        entries.append((*map(str, key), f"{sum(rows.values('holds'))} of {len(known)}", *means, most))
+    headings = ("pull", "link", "P", "cells that hold", "covered", "least", "covered, once reported")
+    return shown(f"{law}, by pull and link", (*headings, "false alarms a minute", "most"), entries)
 
 
-def _where(rows: Table, name: str, value: float) -> str:
-    digits = 1 if name == "alarms_per_min" else 3
-    return f"{value:.{digits}f} ({rows.where(**{name: value}).rows[0]['scene']})"
+def _where(rows: Table, name: str, value: float, form: str) -> str:
+    return f"{value:{form}} ({rows.where(**{name: value}).rows[0]['scene']})"
 
 
-def by_law(table: Table, laws: Sequence[str]) -> Shown:
-    """Make a row for each law and P, over all cells, with the cost in time."""
-    shown = Shown(
-        title="the laws side by side", caption="means over the cells; slowdown at 200 ms and P = 0.99 (arrived)"
-    )
+def by_law(found: Table, laws: Sequence[str]) -> Shown:
+    """Make a row for each law and P, over all cells."""
+    figures = {"coverage": ".3f", "mean_strength": ".2f", "late_ms": ".0f", "never": ".0%"}
+    figures |= {"alarms_per_min": ".1f", "alarm_share": ".0%"}
+    entries = [
+        (
+            *(law, f"{probability:g}", f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"),
+            *(mean(rows, name, form) for name, form in figures.items()),
+        )
+        for law in laws
+        for (probability,), rows in found.where(law=law).groups("probability")
+    ]
     headings = ("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never")
-    for heading in (*headings, "false alarms a minute", "share", *(f"slowdown, {scene}" for scene in RACED)):
-        shown.add_column(heading)
-    for law in laws:
-        slow = [_slowdown(row) for scene in RACED for row in table.where(kind="slowdown", law=law, scene=scene)]
-        for (probability,), rows in table.where(kind="cell", law=law).groups("probability"):
-            forms = {"coverage": ".3f", "mean_strength": ".2f", "late_ms": ".0f", "never": ".0%"}
-            forms |= {"alarms_per_min": ".1f", "alarm_share": ".0%"}
-            holds = f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"
-            means = (mean(rows, name, form) for name, form in forms.items())
-            shown.add_row(law, f"{probability:g}", holds, *means, *slow)
-    return shown
+    return shown("the laws side by side, means over the cells", (*headings, "false alarms a minute", "share"), entries)
 
 
 def mean(rows: Table, name: str, form: str = ".3f") -> str:
@@ -245,36 +188,21 @@ def mean(rows: Table, name: str, form: str = ".3f") -> str:
     return format(sum(values) / len(values), form) if values else ""
 
 
-def _slowdown(row: Row) -> str:
-    return f"{'-' if row['ratio'] is None else format(row['ratio'], '.2f')} ({row['arrived']}/{row['of']})"
-
-
-def check_lines(table: Table) -> Iterator[str]:
-    """Say how often full physics did as reckoned, and where it did not."""
-    for kind in KINDS:
-        rows = table.where(kind="check", kind_of_check=kind)
-        others = [f"{row['pull']}, {row['link']}" for row in rows if row["expected_contact"] != row["contact"]]
-        if len(rows):
-            but = f"; not: {'; '.join(others)}" if others else ""
-            yield f"closed loop, {kind}: {len(rows) - len(others)} of {len(rows)} as reckoned{but}"
-
-
 def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
     """Draw coverage against false alarms: a point for each law and P, means over the cells."""
-    found = table.where(kind="cell")
-    probabilities = sorted(set(found.values("probability")))
+    marks = dict(zip(sorted(set(table.values("probability"))), _MARKS, strict=False))
     with figure(path, figsize=(7.2, 4.6)) as (_, axes):
         for law in settings.laws:
             axes.plot([], [], color=LAW_COLOURS[law], linewidth=4.0, label=law)
             points = []
-            for mark, probability in zip(_MARKS, probabilities, strict=False):
-                rows = found.where(law=law, probability=probability)
+            for probability, mark in marks.items():
+                rows = table.where(law=law, probability=probability)
                 alarms, covered = mean(rows, "alarms_per_min", ".17g"), mean(rows, "coverage", ".17g")
                 if alarms and covered:
                     points.append((float(alarms), float(covered)))
                     axes.plot(*points[-1], mark, color=LAW_COLOURS[law], alpha=0.8)
             axes.plot([x for x, _ in points], [y for _, y in points], color=LAW_COLOURS[law], linewidth=0.8)
-        for mark, probability in zip(_MARKS, probabilities, strict=False):
+        for probability, mark in marks.items():
             axes.plot([], [], mark, color="black", label=f"P = {probability:g}")
         axes.set(xlabel="false alarms a minute", ylabel="covered: full strength in time", ylim=(-0.03, 1.03))
         axes.set_xscale("symlog", linthresh=0.1)
@@ -287,7 +215,7 @@ def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
 QUESTION = Question(
     "bench coverage",
     CoverageSettings,
-    cells,
+    CoverageSettings.pulls,
     run,
     show,
     draw=draw,

@@ -30,18 +30,8 @@ from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import short
-from feelahead.lab.propagation import (
-    BATCHES,
-    DRAWS,
-    METHODS,
-    NOISE_RAD,
-    PROBABILITY,
-    SINGULAR,
-    PosedGripper,
-    failures,
-    measure,
-    run_times_us,
-)
+from feelahead.lab.propagation import BATCHES, METHODS, NOISE_RAD, SINGULAR, PosedGripper, measure, run_times_us
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -52,7 +42,7 @@ DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
 """Each way."""
 QUICK_DELAYS_MS: Final = (0, 50, 200, 400)
 QUICK_PULLS: Final[tuple[PullKind, ...]] = ("bell", "on_off", "random")
-QUICK_ROUNDS: Final = 40
+QUICK_TURNS: Final = 4
 _SCENE: Final = "empty"
 _KINDS: Final[dict[Compensation, tuple[str, str]]] = {
     "operator": ("own commands under way", "#0072b2"),
@@ -105,7 +95,7 @@ class Propagation:
 class RunTimes:
     """Run times of one call of each method."""
 
-    rounds: int
+    turns: int
     before_seed: int
 
 
@@ -134,7 +124,7 @@ def cells(settings: ErrorSettings) -> Iterator[Cell]:
     configurations = 4 if quick else 12
     draws = settings.draws or (100_000 if quick else 400_000)
     yield from (Propagation(number, configurations, draws, second) for number in range(configurations + 2))
-    yield RunTimes(QUICK_ROUNDS if quick else 200, second)
+    yield RunTimes(QUICK_TURNS if quick else 20, second)
     for delay_ms in QUICK_DELAYS_MS if quick else DELAYS_MS:
         for pull in QUICK_PULLS if quick else PULL_KINDS:
             last = second if quick else settings.seed + settings.seeds
@@ -150,7 +140,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
         rows = measure(gripper, cell.number, cell.configurations, cell.draws, seed)
         yield from ({"kind": "propagation"} | row for row in rows)
     elif isinstance(cell, RunTimes):
-        times_us = run_times_us(PosedGripper(load_scene()), cell.rounds, seed)
+        times_us = run_times_us(PosedGripper(load_scene()), cell.turns)
         yield from ({"kind": "run time", "method": name, "run_time_us": value} for name, value in times_us.items())
     else:
         record = record_approach(cell.pull, cell.link, seed, cell.duration_s, _SCENE)
@@ -180,43 +170,30 @@ def write_table(settings: ErrorSettings, table: Table) -> None:
 
 def show(_: ErrorSettings, table: Table) -> Iterator[RenderableType]:
     """Make tables of the propagation by joint noise, and of the prediction by loop age and pull."""
-    propagated, judged = table.where(kind="propagation"), table.where(kind="prediction")
-    if len(propagated):
-        yield _by_noise(propagated, "Standard deviation along the approach: error in %", "sd_error_percent")
-        yield _by_noise(propagated, f"Quantile at {PROBABILITY:g} of eq. 10: error in mm", "quantile_error_mm")
-        yield _by_noise(propagated, "Whole covariance: error in % (Frobenius norm)", "covariance_error_percent")
-        yield from failures(propagated)
-    times = [(row["method"], f"{row['run_time_us']:.1f}") for row in table.where(kind="run time")]
-    yield _shown("Run time of one point and direction: processor time", ("method", "µs a call"), times)
+    judged = table.where(kind="prediction")
+    yield _by_noise(table.where(kind="propagation"))
+    times = ((row["method"], row["run_time_us"]) for row in table.where(kind="run time"))
+    yield shown("Run time of one point and direction", ("method", "µs a call"), times)
     columns = ("pull", "loop age, ms", "moments", *(name for name, _ in _KINDS.values()))
     title = "Displacement until a command takes effect, truth less prediction, mm: mean, sd, 99 %, greatest"
-    yield _shown(title, columns, list(_spreads(judged, COMPENSATIONS, within_reach=True)))
-    edge = list(_spreads(judged, COMPENSATIONS, within_reach=False))
-    yield _shown("At the edge of the arm's reach, not in the table above", columns, edge)
+    yield shown(title, columns, _spreads(judged, COMPENSATIONS, within_reach=True))
+    edge = _spreads(judged, COMPENSATIONS, within_reach=False)
+    yield shown("At the edge of the arm's reach, not in the table above", columns, edge)
 
 
-def _shown(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Shown:
-    shown = Shown(*columns, title=title)
-    for row in rows:
-        shown.add_row(*row)
-    return shown
-
-
-def _by_noise(propagated: Table, title: str, quantity: str) -> Shown:
+def _by_noise(propagated: Table) -> Shown:
     """Show the median and the worst error over all configurations but the singular one, then the worst in that."""
-    columns = ["joint noise, rad"]
-    for method in METHODS:
-        columns += [method, "worst", SINGULAR]
     rows = []
     for noise_rad in NOISE_RAD:
         here = propagated.where(noise_rad=noise_rad)
-        usual, singular = [row for row in here if row["place"] != SINGULAR], here.where(place=SINGULAR).rows
-        cells_shown = [f"{noise_rad:g}"]
-        for method in METHODS:
-            errors, least = ([row[f"{method}_{quantity}"] for row in rows_of] for rows_of in (usual, singular))
-            cells_shown += [short(float(np.median(errors))), short(max(errors, key=abs)), short(max(least, key=abs))]
-        rows.append(cells_shown)
-    return _shown(title, columns, rows)
+        entries = [f"{noise_rad:g}"]
+        for name in (f"{method}_sd_error_percent" for method in METHODS):
+            usual = [row[name] for row in here if row["place"] != SINGULAR]
+            entries += [short(float(np.median(usual))), short(max(usual, key=abs))]
+            entries.append(short(max(here.where(place=SINGULAR).values(name), key=abs)))
+        rows.append(entries)
+    columns = (heading for method in METHODS for heading in (method, "worst", SINGULAR))
+    return shown("Standard deviation along the approach: error in %", ("joint noise, rad", *columns), rows)
 
 
 def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iterator[Sequence[str]]:
@@ -253,30 +230,19 @@ def draw(_: ErrorSettings, table: Table, path: Path) -> None:
 
 def _draw_propagation(axes: Any, propagated: Table, times_us: dict[str, float]) -> None:
     certainty = float(np.median(propagated.values("sd_uncertainty_percent")))
-
-    def error(method: str, noise_rad: float, *, singular: bool) -> float:
-        rows = [row for row in propagated.where(noise_rad=noise_rad) if (row["place"] == SINGULAR) is singular]
-        return float(np.median([abs(row[f"{method}_sd_error_percent"]) for row in rows]))
-
     for method, timed in (("linear", "linear, with kinematics"), ("unscented", "unscented")):
         for singular, mark in ((False, "o"), (True, "x")):
-            errors = {noise_rad: error(method, noise_rad, singular=singular) for noise_rad in NOISE_RAD}
-            above = {noise_rad: value for noise_rad, value in errors.items() if value > certainty}
-            values, label = (
-                list(above.values()) or [certainty],
-                f"{method}{', in the singular one' if singular else ''}",
-            )
-            axes.plot([times_us[timed]] * len(values), values, mark, color=_COLOURS[method], label=label)
-            for noise_rad, value in above.items():
-                place = (times_us[timed], value)
-                axes.annotate(f"{noise_rad:g} rad", place, (5, -3), textcoords="offset points", fontsize=6)
-    drawn = [100.0 / np.sqrt(2.0 * (draws - 1)) for draws in DRAWS.values()]
-    axes.plot([times_us[name] for name in DRAWS], drawn, "s-", color="#777777", label="Monte Carlo of 100, 1000, 10000")
-    once = error("once", NOISE_RAD[0], singular=False)
-    axes.axhline(once, color="#009e73", linestyle="--", label="once (nothing in a tick)")
+            label = f"{method}{', in the singular one' if singular else ''}"
+            for noise_rad in NOISE_RAD:
+                rows = [row for row in propagated.where(noise_rad=noise_rad) if (row["place"] == SINGULAR) is singular]
+                error = float(np.median([abs(row[f"{method}_sd_error_percent"]) for row in rows]))
+                place = times_us[timed], max(error, certainty)
+                axes.plot(*place, mark, color=_COLOURS[method], label=label)
+                label = ""
+                if error > certainty:
+                    axes.annotate(f"{noise_rad:g} rad", place, (5, -3), textcoords="offset points", fontsize=6)
     axes.axhline(certainty, color="black", linestyle=":", label="the truth's standard error")
-    axes.set(xscale="log", yscale="log", xlabel="processor time of a call, µs", ylim=(None, 3e5))
-    axes.set(ylabel="error of the standard deviation, %")
+    axes.set(xscale="log", yscale="log", xlabel="time of a call, µs", ylabel="error of the standard deviation, %")
     axes.set_title("Error propagation, median configuration (less noise: within the truth's error)", fontsize=9)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=7, loc="upper right")

@@ -1,8 +1,7 @@
-"""What does the look ahead cost, and how well is it felt, as it is set otherwise?
+"""What does the look ahead cost, and how well is it felt, by the number of the gripper's spheres?
 
 feelahead bench felt --quick --picture felt.png
 feelahead bench felt --equality
-feelahead bench felt --cover
 feelahead bench felt --field --picture ways.png
 """
 
@@ -18,20 +17,16 @@ from rich.table import Table as Shown
 from common.files.input_file import require_input_file
 from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene, scene_names
 from feelahead.lab.approaches.ticks import DEMO, record
-from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
-from feelahead.lab.field import CONVEX, DRAWN, SHOWN_MM, Facing, draw_field, look_ahead, way_name
+from feelahead.lab.field import CONVEX, DRAWN, Facing, draw_field, look_ahead, way_name
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference.beside import compare_ticks
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.variants import COVER_M, KINDS, Variant, errors_mm, replay
+from feelahead.lab.variants import COVERS_M, KINDS, errors_mm, replay
 
-_OF_MESHES: Final = ("mug", "u_mesh")
 _LIMIT_M: Final = 1e-12
-_LIMIT_COVER_MM: Final = 1e3 * COVER_M
-_QUICK_POINTS: Final = 10_000
 _QUICK_SCENES: Final = 2
 _LEAST_MM: Final = 1e-3
 """Errors below are drawn here: the axis is logarithmic."""
@@ -39,37 +34,31 @@ _LEAST_MM: Final = 1e-3
 
 @dataclass(frozen=True)
 class FeltSweep(Sweep):
-    """Run time against error of what is felt: how late a look is known, how many spheres cover the gripper, and meshes
-    as their convex hulls. Every setting is asked the same recorded ticks, in turns.
+    """Run time against error of what is felt, by how many spheres cover the gripper.
+
+    Each cover is asked the same recorded ticks, in turns, and compared with the finest.
     """
 
     equality: bool = False
     """Instead: the demo's 10 000 ticks by the compiled law and by plain NumPy; how far the two are apart."""
-    cover: bool = False
-    """Instead: how closely spheres cover grippers: the built-in one, and those of --model."""
     field: bool = False
-    """Instead: how far before things R2's strengths begin, without camera error, and what a look takes. The frozen
-    scenes with one convex thing ahead, or those of --model, are moved along the approach."""
+    """Instead: how far before things R2's strengths begin, without camera error. The frozen scenes with one convex
+    thing ahead, or those of --model, are moved along the approach."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
-    """--cover, --field: MJCF files with an arm."""
+    """--field: MJCF files with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """--cover, --field: the site between the fingertips, z along the approach."""
-    points: Annotated[int, Meta(ge=100, le=10_000_000), tyro.conf.arg(metavar="N")] = 200_000
-    """--cover: points of either surface, shared among a gripper's links."""
+    """--field: the site between the fingertips, z along the approach."""
     step_mm: Annotated[float, Meta(ge=1.0, le=150.0), tyro.conf.arg(metavar="MM")] = 10.0
     """--field: free ways from 0 to 150 mm in such steps."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        asked = [f"--{name}" for name in ("equality", "cover", "field") if getattr(self, name)]
-        if len(asked) > 1:
-            raise ValueError(f"{' and '.join(asked)} exclude each other; valid: one of them")
+        if self.equality and self.field:
+            raise ValueError("--equality and --field exclude each other; valid: one of them")
         if self.equality and self.picture is not None:
             raise ValueError(f"--picture {self.picture}: --equality has no figure; valid: without --equality")
-        if (self.model or self.site is not None) and not (self.cover or self.field):
-            raise ValueError("--model and --site are for --cover and --field; valid: with one of them")
-        if self.cover and bool(self.model) != (self.site is not None):
-            raise ValueError("--cover takes --model and --site together; valid: both, or neither")
+        if (self.model or self.site is not None) and not self.field:
+            raise ValueError("--model and --site are for --field; valid: with it")
         for model in self.model:
             require_input_file("--model", model, "an MJCF file")
 
@@ -90,44 +79,23 @@ class Run:
     """Each tick is gone through this often; the least time counts."""
 
 
-LADDERS: Final = {
-    "a look is late": [Variant("a look is late", f"by {ticks} ms", late_ticks=ticks) for ticks in (10, 4, 2, 1, 0)],
-    "spheres stand out": [
-        Variant("spheres stand out", f"{1e3 * cover_m:g} mm", cover_m=cover_m)
-        for cover_m in (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)
-    ],
-    "objects of meshes": [
-        Variant("objects of meshes", "as hulls", hulls=True),
-        Variant("objects of meshes", "as meshes"),
-    ],
-}
-"""One thing is set otherwise at a time; each is compared with the finest of the same ladder, the last."""
-
-
-def cells(settings: FeltSweep) -> Iterator[Run | Gripper | Facing]:
-    """Lay out the recorded runs, the grippers, or the scenes."""
-    if settings.cover:
-        points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
-        yield Gripper("built-in", None, None, points)
-        for model, name in scene_names(settings.model).items():
-            yield Gripper(name, model, settings.site, points)
-        return
+def cells(settings: FeltSweep) -> Iterator[Run | Facing]:
+    """Lay out the recorded runs, or the scenes."""
     if settings.field:
         for model, name in settings.scenes().items():
             yield Facing(name, model, settings.site or SITE, settings.step_mm)
-        return
-    if settings.equality:
+    elif settings.equality:
         yield Run(DEMO, 3.0 if settings.quick else 10.0, equality=True)
-        return
-    yield Run(DEMO, 3.0 if settings.quick else 7.0)
-    for scene in ("mug",) if settings.quick else ("wall", "mug", "u_mesh"):
-        yield Run(scene, 3.0 if settings.quick else 3.5)
+    else:
+        yield Run(DEMO, 3.0 if settings.quick else 7.0)
+        for scene in ("mug",) if settings.quick else ("wall", "mug", "u_mesh"):
+            yield Run(scene, 3.0 if settings.quick else 3.5)
 
 
-def run(cell: Run | Gripper | Facing, seed: int) -> Iterator[Row]:
-    """Record one run, and ask each setting its ticks: a row for each setting. Or measure a cover, or look ahead."""
-    if not isinstance(cell, Run):
-        yield from measure_cover(cell, seed) if isinstance(cell, Gripper) else look_ahead(cell)
+def run(cell: Run | Facing, seed: int) -> Iterator[Row]:
+    """Record one run, and ask the law its ticks with each cover: a row for each. Or look ahead."""
+    if isinstance(cell, Facing):
+        yield from look_ahead(cell)
         return
     recorded = record(cell.run, cell.duration_s, seed)
     if cell.equality:
@@ -135,55 +103,30 @@ def run(cell: Run | Gripper | Facing, seed: int) -> Iterator[Row]:
         for name, largest in found.largest.items():
             yield {"what": name, "largest": largest, "ticks": found.ticks, "looks": found.looks, "ways": found.ways}
         return
-    ladders = [rung for rung in LADDERS.values() if not rung[0].hulls or cell.run in _OF_MESHES]
-    replayed = iter(replay(recorded, [variant for rung in ladders for variant in rung], cell.times))
-    for rung in ladders:
-        of_rung = [next(replayed) for _ in rung]
-        for variant, one in zip(rung, of_rung, strict=True):
-            as_it_is = Variant(variant.knob, variant.value) == variant
-            row = {"knob": variant.knob, "value": f"{variant.value}{' (as it is)' if as_it_is else ''}"}
-            yield (
-                row
-                | one.costs()
-                | {f"{kind} {name}": size for kind in KINDS for name, size in errors_mm(one, of_rung[-1], kind).items()}
-            )
+    covered = replay(recorded, COVERS_M, cell.times)
+    for cover_m, one in zip(COVERS_M, covered, strict=True):
+        apart = {kind: errors_mm(one, covered[-1], kind) for kind in KINDS}
+        sizes = {f"{kind} {name}": size for kind, found in apart.items() for name, size in found.items()}
+        yield {"cover_mm": 1e3 * cover_m} | one.costs() | sizes
 
 
-def show(settings: FeltSweep, table: Table) -> Iterator[Shown | str]:
-    """Make a table for each run: a row for each setting; or one of the largest differences, the links, the scenes."""
-    if settings.cover or settings.field:
-        yield _of_covers(table) if settings.cover else _of_scenes(table)
+def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
+    """Make a table for each run: a row for each cover; or one of the largest differences, or of the scenes."""
+    if settings.field:
+        nearest = [rows.rows[-1] for _, rows in table.groups("scene")]
+        figures = ("free_mm", *map(way_name, DRAWN), "sigma_mm")
+        rows_of = ((row["scene"], *map(row.get, figures)) for row in nearest)
+        yield shown("free ways, and ways after which R2 begins to resist", ("scene", *figures), rows_of)
         return
-    costs = ("spheres", "looks_per_s", "p50_us", "p99_us", "mean_us")
+    costs = ("cover_mm", "spheres", "looks_per_s", "p50_us", "p99_us", "mean_us")
     for (name,), rows in table.groups("run"):
-        if (ticks := rows.values("ticks")) != []:
-            title = f"compiled beside plain: {ticks[0]} ticks, {rows.values('looks')[0]} looks"
+        if settings.equality:
+            title = f"compiled beside plain: {rows.rows[0]['ticks']} ticks, {rows.rows[0]['looks']} looks"
             yield shown(title, ("what", "largest difference"), ((row["what"], row["largest"]) for row in rows))
-            continue
-        yield shown(
-            f"{name}: processor time of the law in a tick; mm: mean, 95 % of the size, earliest to latest",
-            ("setting", *costs, *KINDS),
-            (
-                (
-                    f"{row['knob']} {row['value']}",
-                    *(row[cost] for cost in costs),
-                    *(_apart(row, kind) for kind in KINDS),
-                )
-                for row in rows
-            ),
-        )
-
-
-def _of_covers(table: Table) -> Shown:
-    figures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
-    rows = ((f"{row['gripper']}: {row['part']}", *map(row.get, figures)) for row in table)
-    return shown("grippers in spheres: geoms out of spheres, spheres out of geoms", ("part", *figures), rows)
-
-
-def _of_scenes(table: Table) -> Shown:
-    figures = (*map(way_name, DRAWN), "sigma_mm", "overlaps", "r2_us", "l2_us")
-    rows = ((row["scene"], *map(row.get, figures)) for row in table.where(free_mm=SHOWN_MM))
-    return shown(f"{SHOWN_MM:g} mm before each thing: ways after which R2 begins to resist", ("scene", *figures), rows)
+        else:
+            title = f"{name}: processor time of the law in a tick; mm: mean, 95 % of the size, earliest to latest"
+            entries = ((*(row[cost] for cost in costs), *(_apart(row, kind) for kind in KINDS)) for row in rows)
+            yield shown(title, (*costs, *KINDS), entries)
 
 
 def _apart(row: Row, kind: str) -> str | None:
@@ -192,31 +135,26 @@ def _apart(row: Row, kind: str) -> str | None:
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Hold the compiled law to the plain one, and spheres to what they cover."""
-    for (name,), rows in table.groups("gripper") if settings.cover else ():
-        yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
-        yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
+    """Hold the compiled law to the plain one."""
     if settings.equality:
         yield Goal("largest difference of compiled and plain, SI units", max(table.values("largest")), _LIMIT_M)
 
 
 def draw(settings: FeltSweep, table: Table, path: Path) -> None:
-    """Draw run time against error of full strength, a line for each thing that is set, of each run."""
-    if settings.cover or settings.field:
-        draw_cover(table, path) if settings.cover else draw_field(table, frozen(settings), path)
+    """Draw run time against error of full strength, a line for each run; or where strengths begin."""
+    if settings.field:
+        draw_field(table, frozen(settings), path)
         return
-    runs = list(table.groups("run"))
-    with figure(path, 1, len(runs), figsize=(3.4 * len(runs), 3.8), squeeze=False, sharey=True) as (_, (all_axes,)):
-        for axes, ((name,), rows) in zip(all_axes, runs, strict=True):
-            for (knob,), rung in rows.groups("knob"):
-                sizes = [max(row.get("fast full p95", 0.0), _LEAST_MM) for row in rung]
-                axes.plot(rung.values("mean_us"), sizes, "o-", label=knob, markersize=3, linewidth=0.8)
-                for row, size in zip(rung, sizes, strict=True):
-                    axes.annotate(row["value"], (row["mean_us"], size), fontsize=5)
-            axes.set(xscale="log", yscale="log", xlabel="mean run time of a tick's law, µs", title=name)
-            axes.grid(alpha=0.3)
-        all_axes[0].set_ylabel("95 % of |full strength's way - the finest's|, mm")
-        all_axes[-1].legend(fontsize=6)
+    with figure(path, figsize=(5.2, 3.8)) as (_, axes):
+        for (name,), rows in table.groups("run"):
+            sizes = [max(row.get("fast full p95", 0.0), _LEAST_MM) for row in rows]
+            axes.plot(rows.values("mean_us"), sizes, "o-", label=name, markersize=3, linewidth=0.8)
+            for row, size in zip(rows, sizes, strict=True):
+                axes.annotate(f"{row['cover_mm']:g} mm", (row["mean_us"], size), fontsize=5)
+        axes.set(xscale="log", yscale="log", xlabel="mean run time of a tick's law, µs")
+        axes.set(ylabel="95 % of |full strength's way - the finest's|, mm")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=6)
 
 
 def frozen(settings: FeltSweep) -> str:

@@ -14,11 +14,11 @@ from typing import Annotated
 
 import tyro
 from msgspec import Meta
-from rich.box import MARKDOWN
 from rich.table import Table as Shown
 
 from common.emulation.clauses import LinkModel
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
+from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.trial import Arm, Trial, run_trial
@@ -108,16 +108,12 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
 def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
     """Make a table for each scene and delay, with a row for each arm."""
     for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
-        # As Markdown, for docs/measurements.md.
-        shown = Shown(title=f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs", box=MARKDOWN)
-        for heading in (
-            *("haptics", "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"),
-            *("felt first", "finished, s", "longer by [95 %]"),
-        ):
-            shown.add_column(heading, justify="left" if heading == "haptics" else "right")
-        for arm, words in _ARMS.items():
-            shown.add_row(words, *_figures(pairs, arm, settings.duration))
-        yield shown
+        title = f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs"
+        hits = "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"
+        headings = ("haptics", *hits, "felt first", "finished, s", "longer by [95 %]")
+        yield shown(
+            title, headings, ((words, *_figures(pairs, arm, settings.duration)) for arm, words in _ARMS.items())
+        )
 
 
 def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:

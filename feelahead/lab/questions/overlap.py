@@ -49,9 +49,9 @@ _COUNTS = ("pairs", "undefined", "negative", "false_zeros", "false_positives")
 class OverlapSweep(Sweep):
     """Run time and error of the overlaps and of what is used in their place, on the same pairs in the same run.
 
-    Beside our kernels: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points, Monte Carlo,
-    voxels and SciPy's quadrature. What is missing on this machine is named: pip install 'feelahead[bench]' brings the
-    package; the C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
+    Beside our kernels: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points and Monte
+    Carlo. What is missing on this machine is named: pip install 'feelahead[bench]' brings the package; the C++ row
+    needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
@@ -138,8 +138,6 @@ def _speed(cell: Piece, seed: int) -> Iterator[Row]:
         KERNEL: lambda: least_ns([functools.partial(errors.kernel_overlaps, batch) for batch in batches], clock),
     }
     package, header = PythonPackage(), _header(cell.header)
-    if not package.missing and cell.case == "random":
-        contenders[PACKAGE] = lambda: package.turn_ns(pairs, clock)
     if not header.missing:
         contenders[HEADER] = lambda: header.turn(pairs)[0]
     for method, missing in ((PACKAGE, package.missing), (HEADER, header.missing)):

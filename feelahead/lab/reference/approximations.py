@@ -1,17 +1,15 @@
-"""Approximations that people use instead of exact overlaps: points in the ball, a grid of voxels, numerical quadrature.
+"""Approximations that people use instead of exact overlaps: the share of points of the ball within the solid.
 
 Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. They see a solid as the half-spaces of
 the faces, so that all are given the same.
 """
 
 import math
-import warnings
 from collections.abc import Callable
 from functools import partial
 from itertools import product
 
 import numpy as np
-from scipy import integrate
 
 from common.arrays import FloatArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, TETRAHEDRON_TRIANGLES, Pairs
@@ -47,58 +45,10 @@ def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
     return _shares(pairs, directions) * pairs.sphere_volumes
 
 
-def voxels(pairs: Pairs, cells: int) -> FloatArray:
-    """Count the voxels, cells³ in the ball's cube, whose centres lie within both."""
-    ticks = (np.arange(cells) + 0.5) * 2.0 / cells - 1.0
-    grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    within = grid[np.einsum("ni,ni->n", grid, grid) <= 1.0]
-    return _shares(pairs, within) * len(within) * (2.0 * pairs.radii / cells) ** 3
-
-
-def quadrature(pairs: Pairs, tolerance: float) -> FloatArray:
-    """Integrate the length of the vertical chord within the solid over the disc below the ball, by SciPy's `dblquad`.
-
-    `tolerance` is its absolute one, as a share of the sphere's volume.
-    """
-    normals, heights = _face_planes(pairs)
-
-    def side(x: float) -> float:
-        return math.sqrt(max(1.0 - x * x, 0.0))
-
-    def volume(*planes: FloatArray) -> float:
-        found, _ = integrate.dblquad(
-            _chord, -1.0, 1.0, lambda x: -side(x), side, planes, epsabs=tolerance * 4.0 / 3.0 * math.pi, epsrel=0.0
-        )
-        return float(found)
-
-    with warnings.catch_warnings():
-        # Chord lengths have kinks, at which it complains of slow convergence.
-        warnings.simplefilter("ignore", integrate.IntegrationWarning)
-        rows = zip(normals, heights / pairs.radii[:, None], strict=True)
-        return np.array([volume(*row) for row in rows]) * pairs.radii**3
-
-
 SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
-    **{f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)},
-    **{f"voxels {cells}³": partial(voxels, cells=cells) for cells in (8, 32, 64)},
-    **{f"SciPy {tolerance:g}": partial(quadrature, tolerance=tolerance) for tolerance in (1e-3, 1e-6)},
+    f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)
 }
-"""Those that take long for each pair, by name."""
-
-
-def _chord(y: float, x: float, normals: FloatArray, heights: FloatArray) -> float:
-    """Return the length of the part of the unit ball's vertical chord at (x, y) that lies within every half-space."""
-    high = math.sqrt(max(1.0 - x * x - y * y, 0.0))
-    low = -high
-    for (a, b, c), height in zip(normals.tolist(), heights.tolist(), strict=True):
-        rest = height - a * x - b * y
-        if c > 0.0:
-            high = min(high, rest / c)
-        elif c < 0.0:
-            low = max(low, rest / c)
-        elif rest < 0.0:
-            return 0.0
-    return max(high - low, 0.0)
+"""Methods that take long for each pair, by name."""
 
 
 def _face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:

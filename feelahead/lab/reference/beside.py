@@ -137,11 +137,11 @@ def compare_ticks(law: SweptLaw, ticks: Iterable[Any], motion: ToolMotionSetting
         plain = looks.plain.felt(situation, stick_speed_m_s, touch_speed_m_s(motion.trigger_speed_m_s))
         both = sensed.r2, sensed.l2
         differences.ticks += 1
-        differences.take("ways, m", [(side.fast_m, side.slow_m) for side in both], plain.ways_m)
-        differences.take("δ, m", [side.displacement_m for side in both], plain.displacement_m)
-        differences.take("stiffness", [side.stiffness for side in both], plain.stiffness)
+        differences.take("ways, m", [(side.fast_m, side.slow_m) for side in both], plain["ways, m"])
+        differences.take("δ, m", [side.displacement_m for side in both], plain["δ, m"])
+        differences.take("stiffness", [side.stiffness for side in both], plain["stiffness"])
         for name in ("speed_m_s", "horizon_m", "rumble", "enlargement_m"):
-            differences.take(name, getattr(sensed, name), getattr(plain, name))
+            differences.take(name, getattr(sensed, name), plain[name])
         whole_m3 = float(4.0 / 3.0 * np.pi * (situation.pose.sphere_radii_m**3).sum())
-        differences.take("overlap, of the spheres", sensed.overlap_m3 / whole_m3, plain.overlap_m3 / whole_m3)
+        differences.take("overlap, of the spheres", sensed.overlap_m3 / whole_m3, plain["overlap_m3"] / whole_m3)
     return differences

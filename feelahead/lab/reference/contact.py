@@ -8,13 +8,15 @@ edge or a face, is nearer than that.
 
 from fractions import Fraction
 from math import lcm
+from typing import Any
 
 import numpy as np
 
 from common.arrays import BoolArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, BOX_SIGNS, TETRAHEDRON_TRIANGLES, Pairs
 
-Whole = tuple[int, int, int]
+Point = tuple[Any, Any, Any]
+"""Whole numbers here, and mpmath's in the oracle."""
 
 
 def contacts(pairs: Pairs) -> BoolArray:
@@ -54,19 +56,19 @@ def exact_corners(pairs: Pairs, row: int) -> list[list[Fraction]]:
     ]
 
 
-def _whole(point: list[Fraction], denominator: int) -> Whole:
+def _whole(point: list[Fraction], denominator: int) -> Point:
     x, y, z = (int(coordinate * denominator) for coordinate in point)
     return x, y, z
 
 
-def _origin_within(corners: list[Whole], faces: tuple[tuple[int, ...], ...], reach_2: int) -> bool:
+def _origin_within(corners: list[Point], faces: tuple[tuple[int, ...], ...], reach_2: int) -> bool:
     """Tell whether the origin lies nearer than √`reach_2` to the convex solid, which has an interior."""
     a, b = corners[0], corners[1]
     fourth = corners[3] if len(corners) == 4 else corners[4]
-    volume = _dot(_cross(_minus(b, a), _minus(corners[2], a)), _minus(fourth, a))
+    volume = dot(cross(minus(b, a), minus(corners[2], a)), minus(fourth, a))
     if volume == 0:
         return False
-    if any(_dot(corner, corner) < reach_2 for corner in corners):
+    if any(dot(corner, corner) < reach_2 for corner in corners):
         return True
     handed = 1 if volume > 0 else -1
     if len(corners) == 8:
@@ -75,8 +77,8 @@ def _origin_within(corners: list[Whole], faces: tuple[tuple[int, ...], ...], rea
     inside = True
     for face in faces:
         ring = [corners[index] for index in face]
-        normal = _cross(_minus(ring[1], ring[0]), _minus(ring[2], ring[0]))
-        height = handed * _dot(normal, ring[0])
+        normal = cross(minus(ring[1], ring[0]), minus(ring[2], ring[0]))
+        height = handed * dot(normal, ring[0])
         if height > 0:
             continue
         inside = False
@@ -85,27 +87,30 @@ def _origin_within(corners: list[Whole], faces: tuple[tuple[int, ...], ...], rea
     return inside
 
 
-def _face_within(ring: list[Whole], normal: Whole, reach_2: int) -> bool:
+def _face_within(ring: list[Point], normal: Point, reach_2: int) -> bool:
     """Tell whether the foot of the origin on the face or on an edge of it exists and is nearer than √`reach_2`."""
     foot_on_face = True
     for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
-        along = _minus(end, start)
-        across = _cross(start, along)
+        along = minus(end, start)
+        across = cross(start, along)
         # The foot on the plane is on the inner side of an edge when normal · (along × (foot - start)) > 0.
-        foot_on_face = foot_on_face and _dot(normal, across) >= 0
-        length_2 = _dot(along, along)
-        if 0 < -_dot(start, along) < length_2 and _dot(across, across) < reach_2 * length_2:
+        foot_on_face = foot_on_face and dot(normal, across) >= 0
+        length_2 = dot(along, along)
+        if 0 < -dot(start, along) < length_2 and dot(across, across) < reach_2 * length_2:
             return True
-    return foot_on_face and _dot(normal, ring[0]) ** 2 < reach_2 * _dot(normal, normal)
+    return foot_on_face and dot(normal, ring[0]) ** 2 < reach_2 * dot(normal, normal)
 
 
-def _minus(a: Whole, b: Whole) -> Whole:
+def minus(a: Point, b: Point) -> Point:
+    """Subtract, without rounding where the numbers know none."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def _dot(a: Whole, b: Whole) -> int:
+def dot(a: Point, b: Point) -> Any:
+    """Multiply to a number."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: Whole, b: Whole) -> Whole:
+def cross(a: Point, b: Point) -> Point:
+    """Multiply to a vector."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -24,7 +24,7 @@ import numpy as np
 from mpmath import MPContext
 
 from common.arrays import FloatArray, IntArray
-from feelahead.lab.reference.contact import exact_contact, exact_corners
+from feelahead.lab.reference.contact import Point, cross, dot, exact_contact, exact_corners, minus
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, TETRAHEDRON_TRIANGLES, Pairs
 
 DIGITS = 60
@@ -37,7 +37,6 @@ _MOST_DIGITS_OF_MESHES = 120
 
 Number = Any
 """An mpmath number; the library is untyped."""
-Point = tuple[Number, Number, Number]
 Face = Sequence[int]
 
 
@@ -132,26 +131,26 @@ def _face_sum(
     cut = 0
     for face in faces:
         ring = [points[index] for index in face]
-        normal = _cross(_minus(ring[1], ring[0]), _minus(ring[2], ring[0]))
+        normal = cross(minus(ring[1], ring[0]), minus(ring[2], ring[0]))
         size = _norm(mp, normal)
         if size == 0:
             continue
         normal = _scale(1 / size, normal)
-        height = _dot(normal, ring[0])
+        height = dot(normal, ring[0])
         disc = covered = mp.mpf(0)
         for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
-            along = _minus(end, start)
+            along = minus(end, start)
             along = _scale(1 / _norm(mp, along), along)
-            distance = _dot(start, _cross(along, normal))
+            distance = dot(start, cross(along, normal))
             for point, sign in ((end, 1), (start, -1)):
-                on_face, on_sphere = _orthoscheme(mp, abs(height), distance, _dot(point, along), big_r)
+                on_face, on_sphere = _orthoscheme(mp, abs(height), distance, dot(point, along), big_r)
                 disc += sign * on_face
                 covered += sign * on_sphere
                 magnitude += abs(height) * abs(on_face) + big_r * abs(on_sphere)
         covered *= mp.sign(height)
         volume += (height * disc + big_r * covered) / 3
         surface += covered
-        gradient = _minus(gradient, _scale(disc, normal))
+        gradient = minus(gradient, _scale(disc, normal))
         cut += bool(disc > mp.mpf(10) ** (GOOD_DIGITS - mp.dps) * big_r**2)
     return Truth(volume, gradient, surface, cut), magnitude
 
@@ -233,21 +232,9 @@ def _number(mp: Any, value: Any) -> Number:
     return mp.mpf(value.numerator) / value.denominator if hasattr(value, "denominator") else mp.mpf(value)
 
 
-def _minus(a: Point, b: Point) -> Point:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
 def _scale(factor: Number, a: Point) -> Point:
     return factor * a[0], factor * a[1], factor * a[2]
 
 
-def _dot(a: Point, b: Point) -> Number:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Point, b: Point) -> Point:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
 def _norm(mp: Any, a: Point) -> Number:
-    return mp.sqrt(_dot(a, a))
+    return mp.sqrt(dot(a, a))

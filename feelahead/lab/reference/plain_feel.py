@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -38,20 +38,6 @@ class Look:
     overlap_m3: float
 
 
-@dataclass(frozen=True)
-class PlainlyFelt:
-    """The same as Sensed: the ways (2, 2, 8) of R2 and L2, δ, and s(δ)."""
-
-    ways_m: FloatArray
-    displacement_m: FloatArray
-    stiffness: FloatArray
-    speed_m_s: float
-    horizon_m: float
-    rumble: float
-    enlargement_m: float
-    overlap_m3: float
-
-
 class PlainLooks:
     """Keeps the looks that hold: as new as 0.1 s, and of each place along the direction of the newest."""
 
@@ -75,8 +61,8 @@ class PlainLooks:
         """Forget what was seen from other places."""
         self._kept = [one for one in self._kept if one.side != side or one.place < places]
 
-    def felt(self, situation: Situation, stick_speed_m_s: float, touch_speed_m_s: float) -> PlainlyFelt:
-        """Find what is felt of them where the gripper is now."""
+    def felt(self, situation: Situation, stick_speed_m_s: float, touch_speed_m_s: float) -> dict[str, Any]:
+        """Find what is felt of them where the gripper is now: ways (2, 2, 8) of R2 and L2, δ, s(δ), and Sensed's."""
         pose, age_s = situation.pose, situation.loop_age_s
         tool_m, approach = pose.tool_position_m, pose.tool_rotation[:, 2]
         velocity = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
@@ -100,16 +86,16 @@ class PlainLooks:
             zones = self._shortest(STICK, tool_m)[1 if stick_speed_m_s < touch_speed_m_s else 0]
             rumble = float(np.count_nonzero(zones <= reach)) / STRENGTHS
         leading = self._newest[R2 if speed >= 0.0 else L2]
-        return PlainlyFelt(
-            ways_m=ways,
-            displacement_m=displacement,
-            stiffness=(ways[:, 0] <= displacement[:, None]).sum(axis=1) / STRENGTHS,
-            speed_m_s=speed,
-            horizon_m=max(horizon, 0.0),
-            rumble=rumble,
-            enlargement_m=float(np.linalg.norm(velocity)) * age_s + leading.sigma_m,
-            overlap_m3=leading.overlap_m3,
-        )
+        return {
+            "ways, m": ways,
+            "δ, m": displacement,
+            "stiffness": (ways[:, 0] <= displacement[:, None]).sum(axis=1) / STRENGTHS,
+            "speed_m_s": speed,
+            "horizon_m": max(horizon, 0.0),
+            "rumble": rumble,
+            "enlargement_m": float(np.linalg.norm(velocity)) * age_s + leading.sigma_m,
+            "overlap_m3": leading.overlap_m3,
+        }
 
     def _shortest(self, side: int, tool_m: FloatArray) -> FloatArray:
         """(2, 8)"""

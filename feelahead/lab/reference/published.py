@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from common.clock import Clock
 from feelahead.lab.reference.pairs import Pairs
 
 SDIST = "pip download --no-deps --no-binary overlap overlap==0.2.0"
@@ -24,8 +23,6 @@ _HEXAHEDRON = (0, 4, 6, 2, 1, 5, 7, 3)
 """The corners of `pairs.BOX_SIGNS` round the bottom and then the top, as the package wants them."""
 _TIMEOUT_S = 180.0
 _REPEATS = "2"
-_AT_ONCE = 128
-"""Pairs of a part that is timed by itself."""
 
 
 def package_corners(pairs: Pairs, *, mend: bool = True) -> FloatArray:
@@ -54,7 +51,8 @@ class PythonPackage:
     def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
         """Return volumes (p,) with NaN for an exception."""
         package: Any = importlib.import_module("overlap")
-        volumes, element = np.full(len(pairs), np.nan), _element(package, pairs)
+        volumes = np.full(len(pairs), np.nan)
+        element = package.Tetrahedron if pairs.solid == "tetrahedron" else package.Hexahedron
         for row, corners in enumerate(package_corners(pairs, mend=mend)):
             try:
                 sphere = package.Sphere(pairs.centers[row], float(pairs.radii[row]))
@@ -62,25 +60,6 @@ class PythonPackage:
             except (ValueError, RuntimeError):
                 continue
         return volumes
-
-    def turn_ns(self, pairs: Pairs, clock: Clock) -> FloatArray:
-        """Time one call after another, the objects built beforehand; ns (parts,), each of up to 128 pairs."""
-        package: Any = importlib.import_module("overlap")
-        overlap_volume, element, corners = package.overlap_volume, _element(package, pairs), package_corners(pairs)
-        taken_s = []
-        for first in range(0, len(pairs), _AT_ONCE):
-            rows = slice(first, first + _AT_ONCE)
-            spheres = [package.Sphere(*sphere) for sphere in zip(pairs.centers[rows], pairs.radii[rows], strict=True)]
-            built = list(zip(spheres, [element(corner) for corner in corners[rows]], strict=True))
-            start_s = clock.now()
-            for sphere, solid in built:
-                overlap_volume(sphere, solid)
-            taken_s.append(clock.now() - start_s)
-        return 1e9 * np.array(taken_s)
-
-
-def _element(package: Any, pairs: Pairs) -> Any:
-    return package.Tetrahedron if pairs.solid == "tetrahedron" else package.Hexahedron
 
 
 class CompiledHeader:

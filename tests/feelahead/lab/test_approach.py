@@ -1,11 +1,7 @@
 """`feelahead try approach` from its flags to its sentence, table, summary and figure; most runs are made up."""
 
+import csv
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +15,11 @@ from feelahead.lab.approaches.laws import LAWS
 from feelahead.lab.approaches.outcome import End, Outcome, Trace
 from feelahead.lab.figures import LAW_COLOURS
 from feelahead.lab.questions import approach as module
+from feelahead.lab.questions import haptics
 from feelahead.lab.questions.approach import QUESTION, ApproachSettings, comparison, figures, sentence
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Table
-from tests.helpers.repository import DATA, ROOT
+from tests.helpers.repository import DATA
 
 WALL = str(DATA / "wall.xml")
 SEVERAL = ("swept", "swept_robot", "paper", "none", "full")
@@ -133,13 +130,6 @@ def test_without_a_model_every_frozen_scene_that_is_ahead_is_tried(runs: MadeUp)
     assert [one.model.stem for one in runs.asked if one.grip] == ["place_held"]
 
 
-def test_values_are_combined_and_seeds_counted(runs: MadeUp) -> None:
-    many = "--force 2 3 --law swept none --strongest-effect 1.5 2 --seeds 3 --seed 4"
-    assert tried("--model", WALL, str(DATA / "plate.xml"), "--link", "", "delay 5ms", *many.split()) == 0
-    assert len(runs.asked) == len(set(runs.asked)) == 2**5 * 3
-    assert {one.seed for one in runs.asked} == {4, 5, 6}
-
-
 # Results
 
 
@@ -212,14 +202,6 @@ def test_an_end_that_says_nothing_of_the_law_fails_and_is_drawn_as_well(runs: Ma
     assert tried("--model", WALL, "--force", "3") == 0
 
 
-@pytest.mark.usefixtures("runs")
-def test_the_hash_covers_a_model_of_ones_own(tmp_path: Path) -> None:
-    mine, path = tmp_path / "mine.xml", tmp_path / "summary.json"
-    mine.write_text("<mujoco/>")
-    assert tried("--model", str(mine), "--summary", str(path)) == 0
-    assert json.loads(path.read_text())["frozen"] == frozen_hash([mine]) != frozen_hash()
-
-
 def test_each_end_has_its_sentence_and_names_are_printed_as_they_are() -> None:
     approach = Approach(Path("some/wall.xml"), 3.0, law="none")
     assert "stops 5.0 mm off (6.0 mm along the approach)" in sentence(row(approach, outcome("stopped", 5.0)))
@@ -232,7 +214,7 @@ def test_the_table_counts_how_runs_ended() -> None:
     ends = [outcome(figure=140.0), outcome(figure=150.0), outcome("stopped", 5.0), outcome("undecided", turns=9)]
     paths = [Path(folder, "wall.xml") for folder in ("near", "far")]
     shown = comparison(Table(row(Approach(path, 3.0), end) for path in paths for end in ends))
-    assert [column.header for column in shown.columns] == ["scene", "link", "N", "swept"]
+    assert [column.header for column in shown.columns] == ["scene", "link", "N", "effect, N", "swept"]
     # Scenes of one name in two folders are two rows.
     assert [str(text) for text in shown.columns[0].cells] == ["near/wall.xml", "far/wall.xml"]
     counted = "2/4 at 145 [140 to 150] mm/s, 1/4 stop 5.0 mm off, 1/4 ?, R 9"
@@ -243,14 +225,10 @@ def test_the_table_counts_how_runs_ended() -> None:
     ("arguments", "named", "valid"),
     [
         (["--force", "3", "inf"], "force[1] = inf", "0 to 20"),
-        (["--force=-1"], "force[0] = -1", "0 to 20"),
-        (["--strongest-effect", "nan"], "strongest_effect[0] = nan", "0 to 20"),
         (["--force"], "--force", "one value or more"),
         (["--link", "dealy 5ms"], "dealy", "delay"),
         (["--link", "to_robot: delay 1500ms; to_operator: delay 600ms"], "2.1 s", "below 2 s"),
         (["--law", "swept_robot"], "swept_robot", "swept"),
-        (["--probability", "1"], "probability = 1", "above 0 and below 1"),
-        (["--duration", "0"], "duration = 0", "0.05 to 1000"),
         (["--stick", "1", "0.1"], "--stick (1.0, 0.1)", "at most 1 long"),
         (["--turn", "nan", "0"], "--turn (nan, 0.0)", "at most 1 long"),
         (["--picture", "out.xyz"], "out.xyz", "png"),
@@ -268,63 +246,14 @@ def test_bad_input_is_one_line_before_anything_runs(runs: MadeUp, arguments: lis
     assert runs.asked == []
 
 
-# Whole sweeps, in other processes
-
-SCENES = ("--model", WALL, str(DATA / "post.xml"))
-GRID = (*SCENES, "--force", "2", "3", "--link", "", "delay 20ms 5ms", "--duration", "0.1")
-WAIT_S = 600.0
+# A whole task instead of one pull
 
 
-def started(*arguments: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-P", "-m", "feelahead.main", "try", "approach", *GRID, *arguments]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-
-def workers_of(driver: subprocess.Popen[str]) -> list[int]:
-    children = Path(f"/proc/{driver.pid}/task/{driver.pid}/children").read_text().split()
-    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
-
-
-def wait_for_rows(journal: Path, least: int, driver: subprocess.Popen[str]) -> None:
-    until_s = time.monotonic() + WAIT_S
-    while not journal.exists() or journal.read_bytes().count(b"\n") <= least:
-        assert driver.poll() is None, driver.communicate()[0]
-        assert time.monotonic() < until_s
-        time.sleep(0.02)
-
-
-def is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-@pytest.mark.processes
-@pytest.mark.long
-def test_workers_and_kills_change_no_byte_of_the_table(tmp_path: Path) -> None:
-    one, several, journal = tmp_path / "one.csv", tmp_path / "several.csv", tmp_path / "journal.jsonl"
-    assert tried(*GRID, "--csv", str(one)) == 1  # nothing is decided after 0.1 s
-    assert len(one.read_text().splitlines()) == 1 + 2**3
-
-    again = ("--workers", "2", "--resume", str(journal), "--csv", str(several))
-    driver = started(*again)
-    wait_for_rows(journal, 1, driver)
-    os.kill(workers_of(driver)[0], signal.SIGKILL)  # the driver starts another pool
-    wait_for_rows(journal, 4, driver)
-    orphans = workers_of(driver)
-    driver.kill()
-    driver.communicate()
-    assert not several.exists()
-    before = journal.read_bytes().splitlines()
-
-    resumed = started(*again)
-    said, _ = resumed.communicate(timeout=WAIT_S)
-    assert resumed.returncode == 1, said
-    assert several.read_bytes() == one.read_bytes()
-    lines = journal.read_bytes().splitlines()
-    assert lines[: len(before) - 1] == before[:-1]
-    keys = [json.loads(line)["key"] for line in lines[1:]]
-    assert len(keys) == len(set(keys)) == 2**3
-    assert not any(map(is_alive, orphans))
+def test_haptics_tells_trials_with_from_those_without(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "trials.csv"
+    few = ["--quick", "--workers", "1", "--seeds", "1", "--duration", "3", "--csv", str(path)]
+    assert ask(haptics.QUESTION, few) == 0
+    assert "on, no notice taken" in capsys.readouterr().out
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert [row["arm"] for row in rows] == ["off", "mechanical", "reacting"]
+    assert all(row["hits"] == "0" and row["placed"] == "False" for row in rows)

@@ -30,17 +30,14 @@ from feelahead.lab.propagation import (
     SINGULAR,
     Chain,
     PosedGripper,
-    failures,
-    largest_variance,
-    linear,
+    linear_sd_m,
     measure,
-    monte_carlo,
-    once,
+    monte_carlo_sd_m,
     places,
-    unscented,
+    unscented_sd_m,
 )
 from feelahead.lab.questions import error as module
-from feelahead.lab.questions.error import DELAYS_MS, QUESTION, link_spec
+from feelahead.lab.questions.error import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row, Table
 from robot_side.arm.port import GripperPose
@@ -63,11 +60,6 @@ def gripper() -> PosedGripper:
     return PosedGripper(load_scene())
 
 
-@cache
-def propagated() -> Table:
-    return Table(row for number in range(4) for row in measure(gripper(), number, 2, 500 * BATCHES, 0))
-
-
 def crank(radius_m: float) -> Chain:
     """Make one hinge about z at the origin, whose point stands on x."""
     jacobian = np.array([[0.0], [radius_m], [0.0], [0.0], [0.0], [1.0]])
@@ -85,76 +77,38 @@ def test_the_chain_is_the_kinematics_for_every_point_however_far(seed: int) -> N
         np.testing.assert_allclose(moved, there.sphere_centers_m[sphere], rtol=0.0, atol=1e-12)
 
 
-def test_small_changes_keep_their_digits_and_slides_turn_with_the_joints_before_them() -> None:
-    changes = np.array([[1e-9], [-1e-12]])
-    moved = crank(1.0).displacements(changes)
-    np.testing.assert_allclose(moved[:, 1], changes[:, 0], rtol=1e-14)
-    np.testing.assert_allclose(moved[:, 0], -0.5 * changes[:, 0] ** 2, rtol=1e-12)
-    # A hinge about z, and beyond it a slide along the present x.
-    jacobian = np.array([[0.0, 1.0], [0.5, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
-    at = np.array([0.5, 0.0, 0.0])
-    slid = Chain(jacobian, at, at).displacements(np.array([[math.pi / 2.0, 0.25]]))
-    np.testing.assert_allclose(at + slid[0], [0.0, 0.75, 0.0], atol=1e-15)
-
-
 @pytest.mark.parametrize("noise_rad", NOISE_RAD)
 def test_one_joint_gives_the_known_distribution(noise_rad: float) -> None:
     chain, radius_m, across = crank(0.8), 0.8, np.array([0.0, 1.0, 0.0])
-    eq_5 = linear(np.array([[0.0], [radius_m], [0.0]]), noise_rad, across)
-    assert eq_5.mean_m == 0.0
-    assert eq_5.sd_m == pytest.approx(radius_m * noise_rad)
-    # E cos δ = exp(-σ²/2), Var sin δ = (1 - exp(-2σ²)) / 2.
-    mean_m = radius_m * math.expm1(-0.5 * noise_rad**2)
+    assert linear_sd_m(np.array([[0.0], [radius_m], [0.0]]), noise_rad, across) == pytest.approx(radius_m * noise_rad)
+    # Var sin δ = (1 - exp(-2σ²)) / 2.
     sd_m = radius_m * math.sqrt(-0.5 * math.expm1(-2.0 * noise_rad**2))
-    assert unscented(chain.displacements, 1, noise_rad, X).mean_m == pytest.approx(mean_m, rel=1e-3 * noise_rad)
-    assert unscented(chain.displacements, 1, noise_rad, across).sd_m == pytest.approx(sd_m, rel=noise_rad**2)
+    assert unscented_sd_m(chain.displacements, 1, noise_rad, across) == pytest.approx(sd_m, rel=noise_rad**2)
     draws = noise_rad * np.random.default_rng(1).standard_normal((1000 * BATCHES, 1))
-    truth = monte_carlo(chain.displacements, draws, across)
-    assert abs(truth.sd_m - sd_m) < 5.0 * truth.sd_error_m
-    assert abs(truth.true_quantile_m - radius_m * math.sin(2.3263 * noise_rad)) < 5.0 * truth.quantile_error_m
-    assert truth.sd_error_m == pytest.approx(sd_m / math.sqrt(2.0 * 1000 * BATCHES), rel=0.6)
+    found_m, error_m = monte_carlo_sd_m(chain.displacements, draws, across)
+    assert abs(found_m - sd_m) < 5.0 * error_m
+    assert error_m == pytest.approx(sd_m / math.sqrt(2.0 * 1000 * BATCHES), rel=0.6)
 
 
-def test_once_is_the_same_everywhere_and_never_below_a_sampled_sphere() -> None:
-    largest = largest_variance(gripper(), 0)
-    estimate = once(largest, 1e-3)
-    np.testing.assert_allclose(estimate.covariance_m2, 1e-6 * largest * np.eye(3))
-    far = propagated().where(point="far sphere")
-    assert all(row["once_sd_error_percent"] >= row["linear_sd_error_percent"] for row in far)
-
-
-def test_little_noise_is_linear_within_the_truths_own_error() -> None:
-    rows = [row for row in propagated() if row["noise_rad"] <= 1e-3]
-    assert len(rows) == 4 * 2 * 3
+def test_little_noise_is_linear_and_once_is_never_below_a_sampled_sphere() -> None:
+    rows = [row for number in range(4) for row in measure(gripper(), number, 2, 500 * BATCHES, 0)]
+    assert len(rows) == 4 * 2 * len(NOISE_RAD)
     for row in rows:
-        assert abs(row["linear_sd_error_percent"]) < 5.0 * row["sd_uncertainty_percent"]
-        assert abs(row["linear_quantile_error_mm"]) < 5.0 * row["quantile_uncertainty_mm"]
-        assert row["linear_covariance_error_percent"] < 5.0
-        assert row["unscented_sd_error_percent"] == pytest.approx(row["linear_sd_error_percent"], abs=0.1)
+        if row["noise_rad"] <= 1e-3:
+            assert abs(row["linear_sd_error_percent"]) < 5.0 * row["sd_uncertainty_percent"]
+            assert row["unscented_sd_error_percent"] == pytest.approx(row["linear_sd_error_percent"], abs=0.1)
+        if row["point"] == "far sphere":
+            assert row["once_sd_error_percent"] >= row["linear_sd_error_percent"]
 
 
 def test_the_singular_place_errs_least_along_the_approach() -> None:
     def share(place: FloatArray) -> float:
         pose = gripper().at(place)
-        estimate = linear(pose.tool_jacobian[:3], 1.0, pose.tool_rotation[:, 2])
-        return estimate.sd_m**2 / float(np.trace(estimate.covariance_m2))
+        jacobian = pose.tool_jacobian[:3]
+        return linear_sd_m(jacobian, 1.0, pose.tool_rotation[:, 2]) / float(np.linalg.norm(jacobian))
 
     found = places(gripper(), 3, 0)
     assert min(found, key=lambda name: share(found[name])) == SINGULAR
-
-
-def test_failures_name_the_least_noise_of_more_than_five_per_cent() -> None:
-    def row(place: str, noise_rad: float, sd_percent: float, quantile_percent: float) -> Row:
-        return {"place": place, "noise_rad": noise_rad, "quantile_mm": 2.0, "linear_sd_error_percent": sd_percent} | {
-            "linear_quantile_error_mm": 0.02 * quantile_percent
-        }
-
-    made = [row("home", noise_rad, -1000.0 * noise_rad, 1.0) for noise_rad in NOISE_RAD]
-    made += [row("random 1", noise_rad, 4.0, -14.0) for noise_rad in NOISE_RAD]
-    sd, quantile = failures(Table(made))
-    assert "standard deviation: off by more than 5 % at home from 0.01 rad on" in sd
-    assert "in the random configurations not up to 0.1 rad" in sd
-    assert "at home not up to 0.1 rad, in the random configurations from 1e-05 rad on" in quantile
 
 
 # Prediction
@@ -196,8 +150,6 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
     poses = slice(0, None, 10)
     count = len(ticks[poses])
     return RecordedApproach(
-        pull="bell",
-        link="",
         seed=0,
         began_s=BEGAN_S,
         pose_time_s=ticks[poses],
@@ -226,6 +178,9 @@ def greatest_m(row: Row, name: str) -> float:
 
 @pytest.mark.parametrize(("there_ms", "back_ms"), [(0, 0), (20, 100), (400, 400)])
 def test_the_commands_under_way_predict_an_obedient_arm(there_ms: int, back_ms: int) -> None:
+    lets_go = np.where(np.arange(1500) * 0.004 < 4.0, 1.0, 0.0)
+    # An arm of infinite acceleration would be v²/2a = 3.9 mm off.
+    assert greatest_m(judge(recorded(lets_go, there_ms, back_ms), pose_at, LIMITS, FULL_M_S), "operator") < 0.6e-3
     judged = judge(recorded(bells(), there_ms, back_ms), pose_at, LIMITS, FULL_M_S)
     assert len(judged["way_m"]) > 300
     assert all(judged["within_reach"])
@@ -247,13 +202,6 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
     # The age of the newest command that the report knew of has up to a period in it for which it was held.
     np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
-
-
-def test_the_prediction_follows_a_hand_that_lets_go() -> None:
-    travels = np.where(np.arange(1500) * 0.004 < 4.0, 1.0, 0.0)
-    judged = judge(recorded(travels, 200, 200), pose_at, LIMITS, FULL_M_S)
-    # An arm of infinite acceleration would be v²/2a = 3.9 mm off.
-    assert greatest_m(judged, "operator") < 0.6e-3
 
 
 def test_moments_are_those_that_can_be_compared() -> None:
@@ -340,13 +288,13 @@ def test_the_question_is_answered_whole_and_the_same_again(
 ) -> None:
     monkeypatch.setattr(module, "QUICK_DELAYS_MS", (200,))
     monkeypatch.setattr(module, "QUICK_PULLS", ("bell",))
-    monkeypatch.setattr(module, "QUICK_ROUNDS", 1)
+    monkeypatch.setattr(module, "QUICK_TURNS", 1)
     tables = [tmp_path / "one.toml", tmp_path / "two.toml"]
     picture = tmp_path / "out.png"
     arguments = ["--quick", "--draws", str(100 * BATCHES)]
     assert ask(QUESTION, [*arguments, "--table", str(tables[0]), "--picture", str(picture)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert "linear, quantile at 0.99: off by more than 5 %" in shown
+    assert "Standard deviation along the approach" in shown
     assert "own commands under way" in shown
     assert picture.read_bytes().startswith(b"\x89PNG")
     [own], [eq_8] = (load_prediction_errors(tables[0]).rows[kind] for kind in ("operator", "robot"))
@@ -360,8 +308,6 @@ def test_the_question_is_answered_whole_and_the_same_again(
     ("arguments", "complaint"),
     [
         (["--draws", "100001"], "--draws 100001: valid: a multiple of 20"),
-        (["--draws", "20"], "draws = 20; valid: 2000 to 10000000"),
-        (["--seeds", "0"], "seeds = 0; valid: 1 to 10000"),
         (["--table", "/"], "--table /: is a folder"),
         (["--workers", "2"], "--workers 2: bench error measures time"),
     ],
@@ -371,11 +317,3 @@ def test_bad_input_is_one_line(arguments: list[str], complaint: str) -> None:
         ask(QUESTION, arguments)
     assert complaint in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-def test_links_jitter_where_their_delay_permits() -> None:
-    assert [link_spec(delay_ms) for delay_ms in DELAYS_MS][:3] == [
-        "",
-        "delay 25ms 6ms distribution normal",
-        "delay 50ms 10ms distribution normal",
-    ]

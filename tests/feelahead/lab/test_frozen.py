@@ -54,29 +54,22 @@ def test_an_unknown_scene_is_named_with_the_known_ones_or_with_where_they_are(
         frozen_scene("wall")
 
 
-@pytest.fixture
-def copied_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The scenes, in a folder where a test may change them."""
-    folder = tmp_path / "data"
-    folder.mkdir()
+def test_the_hash_is_of_names_and_contents_and_not_of_the_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copied = tmp_path / "data"
+    copied.mkdir()
     for path in DATA.glob("*.xml"):
-        shutil.copy(path, folder)
-    monkeypatch.setattr(frozen, "SCENES", folder)
-    return folder
-
-
-def test_the_hash_is_of_names_and_contents_and_not_of_the_place(copied_scenes: Path) -> None:
+        shutil.copy(path, copied)
+    monkeypatch.setattr(frozen, "SCENES", copied)
     assert frozen_hash() == HASH
-    (copied_scenes / "wall.xml").rename(copied_scenes / "wall_2.xml")
-    assert frozen_hash() != HASH
-
-
-def test_the_hash_notices_each_file(copied_scenes: Path) -> None:
-    for path in copied_scenes.glob("*.xml"):
+    for path in copied.glob("*.xml"):
         content = path.read_bytes()
         path.write_bytes(content + b" ")
         assert frozen_hash() != HASH
         path.write_bytes(content)
+    (copied / "wall.xml").rename(copied / "wall_2.xml")
+    assert frozen_hash() != HASH
 
 
 def test_the_hash_covers_a_model_of_somebody_elses(tmp_path: Path) -> None:

@@ -9,17 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from feelahead.lab.approaches.approach import Approach, robot_settings, run_approach
 from feelahead.lab.approaches.frozen import ASIDE
 from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, controller
-from operator_side.dualsense.effects.official import AnyEffect, MultiPositionFeedback, Off
+from feelahead.lab.approaches.spoilt import controller
+from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.output_report import OutputReport
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from tests.helpers.felt import feedback
 from tests.helpers.repository import DATA
@@ -28,7 +24,6 @@ pytestmark = pytest.mark.long
 
 approaches = pytest.mark.xdist_group("approaches")
 """Run by one worker, so that each approach is made once."""
-REPEATABLE = settings(derandomize=True, deadline=None)
 WAY_MM = 320.0
 FAR = "delay 200ms"
 JITTER = "delay 20ms 10ms distribution normal"
@@ -116,27 +111,6 @@ def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_predic
 
 
 @approaches
-def test_by_the_robot_sides_reckoning_it_stops_as_well_and_farther_off() -> None:
-    at_once, late = (ended(force_n=2.0, link=link, law="swept_robot") for link in ("", FAR))
-    own = ended(force_n=2.0, link=FAR)
-    assert {at_once.end, late.end, own.end} == {"stopped"}
-    assert at_once.stops_at_mm is not None
-    assert late.stops_at_mm is not None
-    assert own.stops_at_mm is not None
-    assert at_once.stops_at_mm < 20.0
-    # What v t_d misses at 200 ms each way is enlarged by.
-    assert late.stops_at_mm > own.stops_at_mm + 20.0
-
-
-@approaches
-def test_a_margin_stops_it_so_far_off() -> None:
-    outcome = ended(force_n=2.0, law="margin", margin_m=0.05)
-    assert outcome.stops_at_mm is not None
-    # Where the ways are so short: D_σ and the ramp before the wall come on top.
-    assert 50.0 < outcome.stops_at_mm < 75.0
-
-
-@approaches
 def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> None:
     assisted, alone = (ended(force_n=5.0, assist=assist, duration_s=3.5) for assist in ("speed", "none"))
     assert (assisted.end, assisted.contact_with) == ("stopped", None)
@@ -170,24 +144,6 @@ def test_the_trace_tells_the_way_to_the_wall() -> None:
     # A finger of 3 N, felt by nobody but the spring.
     assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
     assert trace.strengths.max() == 0
-
-
-@approaches
-def test_what_is_felt_is_in_the_trace() -> None:
-    trace, strongest_n = ended().trace, 2.0
-    assert trace.strengths.dtype == np.int64
-    assert trace.strengths[0].max() == 0
-    assert trace.strengths.max() == 8
-    # A finger of 3 N that feels these strengths travels as the trace says, but for what changes within 10 ms; by the
-    # end it has gone back by this much.
-    trigger, travels = SimulatedTrigger(strongest_n / 8), []
-    trigger.set_finger_force(3.0)
-    for strengths in trace.strengths[:-1].tolist():
-        travels.append(trigger.travel)
-        trigger.set_effect(MultiPositionFeedback(tuple(strengths)))
-        trigger.advance(SAMPLE_S)
-    np.testing.assert_allclose(travels, trace.travel[:-1], atol=0.1)
-    assert trace.travel[-1] < (3.0 - 0.5) / 4.0 - 0.1 * strongest_n
 
 
 @approaches
@@ -225,28 +181,6 @@ def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_ef
     assert strong.contact_speed_mm_s <= 40.0
 
 
-# Not onto it
-
-
-@approaches
-def test_who_does_not_pull_stops_where_they_are() -> None:
-    outcome = ended(force_n=0.0, duration_s=1.2)
-    assert (outcome.end, outcome.contact_speed_mm_s, outcome.contact_with) == ("stopped", None, None)
-    assert outcome.stops_at_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.way_left_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.least_gap_mm == pytest.approx(WAY_MM, abs=0.1)
-    assert outcome.reversals == 0
-    assert outcome.ended_s == pytest.approx(1.2)
-
-
-@approaches
-def test_who_still_moves_at_the_end_is_undecided() -> None:
-    outcome = ended(force_n=3.7, duration_s=0.5, link=JITTER)
-    assert outcome.end == "undecided"
-    assert (outcome.contact_speed_mm_s, outcome.stops_at_mm, outcome.way_left_mm) == (None, None, None)
-    assert 0.0 < outcome.least_gap_mm < WAY_MM
-
-
 # The same again
 
 
@@ -259,6 +193,8 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 def test_a_seed_gives_the_same_outcome_whatever_ran_before_and_another_one_another() -> None:
     asked = Approach(DATA / "wall.xml", 3.7, duration_s=0.5, link=JITTER)
     first = numbers(run_approach(asked))
+    assert first["end"] == "undecided"
+    assert first["contact_speed_mm_s"] is first["stops_at_mm"] is first["way_left_mm"] is None
     assert numbers(run_approach(replace(asked, seed=1))) != first
     assert numbers(run_approach(asked)) == first
 
@@ -288,9 +224,6 @@ def test_an_arm_that_safety_stops_has_not_been_stopped_by_the_law() -> None:
 
 # Reversals
 
-SPEEDS = st.lists(st.integers(-300, 300).map(lambda mm_s: mm_s / 1024.0), max_size=60)
-"""In binary fractions, so that adding and taking away is exact."""
-
 
 @pytest.mark.parametrize(
     ("speeds_mm_s", "count"),
@@ -314,65 +247,33 @@ def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], cou
     assert reversals([1e-3 * one for one in speeds_mm_s]) == count
 
 
-@given(SPEEDS, st.integers(-1024, 1024))
-@REPEATABLE
-def test_a_constant_speed_on_top_changes_no_count(speeds_m_s: list[float], offset: int) -> None:
-    assert reversals([one + offset / 1024.0 for one in speeds_m_s]) == reversals(speeds_m_s)
-
-
-@given(SPEEDS, st.integers(1, 5))
-@REPEATABLE
-def test_speeds_that_last_longer_change_no_count(speeds_m_s: list[float], times: int) -> None:
-    assert reversals([one for one in speeds_m_s for _ in range(times)]) == reversals(speeds_m_s)
-
-
 # Standing
 
 
-def trace_of(speeds_m_s: list[float]) -> Trace:
-    rows = len(speeds_m_s)
-    still = np.zeros(rows)
-    return Trace(
-        np.linspace(0.0, SAMPLE_S * (rows - 1), rows),
-        np.array(speeds_m_s),
-        still,
-        still,
-        np.zeros((rows, 10), dtype=np.int64),
-    )
-
-
 @pytest.mark.parametrize(
-    ("last_m_s", "seconds", "standing"),
+    ("last_m_s", "standing"),
     [
-        (0.0, 1.02, True),
-        (0.00099, 1.02, True),
-        (-0.00099, 1.02, True),
-        (0.0011, 1.02, False),
-        (-0.0011, 1.02, False),
-        (0.0, 0.9, False),  # not for long enough
+        ([0.00099] * 102, True),
+        ([-0.00099] * 102, True),
+        ([0.0011] * 102, False),
+        ([-0.0011] * 102, False),
+        ([0.0] * 90, False),  # not for long enough
+        ([0.002, *[0.0] * 94], False),  # one twitch
+        ([0.002, *[0.0] * 105], True),
     ],
 )
-def test_the_gripper_stands_when_it_has_been_slow_for_a_second(
-    last_m_s: float, seconds: float, *, standing: bool
-) -> None:
-    assert stands(trace_of([0.2] * 100 + [last_m_s] * round(seconds / SAMPLE_S))) is standing
-
-
-def test_one_twitch_within_the_last_second_is_no_standing() -> None:
-    for ago_s, standing in ((0.02, False), (0.95, False), (1.05, True)):
-        speeds = [0.0] * 300
-        speeds[-1 - round(ago_s / SAMPLE_S)] = 0.002
-        assert stands(trace_of(speeds)) is standing
+def test_the_gripper_stands_when_it_has_been_slow_for_a_second(last_m_s: list[float], *, standing: bool) -> None:
+    speeds_m_s = [0.2] * 100 + last_m_s
+    rows = len(speeds_m_s)
+    times_s, still = np.linspace(0.0, SAMPLE_S * (rows - 1), rows), np.zeros(rows)
+    trace = Trace(times_s, np.array(speeds_m_s), still, still, np.zeros((rows, 10), dtype=np.int64))
+    assert stands(trace) is standing
 
 
 # Controllers
 
 
-def felt(device: SimulatedDualSense) -> tuple[AnyEffect, AnyEffect]:
-    return device.effects
-
-
-def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
+def test_a_delayed_controller_does_the_same_100_ms_later_and_a_swapped_one_on_the_other_trigger() -> None:
     device = controller(0.25, "delayed")
     device.read(0.0)
     device.write(OutputReport(r2=feedback(3, 6)), 0.01)
@@ -380,20 +281,14 @@ def test_a_delayed_controller_does_the_same_100_ms_later() -> None:
     after_ms = {}
     for milliseconds in range(51, 200):
         device.read(1e-3 * milliseconds)
-        after_ms[milliseconds] = felt(device)
-    assert SPOILING_DELAY_S == 0.1
+        after_ms[milliseconds] = device.effects
     assert after_ms[109] == (Off(), Off())
     assert after_ms[111] == after_ms[149] == (Off(), feedback(3, 6))
     assert after_ms[151] == after_ms[199] == (feedback(1, 1), feedback(2, 1))
-
-
-def test_a_swapped_controller_does_it_on_the_other_trigger() -> None:
     device = controller(0.25, "swapped")
     device.read(0.0)
-    device.write(OutputReport(r2=feedback(3, 6)), 0.01)
-    assert felt(device) == (feedback(3, 6), Off())
-    device.write(OutputReport(l2=feedback(1, 1), r2=Off()), 0.02)
-    assert felt(device) == (Off(), feedback(1, 1))
+    device.write(OutputReport(l2=feedback(1, 1), r2=feedback(3, 6)), 0.01)
+    assert device.effects == (feedback(3, 6), feedback(1, 1))
     # Telling one of them leaves the other as it is.
     device.write(OutputReport(r2=feedback(5, 5)), 0.03)
-    assert felt(device) == (feedback(5, 5), feedback(1, 1))
+    assert device.effects == (feedback(5, 5), feedback(1, 1))

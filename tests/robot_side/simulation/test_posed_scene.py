@@ -1,7 +1,6 @@
 """A gripper that is put among the objects: distances against those that one can work out by hand."""
 
 import math
-from pathlib import Path
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation.camera import MujocoCamera
-from robot_side.simulation.posed_scene import PosedScene, let_through, move_objects
+from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import TrueContact
 from tests.helpers.repository import DATA
@@ -185,34 +184,7 @@ def test_the_camera_sees_by_the_scenes_roles() -> None:
     assert scene.at().perceived(np.zeros((1, 3))).roles == (Role.TARGET,)
 
 
-# Scenes that are changed before anything moves
-
-
-def test_let_through_lets_the_gripper_into_a_wall() -> None:
-    scene = load_scene(DATA / "wall.xml", "tool")
-    move_objects(scene, np.array([-WALL_M - 0.01, 0.0, 0.0]))
-    assert scene.data.ncon > 0
-    let_through(scene)
-    mujoco.mj_forward(scene.model, scene.data)
-    assert scene.data.ncon == 0
-    # The distance is still seen.
-    assert TrueContact(scene).gap_m(None) < -0.005
-
-
-@pytest.mark.parametrize("name", ["wall", "slot", "cluttered", "mug", "u_mesh", "table_mesh", "table_12_tetrahedra"])
-def test_every_object_is_moved_and_the_arm_is_not(name: str) -> None:
-    scene = load_scene(DATA / f"{name}.xml", "tool")
-    shift_m = np.array([0.01, -0.02, 0.03])
-    objects = [geom for thing in scene.objects for geom in thing.geoms]
-    expected = scene.data.geom_xpos.copy()
-    expected[objects] += shift_m
-    move_objects(scene, shift_m)
-    np.testing.assert_allclose(scene.data.geom_xpos, expected, atol=1e-12)
-    mujoco.mj_step(scene.model, scene.data)
-    np.testing.assert_allclose(scene.data.geom_xpos[objects], expected[objects], atol=1e-12)
-
-
-def test_where_things_may_sleep_they_are_moved_as_well() -> None:
+def test_where_things_may_sleep_they_are_put_as_well() -> None:
     """MuJoCo then looks but once where those are that stand fixed."""
     scene = load_scene(DATA / "wall.xml", "tool")
     scene.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
@@ -222,46 +194,3 @@ def test_where_things_may_sleep_they_are_moved_as_well() -> None:
     for shift_m in (0.0, 0.05, 0.05, -0.02):
         posed.put(arm_rad, fingers, np.array([shift_m, 0.0, 0.0]))
         assert posed.gap_m() == pytest.approx(WALL_M + shift_m, abs=1e-4)
-    move_objects(scene, np.array([0.05, 0.0, 0.0]))
-    assert TrueContact(scene).gap_m(None) == pytest.approx(WALL_M + 0.05, abs=1e-4)
-    posed.put(arm_rad, fingers, NOWHERE)
-    assert posed.gap_m() == pytest.approx(WALL_M + 0.05, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    "name", ["wall", "plate", "ball", "post", "rod_2mm", "rod_10mm", "wall_45", "slot", "shelf_edge", "u_mesh", "mug"]
-)
-def test_what_was_moved_into_the_gripper_is_touched(name: str) -> None:
-    """MuJoCo looks for contacts in trees of its own, which know nothing of a move."""
-    scene = load_scene(DATA / f"{name}.xml", "tool")
-    assert scene.data.ncon == 0
-    axis, _ = TrueContact(scene).approach()
-    move_objects(scene, -(WALL_M + 0.004) * axis)
-    objects = {geom for thing in scene.objects for geom in thing.geoms}
-    assert any(objects & {int(geom) for geom in pair} for pair in scene.data.contact.geom)
-    assert TrueContact(scene).gap_m(None) == pytest.approx(-0.004, abs=2e-3)
-
-
-@pytest.mark.parametrize("name", ["moving", "place_held"])
-def test_what_moves_on_joints_is_refused_and_left_where_it_is(name: str) -> None:
-    scene = load_scene(DATA / f"{name}.xml", "tool")
-    before = scene.data.geom_xpos.copy()
-    with pytest.raises(ValueError, match="move on joints; valid: objects that stand fixed"):
-        move_objects(scene, np.array([0.01, 0.0, 0.0]))
-    mujoco.mj_forward(scene.model, scene.data)
-    np.testing.assert_array_equal(scene.data.geom_xpos, before)
-
-
-def test_what_stands_at_the_origin_is_moved_as_well(tmp_path: Path) -> None:
-    """MuJoCo does not look at the place of a geom that is where its body is."""
-    path = tmp_path / "floor.xml"
-    path.write_text(
-        (DATA / "wall.xml")
-        .read_text()
-        .replace("arm.xml", str(DATA / "arm.xml"))
-        .replace('<geom name="wall"', '<geom name="floor" type="plane" size="2 2 0.1"/>\n    <geom name="wall"')
-    )
-    scene = load_scene(path, "tool")
-    move_objects(scene, np.array([0.0, 0.0, -0.1]))
-    np.testing.assert_allclose(scene.data.geom("floor").xpos, [0.0, 0.0, -0.1], atol=1e-12)
-    np.testing.assert_allclose(scene.data.geom("wall").xpos, [0.935, 0.0, 0.1], atol=1e-12)
