@@ -35,6 +35,8 @@ class _Peer:
     """Whom it authenticated as; empty without keys."""
     descriptor: int = -1
     """That which its last message came by; -1 where it is not known."""
+    connection: int | None = None
+    """Which one of the crowd that was, as the descriptor may be another's later; 0: one that ended; None: unknown."""
     received: int = 0
     """Messages in the present second."""
 
@@ -71,8 +73,6 @@ class RobotSockets(SocketShell):
         """Connections that were ended because there were too many at once."""
         self._told: list[str] = []
         self._peers: dict[bytes, _Peer] = {}
-        self._spoke_by: dict[int, bytes] = {}
-        """Which peer was the last to take up a descriptor, until it is hung up on."""
         self._all_seen = False
         """Whether what the gates know of the connections was all there was to know."""
         self._second = 0
@@ -245,11 +245,12 @@ class RobotSockets(SocketShell):
             if len(self._peers) >= _REMEMBERED_PEERS:
                 del self._peers[next(iter(self._peers))]
             peer = self._peers[name] = _Peer(key)
-        if (descriptor := _descriptor(frame)) != peer.descriptor:
-            peer.descriptor = descriptor
-            self._spoke_by[descriptor] = name
+        crowd, descriptor = self._gates[0].crowd, _descriptor(frame)
+        if descriptor != peer.descriptor or peer.connection is None:
+            self._watch_connections()
+            peer.descriptor, peer.connection = descriptor, crowd.number(descriptor) if self._all_seen else None
         if self._allows(key):
-            self._gates[0].crowd.spoke(descriptor)
+            crowd.spoke(descriptor)
         peer.received += 1
         if not self._allows(key):
             self.revoked += 1
@@ -263,11 +264,11 @@ class RobotSockets(SocketShell):
 
     def _hang_up(self, name: bytes) -> None:
         """End the connection of `name`, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
-        descriptor = self._peers[name].descriptor
-        # The number may stand for another connection by now, or for none.
-        if self._all_seen and self._spoke_by.get(descriptor) == name and self._gates[0].crowd.holds(descriptor):
-            del self._spoke_by[descriptor]
-            _shut_down(descriptor)
+        peer = self._peers[name]
+        # A message may be read long after its sender left: the descriptor may stand for another connection by now.
+        if self._all_seen and peer.connection and self._gates[0].crowd.number(peer.descriptor) == peer.connection:
+            peer.connection = 0
+            _shut_down(peer.descriptor)
 
 
 def _shut_down(descriptor: int) -> None:
