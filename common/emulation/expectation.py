@@ -28,7 +28,6 @@ def expected(profile: LinkProfile) -> dict[str, Any]:
 def _delay_depends_on_traffic(profile: LinkProfile) -> bool:
     return (
         profile.rate is not None
-        or profile.slot is not None
         or profile.reorder is not None
         # A stream waits for the slowest so far, unless all are alike and none is lost.
         or (

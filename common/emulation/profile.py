@@ -11,7 +11,6 @@ from common.emulation.clauses import QUEUE_LIMIT, Chance, LinkModel, Outage, Rat
 from common.emulation.distribution import Distribution, moments
 from common.emulation.grammar import read_fields
 from common.emulation.loss import LossModel
-from common.emulation.slots import Slot
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
 from common.limits import Share, check_limits
@@ -55,7 +54,6 @@ class LinkProfile:
     rate: Rate | None = None
     limit: _Count = QUEUE_LIMIT
     """Messages that may wait; what comes on top is dropped."""
-    slot: Slot | None = None
     outages: tuple[Outage, ...] = ()
     trace: Trace | None = None
     """Recorded delays instead of delay, jitter and loss."""
@@ -104,8 +102,6 @@ class LinkProfile:
             clauses.append(f"rate {format_rate(self.rate.bits_per_second)}{overhead}")
         if self.limit != QUEUE_LIMIT:
             clauses.append(f"limit {self.limit}")
-        if self.slot is not None:
-            clauses.append(_format_slot(self.slot))
         if self.trace is not None:
             clauses.append(f"trace {shlex.quote(self.trace.name)}")
         for outage in self.outages:
@@ -116,7 +112,7 @@ class LinkProfile:
         return " ".join(filter(None, clauses))
 
     def mean_delay_s(self) -> float:
-        """Of the delay asked for, without what rate, slots and retransmission add."""
+        """Of the delay asked for, without what rate and retransmission add."""
         if self.trace is not None:
             known_s = [delay_s for delay_s in self.trace.delays_s if delay_s is not None]
             return math.fsum(known_s) / len(known_s)
@@ -172,14 +168,6 @@ def _format_delay(profile: LinkProfile) -> str:
             words.append(format_share(profile.delay_correlation))
         if shape != "uniform":
             words += ["distribution", shape]
-    return " ".join(words)
-
-
-def _format_slot(slot: Slot) -> str:
-    words = ["slot", format_duration(slot.least_s), format_duration(slot.most_s)]
-    for name, budget in (("packets", slot.packets), ("bytes", slot.size_bytes)):
-        if budget is not None:
-            words += [name, str(budget)]
     return " ".join(words)
 
 
