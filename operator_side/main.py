@@ -31,9 +31,8 @@ from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
-from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import BackgroundSearch, Ready
+from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
 from operator_side.page_hands.driving_page import DrivingPage

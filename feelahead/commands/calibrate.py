@@ -20,7 +20,7 @@ from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, place_to_write, write_calibration
 from operator_side.dualsense.hid.device import load_backend
 from operator_side.dualsense.hid.finding import find_controller
-from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.hid.search import Device, OpenController
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import RELEASED

@@ -17,7 +17,7 @@ from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import INPUT_REPORT_PERIOD_S, SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.controller import UhidController, UhidIdentity
 from operator_side.dualsense.uhid.file import EventFile, UhidFile, offer
 
 PULL_PERIOD_S = 4.0
@@ -66,7 +66,7 @@ def live(
     """One controller from plug to unplug; DeviceError when the kernel lets it go."""
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
     controller = SimulatedDualSense(transport, Model.EDGE if settings.edge else Model.DUALSENSE)
-    told = identity(transport, controller.model, controller.address)
+    told = UhidIdentity(transport, controller.model, controller.address)
     offered = UhidController(_Narrated(controller, say), told)
     start_s = clock.now()
     driver = _DriverWatch(offered, start_s, say)

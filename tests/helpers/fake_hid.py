@@ -12,11 +12,13 @@ from operator_side.dualsense.reports.feature_report import (
     Firmware,
     build_address,
 )
-from operator_side.dualsense.reports.input_report import build_input_report, build_simple_input_report
+from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.transport import Transport
 
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
+SIMPLE_REPORT = bytes.fromhex("01 80808080 080000 0000")
+"""What Bluetooth starts with: nothing touched."""
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
@@ -92,7 +94,7 @@ class FakeHandle:
 
     def _first_report(self) -> bytes:
         if self.transport is BLUETOOTH and not self.full_mode:
-            return build_simple_input_report(ControllerState())
+            return SIMPLE_REPORT
         return self.report()
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from common.clock import VirtualClock
 from common.errors import DeviceError
-from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
+from operator_side.dualsense.uhid.controller import EVENT_LENGTH
 
-START, STOP, OPEN, CLOSE, OUTPUT, GET_REPORT, SET_REPORT = 2, 3, 4, 5, 6, 9, 13
+START, STOP, OUTPUT, GET_REPORT = 2, 3, 6, 9
 FEATURE, OUT = 0, 1
 
 
@@ -23,10 +23,6 @@ def output(report: bytes) -> bytes:
 
 def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
     return said(GET_REPORT, struct.pack("=IBB", request, report_id, kind))
-
-
-def set_report(request: int, report: bytes, kind: int = OUT) -> bytes:
-    return said(SET_REPORT, struct.pack("=IBBH", request, report[0], kind, len(report)) + report)
 
 
 @dataclass

@@ -8,7 +8,7 @@ import threading
 from typing import Final
 
 from common.errors import DeviceError
-from operator_side.dualsense.hid.port import Device
+from operator_side.dualsense.hid.search import Device
 from operator_side.dualsense.reports.output_report import OutputReport
 
 CLOSE_TIMEOUT_S: Final = 0.3

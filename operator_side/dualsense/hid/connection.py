@@ -7,9 +7,8 @@ from enum import StrEnum
 from typing import Final, Protocol
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
-from operator_side.dualsense.hid.port import OpenController
-from operator_side.dualsense.hid.release_guard import Guard
-from operator_side.dualsense.hid.search import Search
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.search import OpenController, Search
 from operator_side.dualsense.reports.output_report import OutputReport
 
 BEAT_PERIOD_S: Final = 0.05
@@ -46,7 +45,7 @@ class Listener(Protocol):
 class Connection:
     """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
 
-    def __init__(self, search: Search, listener: Listener, guard: Guard | None = None) -> None:
+    def __init__(self, search: Search, listener: Listener, guard: ReleaseGuard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
         """How often a controller was found."""

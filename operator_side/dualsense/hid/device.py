@@ -1,12 +1,12 @@
 """A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
 
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol, TypeVar, cast
+from typing import Any, Final, TypeVar
 
 from common.errors import DeviceError, NoDriverError, RemoteProtocolError
-from operator_side.dualsense.hid.device_messages import INSTALL, gone, no_dualsense, not_opened, silent
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     FEATURE_LENGTHS,
@@ -16,9 +16,16 @@ from operator_side.dualsense.reports.feature_report import (
 )
 from operator_side.dualsense.reports.input_report import is_input_report
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
-from operator_side.dualsense.reports.transport import Transport, transport_of_input
+from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
 Read = TypeVar("Read")
+HidHandle = Any
+"""One of hidapi's `device` objects, which has no types."""
+HidBackend = Any
+"""One of hidapi's modules, `hidraw` or `hid`."""
+
+_INSTALL: Final = "pip install --force-reinstall hidapi"
+"""Over another package's module, too; by its own name, for feelahead may come from a folder."""
 
 _READ_LENGTH: Final = 128  # longer than any report, so that each is seen as long as it is
 _MAX_DRAINED: Final = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
@@ -26,50 +33,6 @@ _FIRST_REPORT_MS: Final = 100
 _FIRST_REPORT_ATTEMPTS: Final = 5
 _FEATURE_ATTEMPTS: Final = 3
 """A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
-
-
-class HidHandle(Protocol):
-    """What is used of hidapi's `device` objects."""
-
-    def open_path(self, path: bytes) -> None:
-        """Open; OSError when that fails."""
-        ...
-
-    def set_nonblocking(self, flag: int) -> object:
-        """1: `read` returns an empty list rather than wait."""
-        ...
-
-    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
-        """One report; empty after the timeout, which 0 leaves to set_nonblocking. OSError when the device is gone."""
-        ...
-
-    def write(self, data: bytes) -> int:
-        """The number of bytes written; -1 when the device is gone."""
-        ...
-
-    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
-        """One feature report, with its id; OSError when the device does not answer."""
-        ...
-
-    def close(self) -> None:
-        """Let the device go."""
-        ...
-
-    def error(self) -> str:
-        """What the last failure was."""
-        ...
-
-
-class HidBackend(Protocol):
-    """What is used of hidapi's modules `hidraw` and `hid`."""
-
-    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
-        """The devices that are there."""
-        ...
-
-    def device(self) -> HidHandle:
-        """A handle that is not open yet."""
-        ...
 
 
 def load_backend() -> HidBackend:
@@ -85,16 +48,16 @@ def load_backend() -> HidBackend:
             import hid as module  # noqa: PLC0415
     except Exception as error:  # another package's module may fail as it likes
         raise NoDriverError(
-            f"hidapi cannot be imported ({type(error).__name__}: {error}): {INSTALL}, after pip uninstall hid if that"
+            f"hidapi cannot be imported ({type(error).__name__}: {error}): {_INSTALL}, after pip uninstall hid if that"
             " other package is there; or run without a controller: --device simulated"
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
         place = getattr(module, "__file__", None)
         raise NoDriverError(
             f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it (for hid:"
-            f" pip uninstall hid), then {INSTALL}"
+            f" pip uninstall hid), then {_INSTALL}"
         )
-    return cast(HidBackend, module)
+    return module
 
 
 @dataclass(frozen=True)
@@ -126,7 +89,7 @@ class HidDualSense:
             self._reading.set_nonblocking(1)
         except OSError as error:
             self._close_handles()
-            raise gone(str(error)) from error
+            raise _gone(str(error)) from error
         except DeviceError:
             self._close_handles()
             raise
@@ -157,8 +120,9 @@ class HidDualSense:
                     break
                 drained.append(report)
         except OSError as error:
-            raise gone(str(error)) from error
-        reports = [bytes(report) for report in reversed(drained)]
+            raise _gone(str(error)) from error
+        # Bluetooth may have begun with simple reports before it was asked for more.
+        reports = [report for report in map(bytes, reversed(drained)) if not is_simple_report(report)]
         return next(filter(is_input_report, reports), reports[0] if reports else None)
 
     def write(self, output: OutputReport, now_s: float) -> None:
@@ -218,7 +182,7 @@ def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
         except OSError as error:
             for opened in handles:
                 opened.close()
-            raise not_opened(path, handle.error() or str(error)) from error
+            raise _not_opened(path, handle.error() or str(error)) from error
         handles.append(handle)
     return handles[0], handles[-1]
 
@@ -227,9 +191,9 @@ def _write(handle: HidHandle, report: bytes) -> None:
     try:
         written = handle.write(report)
     except OSError as error:
-        raise gone(str(error)) from error
+        raise _gone(str(error)) from error
     if written < len(report):
-        raise gone(handle.error() or f"{written} of {len(report)} bytes written")
+        raise _gone(handle.error() or f"{written} of {len(report)} bytes written")
 
 
 def write_once(path: bytes, report: bytes) -> None:
@@ -238,7 +202,7 @@ def write_once(path: bytes, report: bytes) -> None:
     try:
         handle.open_path(path)
     except OSError as error:
-        raise not_opened(path, handle.error() or str(error)) from error
+        raise _not_opened(path, handle.error() or str(error)) from error
     try:
         _write(handle, report)
     finally:
@@ -253,7 +217,10 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
     try:
         transport = transport_of_input(first_report)
     except RemoteProtocolError as error:
-        raise no_dualsense(path, str(error)) from error
+        raise DeviceError(
+            f"the controller at {os.fsdecode(path)} does not speak as a DualSense does ({error}): plug it in again;"
+            " imitations are not supported"
+        ) from error
     return Identity(
         transport=transport,
         address=_feature(handle, ADDRESS_ID, lambda report: parse_address(report, transport)),
@@ -263,11 +230,18 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
 
 
 def _first_report(handle: HidHandle, path: bytes) -> bytes:
+    """The first full report, or a simple one where nothing else comes."""
+    newest = b""
     for _ in range(_FIRST_REPORT_ATTEMPTS):
-        report = handle.read(_READ_LENGTH, _FIRST_REPORT_MS)
-        if report:
-            return bytes(report)
-    raise silent(path)
+        newest = bytes(handle.read(_READ_LENGTH, _FIRST_REPORT_MS)) or newest
+        if newest and not is_simple_report(newest):
+            return newest
+    if not newest:
+        raise DeviceError(
+            f"the controller at {os.fsdecode(path)} sends nothing: press its PS button, and plug it in again if that"
+            " does not help"
+        )
+    return newest
 
 
 def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
@@ -278,3 +252,23 @@ def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) 
         except (OSError, RemoteProtocolError):
             continue
     return None
+
+
+def _not_opened(path: bytes, reason: str) -> DeviceError:
+    """There is one, and the system does not let us at it."""
+    name = os.fsdecode(path)
+    denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
+    if sys.platform == "linux" and (denied or "permission denied" in reason.lower()):
+        return DeviceError(
+            f"no permission to open the controller at {name}: `feelahead doctor` prints the udev rule that grants it,"
+            " and the command that puts it in place"
+        )
+    return DeviceError(
+        f"the controller at {name} cannot be opened ({reason}): close other programs that use it (Steam Input), plug"
+        f" it in again, or run without one: --device simulated"
+    )
+
+
+def _gone(reason: str) -> DeviceError:
+    """The controller was there a moment ago."""
+    return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")

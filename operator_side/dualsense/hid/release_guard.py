@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Protocol
+from typing import Final
 
 _WATCHDOG = "operator_side.dualsense.hid.release_watchdog"
 _END_TIMEOUT_S = 2.0
@@ -14,26 +14,6 @@ _END_TIMEOUT_S = 2.0
 MOST_REPLACEMENTS: Final = 3
 """Whatever ends so many watchdogs will end the next one, too."""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
-
-
-class Guard(Protocol):
-    """Whoever releases a controller when we cannot."""
-
-    def hold(self, path: bytes, release: bytes) -> None:
-        """From now on, should we die, `release` is to be written to the controller at `path`."""
-        ...
-
-    def let_go(self) -> None:
-        """There is nothing to release any more."""
-        ...
-
-    def beat(self) -> None:
-        """An effect is on, and we live: should no further beat follow in time, we hang."""
-        ...
-
-    def rest(self) -> None:
-        """No effect is on: there are no beats until the next one."""
-        ...
 
 
 class ReleaseGuard:

@@ -23,8 +23,15 @@ from operator_side.dualsense.effects.official import (
     OtherEffect,
     decode_effect,
 )
-from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.reports.transport import OUTPUT_FRAMING, Transport, described
+from operator_side.dualsense.reports.transport import (
+    CHECKSUM_LENGTH,
+    OUTPUT_FRAMING,
+    Seed,
+    Transport,
+    check,
+    described,
+    sealed,
+)
 
 Byte = Annotated[int, Meta(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]

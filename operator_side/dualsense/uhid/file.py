@@ -12,8 +12,7 @@ from typing import Final, Protocol
 from common.clock import Clock
 from common.errors import ConfigurationError, DeviceError
 from common.realtime.pacing import Pacer, wait_for_turn
-from operator_side.dualsense.uhid.controller import UhidController
-from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
+from operator_side.dualsense.uhid.controller import EVENT_LENGTH, UhidController
 
 UHID_PATH: Final = Path("/dev/uhid")
 

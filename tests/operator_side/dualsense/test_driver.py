@@ -14,8 +14,6 @@ from common.errors import DeviceError, NoDriverError
 from operator_side.dualsense.effects.official import Off, OtherEffect
 from operator_side.dualsense.hid.background_writes import CLOSE_TIMEOUT_S, STALL_S, BackgroundWrites
 from operator_side.dualsense.hid.device import HidDualSense, load_backend, write_once
-from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.dualsense.reports.input_report import build_simple_input_report
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     USUAL_LIGHT,
@@ -26,7 +24,16 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
 )
 from operator_side.dualsense.reports.transport import Transport
-from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
+from tests.helpers.fake_hid import (
+    ADDRESS,
+    BLUETOOTH,
+    FIRMWARE,
+    SIMPLE_REPORT,
+    USB,
+    FakeBackend,
+    FakeHandle,
+    valid_checksum,
+)
 from tests.helpers.felt import feedback
 
 PATH = b"/dev/hidraw3"
@@ -53,9 +60,15 @@ def test_what_it_is_is_asked_and_nothing_is_written(transport: Transport) -> Non
     assert (identity.transport, identity.address, identity.firmware) == (transport, None, None)
 
 
-def test_bluetooth_is_told_even_from_a_short_report() -> None:
-    handle = FakeHandle(BLUETOOTH, waiting=[build_simple_input_report(ControllerState())])
-    assert open_fake(handle).identity.transport is BLUETOOTH
+def test_bluetooth_is_told_from_short_reports_which_are_passed_over() -> None:
+    assert open_fake(FakeHandle(BLUETOOTH, waiting=[SIMPLE_REPORT] * 9)).identity.transport is BLUETOOTH
+    handle = FakeHandle(BLUETOOTH, waiting=[SIMPLE_REPORT] * 2)
+    device = open_fake(handle)
+    assert device.identity.first_report == handle.report()
+    handle.waiting = [handle.report(1), SIMPLE_REPORT, SIMPLE_REPORT.ljust(78, b"\0")]
+    assert (device.read(0.1), handle.waiting) == (handle.report(1), [])
+    handle.waiting = [SIMPLE_REPORT]
+    assert device.read(0.2) is None
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from operator_side.dualsense.effects.official import (
     TriggerEffect,
     decode_effect,
 )
-from operator_side.dualsense.reports.checksum import Seed, sealed
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
@@ -25,7 +24,7 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
     transport_of_output,
 )
-from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.reports.transport import Seed, Transport, sealed
 from tests.helpers.felt import feedback
 
 REPEATABLE = settings(derandomize=True, deadline=None)
