@@ -80,12 +80,6 @@ def until_descriptors_are(count: int, robot: RobotSockets) -> bool:
     return False
 
 
-def test_the_raw_client_is_understood(robot: RobotSockets) -> None:
-    with contextlib.closing(stranger(robot)) as connection:
-        connection.send(message(b"good"))
-        assert drain(robot, PATIENT_S) == [b"good"]
-
-
 def test_two_thousand_hostile_inputs_leave_the_operator_heard_and_no_descriptor_behind(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
@@ -292,14 +286,6 @@ def test_a_flood_whose_sender_has_left_is_only_counted(
     received = [payload for _ in range(100) for _, payload in robot.receive()]
     assert received == [b"flood"] * 200
     assert robot.flooding == 800
-    assert is_heard(robot, operator)
-
-
-def test_random_bytes_after_a_proper_handshake(robot: RobotSockets, operator: OperatorSockets) -> None:
-    generator = random.Random(1)  # noqa: S311
-    for _ in range(200):
-        with contextlib.closing(stranger(robot)) as connection:
-            connection.send(generator.randbytes(generator.randint(1, 300)))
     assert is_heard(robot, operator)
 
 

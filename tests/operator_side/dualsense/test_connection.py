@@ -8,6 +8,7 @@ from common.errors import DeviceError, NoDeviceError, NoDriverError
 from operator_side.dualsense.hid.connection import (
     BEAT_PERIOD_S,
     LOOK_PERIOD_S,
+    RETELL_AFTER_S,
     Connection,
     ConnectionState,
 )
@@ -159,6 +160,17 @@ def test_the_watchdog_knows_before_anything_is_written_and_hears_of_us_while_an_
     world.run(1.0)
     world.connection.write(STIFF, world.now_s)
     assert world.log == ["rest", "beat", "write"]
+
+
+def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
+    world.connected()
+    world.connection.write(STIFF, world.now_s)
+    world.run(1.0)
+    world.log.clear()
+    world.now_s += RETELL_AFTER_S
+    world.run(PERIOD_S)
+    assert world.log == ["beat", "found"]
+    assert world.connection.found == 1
 
 
 @pytest.mark.parametrize("noticed_by", ["reading", "writing"])
