@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import secrets
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
@@ -135,8 +134,6 @@ def _console(settings: OperatorSettings, stack: ExitStack) -> Console | None:
 
 def _find(find: Finder, preferred: str | None) -> OpenController:
     found = find(preferred)
-    if sys.platform != "linux":
-        return found  # a device is read and written by one thread there
     writes = BackgroundWrites(found.device)
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 

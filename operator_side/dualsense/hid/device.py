@@ -1,7 +1,6 @@
 """A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
 
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
@@ -38,14 +37,11 @@ _FEATURE_ATTEMPTS: Final = 3
 def load_backend() -> HidBackend:
     """Import hidapi; NoDriverError when it is missing, broken or shadowed by the other package called `hid`.
 
-    hidapi's wheel for Linux has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which
-    goes through libusb and does not. Elsewhere there is only `hid`.
+    hidapi's wheel has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which goes through
+    libusb and does not.
     """
     try:
-        if sys.platform == "linux":
-            import hidraw as module  # noqa: PLC0415
-        else:
-            import hid as module  # noqa: PLC0415
+        import hidraw as module  # noqa: PLC0415
     except Exception as error:  # another package's module may fail as it likes
         raise NoDriverError(
             f"hidapi cannot be imported ({type(error).__name__}: {error}): {_INSTALL}, after pip uninstall hid if that"
@@ -54,8 +50,8 @@ def load_backend() -> HidBackend:
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
         place = getattr(module, "__file__", None)
         raise NoDriverError(
-            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it (for hid:"
-            f" pip uninstall hid), then {_INSTALL}"
+            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it, then"
+            f" {_INSTALL}"
         )
     return module
 
@@ -73,10 +69,7 @@ class Identity:
 
 
 class HidDualSense:
-    """The Device port on a controller that is open, on USB or Bluetooth.
-
-    On Linux it may be read by one thread and written by another; elsewhere one thread does both.
-    """
+    """The Device port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
         """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
@@ -154,8 +147,7 @@ class HidDualSense:
 
     def _close_handles(self) -> None:
         self._reading.close()
-        if self._writing is not self._reading:
-            self._writing.close()
+        self._writing.close()
 
     def _require_open(self) -> None:
         if self._closed:
@@ -168,14 +160,14 @@ class HidDualSense:
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
-    """Handles to read and to write by: two where a device may be opened twice, else one for both.
+    """Handles to read and to write by.
 
     hidapi keeps the text of the last failure with each handle and frees it with every call, so that one handle
     must not be read and written at once (background_writes.py). Both are opened at once, while the path is
     certainly still this controller's.
     """
     handles: list[HidHandle] = []
-    for _ in range(2 if sys.platform == "linux" else 1):
+    for _ in range(2):
         handle = backend.device()
         try:
             handle.open_path(path)
@@ -194,19 +186,6 @@ def _write(handle: HidHandle, report: bytes) -> None:
         raise _gone(str(error)) from error
     if written < len(report):
         raise _gone(handle.error() or f"{written} of {len(report)} bytes written")
-
-
-def write_once(path: bytes, report: bytes) -> None:
-    """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
-    handle = load_backend().device()
-    try:
-        handle.open_path(path)
-    except OSError as error:
-        raise _not_opened(path, handle.error() or str(error)) from error
-    try:
-        _write(handle, report)
-    finally:
-        handle.close()
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:
@@ -258,7 +237,7 @@ def _not_opened(path: bytes, reason: str) -> DeviceError:
     """There is one, and the system does not let us at it."""
     name = os.fsdecode(path)
     denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
-    if sys.platform == "linux" and (denied or "permission denied" in reason.lower()):
+    if denied or "permission denied" in reason.lower():
         return DeviceError(
             f"no permission to open the controller at {name}: `feelahead doctor` prints the udev rule that grants it,"
             " and the command that puts it in place"

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-_WATCHDOG = "operator_side.dualsense.hid.release_watchdog"
+_WATCHDOG = Path(__file__).with_name("release_watchdog.py")
 _END_TIMEOUT_S = 2.0
 """It releases what it holds and ends within milliseconds, but on a busy machine its turn may be late."""
 MOST_REPLACEMENTS: Final = 3
@@ -105,7 +105,7 @@ class ReleaseGuard:
 
     def _refusals(self) -> list[str]:
         """What it answered since the last look; nothing is waited for."""
-        if sys.platform == "win32" or self._process is None or self._process.stdout is None:
+        if self._process is None or self._process.stdout is None:
             return []
         self._answers += self._process.stdout.read(4096) or b""
         *answers, self._answers = self._answers.split(b"\n")
@@ -114,7 +114,7 @@ class ReleaseGuard:
 
 def _started() -> subprocess.Popen[bytes]:
     process = subprocess.Popen(
-        [sys.executable, *_arguments()],
+        [sys.executable, "-I", "-S", str(_WATCHDOG)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -123,13 +123,6 @@ def _started() -> subprocess.Popen[bytes]:
         start_new_session=True,
     )
     for stream in (process.stdin, process.stdout):
-        if stream is not None and sys.platform != "win32":
+        if stream is not None:
             os.set_blocking(stream.fileno(), False)  # the loop waits for nobody
     return process
-
-
-def _arguments() -> list[str]:
-    """How to run the watchdog: as a bare file where it needs nothing but Python itself."""
-    if sys.platform == "linux":
-        return ["-I", "-S", str(Path(__file__).with_name("release_watchdog.py"))]
-    return ["-P", "-m", _WATCHDOG]

@@ -10,8 +10,8 @@ without a word (kill -9, a crash): the report is written and the process ends. W
 (kill -STOP, a write that never returns): the report is written, once for each silence. Nothing is written otherwise.
 Each `hold` is answered on the standard output: `held`, or `refused` when the controller cannot be opened.
 
-It is run as a bare file with `python -I -S` on Linux, so that it starts in some 10 ms and stays small: only modules
-that Python has loaded anyway are imported. Elsewhere it needs hidapi, hence the whole environment.
+It is run as a bare file with `python -I -S`, so that it starts in some 10 ms and stays small: only modules that Python
+has loaded anyway are imported.
 """
 
 import os
@@ -26,7 +26,7 @@ _ATTEMPTS = 3
 """A transfer can fail once while the controller is there; one that is gone refuses each at once."""
 
 
-class LinuxTarget:
+class Target:
     """The controller, opened while it is still known to be the one: its path may be another device's later."""
 
     def __init__(self, path: bytes, report: bytes) -> None:
@@ -54,32 +54,6 @@ class LinuxTarget:
             self._file = -1
 
 
-class HidapiTarget:
-    """The controller by its path in hidapi, opened when it comes to that: some systems open it only once."""
-
-    def __init__(self, path: bytes, report: bytes) -> None:
-        self._path, self._report = path, report
-        self.usable = True  # as far as can be told before
-
-    def release(self) -> None:
-        """Open, write the report, close."""
-        from common.errors import FeelaheadError  # noqa: PLC0415  # Linux needs nothing of ours
-        from operator_side.dualsense.hid.device import write_once  # noqa: PLC0415  # needs hidapi
-
-        for _ in range(_ATTEMPTS):
-            try:
-                write_once(self._path, self._report)
-                return
-            except FeelaheadError:
-                continue
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-Target = LinuxTarget | HidapiTarget
-
-
 class Watch:
     """What is held, and until when the next beat is waited for."""
 
@@ -104,7 +78,7 @@ class Watch:
             self._take(None)
         elif len(words) == 3 and words[0] == b"hold":
             path, report = (bytes.fromhex(word.decode("ascii")) for word in words[1:])
-            self._take(LinuxTarget(path, report) if sys.platform == "linux" else HidapiTarget(path, report))
+            self._take(Target(path, report))
 
     def release(self) -> None:
         """Write the report, if a controller is held; what is released now is not waited for again."""
@@ -144,18 +118,14 @@ def watch(input_file: int, answer_file: int) -> None:
 
 def _readable(file: int, patience_s: float | None) -> bool:
     """Wait for something to be read, or for the end; False when there is nothing for so long."""
-    if sys.platform == "win32":
-        return True  # a pipe cannot be waited for with a limit there: the beats are not counted, the end still is
     return bool(select.select([file], [], [], patience_s)[0])
 
 
 def main() -> None:
     """Ignore what stops the operator side, which ends us by closing the pipe."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # Windows has no SIGHUP
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    if sys.platform != "win32":
-        os.set_blocking(sys.stdout.fileno(), False)  # an answer is lost rather than waited for
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    os.set_blocking(sys.stdout.fileno(), False)  # an answer is lost rather than waited for
     watch(sys.stdin.fileno(), sys.stdout.fileno())
 
 
