@@ -13,7 +13,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
 from common.sockets.allow_list import AllowList
-from common.sockets.keys import KeyFolder, passed_over_note, read_public_key
+from common.sockets.keys import KeyFolder, read_public_key
 from common.sockets.readable import readable
 
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
@@ -54,11 +54,11 @@ class RobotKeys:
         return cls(secret, allowed)
 
     def notes(self) -> list[str]:
-        """What a person should know at the start: who is let in, and which files are passed over."""
+        """What a person should know at the start: who is let in."""
         folder, names = self.allowed.folder, ", ".join(sorted(self.allowed.names.values()))
         change = folder.command("allow NAME KEY")
         who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {change}"
-        return [f"keys: {text}" for text in (who, *passed_over_note(folder))]
+        return [f"keys: {who}"]
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
         """Let nobody into `part` but who has an allowed key; before it is bound."""

@@ -177,8 +177,12 @@ class KeyFolder:
         """
         names: dict[str, str] = {}
         faults = []
-        for path in self._peer_files():
+        for path in self._allowed_files():
             try:
+                if _NAME.fullmatch(path.stem) is None:
+                    raise ConfigurationError(
+                        f"allowed: {path}: its name is no peer's; valid: letters, digits, - and _, then .public"
+                    )
                 key = _read_key(path, "allowed")
             except ConfigurationError as error:
                 faults.append(str(error))
@@ -191,7 +195,7 @@ class KeyFolder:
 
         Errors as in `peers`.
         """
-        return tuple((path.name, *_stand(path)) for path in self._peer_files())
+        return tuple((path.name, *_stand(path)) for path in self._allowed_files())
 
     def command(self, rest: str) -> str:
         """The command line that does `rest` to this folder."""
@@ -201,16 +205,6 @@ class KeyFolder:
     def peer_path(self, name: str) -> Path:
         """Where the public key of the peer of that name stands; ConfigurationError for what is no name."""
         return self.allowed_path / f"{checked_name(name)}.public"
-
-    def passed_over(self) -> list[str]:
-        """Files among the allowed keys whose names are no peer's, so that they let nobody in; ConfigurationError."""
-        return [path.name for path in self._allowed_files() if _NAME.fullmatch(path.stem) is None]
-
-    def _peer_files(self) -> list[Path]:
-        files = [path for path in self._allowed_files() if _NAME.fullmatch(path.stem)]
-        if len(files) > PEER_LIMIT:
-            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
-        return files
 
     def _allowed_files(self) -> list[Path]:
         try:
@@ -225,7 +219,10 @@ class KeyFolder:
                 f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder of this user's, mode 0700"
             ) from error
         _refuse_writable(self.allowed_path)
-        return [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
+        files = [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
+        if len(files) > PEER_LIMIT:
+            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
+        return files
 
     @staticmethod
     def _make_folder(path: Path) -> None:
@@ -233,16 +230,6 @@ class KeyFolder:
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigurationError(f"--folder {path}: cannot be made: {error.strerror}") from error
-
-
-def passed_over_note(folder: KeyFolder) -> list[str]:
-    """A line for a person, where keys lie there that let nobody in because of their files' names."""
-    names = folder.passed_over()
-    if not names:
-        return []
-    return [
-        f"passed over, for its name is no peer's: {', '.join(names)}; valid: letters, digits, - and _, then .public"
-    ]
 
 
 def _read_key(path: Path, what: str) -> str:
