@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from common.errors import DeviceError
 from operator_side.dualsense.effects.official import MultiPositionFeedback, Off, OtherEffect, TriggerEffect
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState
-from operator_side.dualsense.reports.feature_report import Firmware, build_calibration, parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import (
     USUAL_LIGHT,
@@ -21,7 +20,7 @@ from operator_side.dualsense.reports.output_report import (
     build_output_report,
 )
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS, SIMULATED_FIRMWARE, SimulatedDualSense
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import (
     FINGER_TIME_CONSTANT_S,
     NORMAL_FINGER_FORCE_N,
@@ -228,16 +227,6 @@ def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
 
 
 # Its modes, and the cable
-
-
-@TRANSPORTS
-def test_features(transport: Transport) -> None:
-    device = SimulatedDualSense(transport)
-    assert parse_address(device.get_feature(0x09), transport) == SIMULATED_ADDRESS == device.address
-    assert Firmware.parse(device.get_feature(0x20), transport) == SIMULATED_FIRMWARE
-    assert device.get_feature(0x05) == build_calibration(transport)
-    with pytest.raises(DeviceError, match="no feature report 0x22; valid: 0x05, 0x09, 0x20"):
-        device.get_feature(0x22)
 
 
 @TRANSPORTS
