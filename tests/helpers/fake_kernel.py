@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from common.clock import VirtualClock
 from common.errors import DeviceError
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.uhid.controller import EVENT_LENGTH
+from operator_side.dualsense.uhid.file import UhidFile
 
 START, STOP, OUTPUT, GET_REPORT = 2, 3, 6, 9
 FEATURE, OUT = 0, 1
@@ -26,7 +28,7 @@ def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
 
 
 @dataclass
-class FakeKernel:
+class FakeKernel(UhidFile):
     """What the loop reads, waits for and writes; a wait lets the time pass."""
 
     clock: VirtualClock
@@ -55,10 +57,11 @@ class FakeKernel:
         return [(now_s, event) for now_s, event in self.heard if event[0] == kind]
 
 
-class PlainController:
+class PlainController(SimulatedDualSense):
     """A report that counts, at each reading; takes what begins with 2, and has feature 5."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.written: list[bytes] = []
         self.reads = 0
 

@@ -8,7 +8,7 @@ byte order.
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated, Final, Protocol
+from typing import Annotated, Final
 
 from msgspec import Meta
 
@@ -17,6 +17,7 @@ from common.limits import check_limits
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID, Model
 from operator_side.dualsense.reports.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
 from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 EVENT_LENGTH: Final = 4380
 """sizeof(struct uhid_event), padded to 8 bytes; the length to ask for with each read."""
@@ -52,22 +53,6 @@ _GET = struct.Struct("=IBB")
 _GET_REPLY = struct.Struct("=IIHH")
 _SET = struct.Struct("=IBBH")
 _SET_REPLY = struct.Struct("=IIH")
-
-
-class OfferedController(Protocol):
-    """What is used of a simulated controller."""
-
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report, or None when there is no new one."""
-        ...
-
-    def take_report(self, report: bytes, now_s: float) -> None:
-        """Take an output report; ValueError, and nothing changed, for one that it cannot read."""
-        ...
-
-    def get_feature(self, report_id: int) -> bytes:
-        """The answer to a feature report, its id in front; DeviceError for one that it does not have."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +95,7 @@ class UhidCounts:
 class UhidController:
     """One controller on one file of /dev/uhid: each method gives what is to be written to it."""
 
-    def __init__(self, controller: OfferedController, told: UhidIdentity) -> None:
+    def __init__(self, controller: SimulatedDualSense, told: UhidIdentity) -> None:
         self.counts = UhidCounts()
         self.driven = False
         """A driver has taken the device."""

@@ -7,7 +7,7 @@ import select
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Protocol
+from typing import Final
 
 from common.clock import Clock
 from common.errors import ConfigurationError, DeviceError
@@ -80,24 +80,8 @@ class UhidFile:
         return self._descriptor
 
 
-class EventFile(Protocol):
-    """What the loop uses of it."""
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for the kernel to say something; whether it has."""
-        ...
-
-    def read(self) -> bytes | None:
-        """One event, or None when there is none."""
-        ...
-
-    def write(self, event: bytes) -> None:
-        """Tell the kernel; DeviceError when it does not have the device."""
-        ...
-
-
 def offer(
-    file: EventFile,
+    file: UhidFile,
     controller: UhidController,
     clock: Clock,
     period_s: float,
