@@ -72,7 +72,7 @@ def surroundings_of(
     lease = core.lease
     return Surroundings(
         hands="controller" if shared is None else shared.hands,
-        asked_to_robot=line.profile.words(),
+        asked_to_robot=line.profile.words,
         swap_sides=swap_sides,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,

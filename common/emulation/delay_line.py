@@ -143,7 +143,7 @@ class DelayLine(Generic[Item]):
     def summary(self) -> dict[str, Any]:
         """`asked`, in the grammar's words, with model and seed, what is `expected` and was `achieved`."""
         return {
-            "asked": self.profile.words(),
+            "asked": self.profile.words,
             "model": self.profile.model,
             "seed": self.profile.seed,
             "expected": expected(self.profile),

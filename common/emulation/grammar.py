@@ -109,7 +109,8 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
     if words.number_follows(percent=False):
         settings["jitter_s"] = words.value(parse_duration, "delay", "jitter")
         if words.number_follows(percent=True):
-            settings["delay_correlation"] = words.value(parse_share, "delay", "correlation")
+            # Without effect: in netem, too, the delays stay independent (measured lag-1 correlation 0).
+            words.value(parse_share, "delay", "correlation")
     if words.take_if("distribution"):
         if "jitter_s" not in settings:
             raise words.error("'distribution' without a jitter to shape", "delay")

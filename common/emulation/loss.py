@@ -6,13 +6,12 @@ its middle, so that rare events all but vanish: `loss 10% 50%` loses 0.1 %.
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.limits import Share, check_limits
-from common.units import format_share
 
 _DRAWN_AT_ONCE = 256
 _WORDS = 2**32
@@ -59,10 +58,6 @@ class RandomLoss:
         """The share that is asked for; netem's correlation loses less."""
         return self.probability
 
-    def words(self) -> str:
-        """In netem's grammar."""
-        return f"loss {_shares(self)}"
-
 
 @dataclass(frozen=True)
 class GilbertElliott:
@@ -101,17 +96,5 @@ class GilbertElliott:
         bad = self.p / (self.p + self.r) if self.p else 0.0
         return (1.0 - bad) * self.loss_good + bad * self.loss_bad
 
-    def words(self) -> str:
-        """In netem's grammar."""
-        return f"loss gemodel {_shares(self)}"
-
 
 LossModel = RandomLoss | GilbertElliott
-
-
-def _shares(loss: LossModel) -> str:
-    """In order, without those at the end that have their defaults."""
-    parts = list(fields(loss))
-    while getattr(loss, parts[-1].name) == parts[-1].default:
-        parts.pop()
-    return " ".join(format_share(getattr(loss, part.name)) for part in parts)

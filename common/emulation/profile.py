@@ -1,7 +1,6 @@
 """What one direction of one stream does to messages: a frozen, validated profile."""
 
 import math
-import shlex
 from dataclasses import dataclass, field
 from typing import Annotated, get_args
 
@@ -13,8 +12,7 @@ from common.emulation.grammar import read_fields
 from common.emulation.loss import LossModel
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
-from common.limits import Share, check_limits
-from common.units import format_duration, format_rate, format_share
+from common.limits import check_limits
 
 _SHORTEST_RECOVERY_S = 1e-3
 _RECOVERY_ROUND_TRIPS = 1.25
@@ -42,8 +40,6 @@ class LinkProfile:
     distribution: Distribution = "uniform"
     seed: int = 0
     model: LinkModel = "datagram"
-    delay_correlation: Share = 0.0
-    """Kept for the words alone: in netem, too, the delays stay independent (measured lag-1 correlation 0)."""
     loss: LossModel | None = None
     duplicate: Chance | None = None
     corrupt: Chance | None = None
@@ -61,6 +57,8 @@ class LinkProfile:
     """In a stream, how long until a lost message is sent again; None: see `recovery_s`."""
     round_trip_s: _Recovery | None = field(default=None, compare=False)
     """Of both directions, where the other one is known; None: twice this one."""
+    words: str = field(default="", compare=False)
+    """In the grammar's words, as they were given."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -84,32 +82,9 @@ class LinkProfile:
         check_seed_and_model(seed, model)
         fields = read_fields(profile, spec, model)
         try:
-            return cls(**fields, seed=seed, model=model)
+            return cls(**fields, seed=seed, model=model, words=" ".join(profile.split()))
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
-
-    def words(self) -> str:
-        """The profile in the words that `parse` reads; empty where nothing is asked for."""
-        clauses = [_format_delay(self)]
-        if self.loss is not None:
-            clauses.append(self.loss.words())
-        clauses += [f"{name} {_format_chance(getattr(self, name))}" for name in ("duplicate", "corrupt", "reorder")]
-        clauses = [clause for clause in clauses if not clause.endswith(" ")]
-        if self.reorder is not None and self.gap > 1:
-            clauses.append(f"gap {self.gap}")
-        if self.rate is not None:
-            overhead = f" {self.rate.overhead_bytes}" if self.rate.overhead_bytes else ""
-            clauses.append(f"rate {format_rate(self.rate.bits_per_second)}{overhead}")
-        if self.limit != QUEUE_LIMIT:
-            clauses.append(f"limit {self.limit}")
-        if self.trace is not None:
-            clauses.append(f"trace {shlex.quote(self.trace.name)}")
-        for outage in self.outages:
-            every = "" if outage.every_s is None else f" every {format_duration(outage.every_s)}"
-            clauses.append(f"outage {format_duration(outage.duration_s)} at {format_duration(outage.at_s)}{every}")
-        if self.retransmit_s is not None:
-            clauses.append(f"retransmit {format_duration(self.retransmit_s)}")
-        return " ".join(filter(None, clauses))
 
     def mean_delay_s(self) -> float:
         """Of the delay asked for, without what rate and retransmission add."""
@@ -155,24 +130,3 @@ def check_seed_and_model(seed: int, model: LinkModel) -> None:
 def choices(literal: object) -> str:
     """The values of a Literal, for messages."""
     return ", ".join(get_args(literal))
-
-
-def _format_delay(profile: LinkProfile) -> str:
-    if profile.delay_s == 0.0 and profile.jitter_s == 0.0:
-        return ""
-    words = ["delay", format_duration(profile.delay_s)]
-    shape = profile.distribution
-    if profile.jitter_s or profile.delay_correlation or shape != "uniform":
-        words.append(format_duration(profile.jitter_s))
-        if profile.delay_correlation:
-            words.append(format_share(profile.delay_correlation))
-        if shape != "uniform":
-            words += ["distribution", shape]
-    return " ".join(words)
-
-
-def _format_chance(chance: Chance | None) -> str:
-    if chance is None:
-        return ""
-    correlation = f" {format_share(chance.correlation)}" if chance.correlation else ""
-    return format_share(chance.share) + correlation

@@ -21,8 +21,6 @@ _COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where 
 class Trace:
     """Delays in order of sending: the n-th message gets the n-th, and after the last the first again."""
 
-    name: str
-    """The file that it came from."""
     delays_s: tuple[float | None, ...]
     """None: that message is lost."""
 
@@ -40,7 +38,7 @@ class Trace:
         """
         rows = read_samples(path, field)
         try:
-            return cls(str(path), tuple(row.delay_s for row in rows))
+            return cls(tuple(row.delay_s for row in rows))
         except ValueError as error:
             raise ConfigurationError(f"{field}: {path}: no message arrives; valid: one or more that do") from error
 

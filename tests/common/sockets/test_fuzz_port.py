@@ -23,12 +23,6 @@ from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS
 
 
 @pytest.fixture
-def robot() -> Iterator[RobotSockets]:
-    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
-        yield opened
-
-
-@pytest.fixture
 def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
     with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
         assert is_heard(robot, opened)

@@ -1,7 +1,5 @@
 """Real sockets on loopback. Nothing here sleeps: every wait is for a message, or for a bounded time at most."""
 
-from collections.abc import Iterator
-
 import pytest
 
 from common.sockets import inbox
@@ -18,19 +16,6 @@ from tests.helpers.socket_talk import (
     receive_one,
     send_until_connected,
 )
-
-
-@pytest.fixture
-def robot() -> Iterator[RobotSockets]:
-    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
-        yield opened
-
-
-@pytest.fixture
-def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
-    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
-        yield opened
-
 
 # Control
 

@@ -239,22 +239,13 @@ def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool
         assert abs(error_s(offset, clock, now_s)) < 0.5e-3
 
 
-def test_a_route_that_gets_shorter_is_no_jump() -> None:
+@pytest.mark.parametrize(("before_s", "there_s", "back_s"), [(0.080, 0.040, 0.040), (0.040, 0.140, 0.080)])
+def test_a_route_that_gets_shorter_or_longer_is_no_jump(before_s: float, there_s: float, back_s: float) -> None:
     generator, clock = np.random.default_rng(24), ahead(70.0)
     offset = ClockOffset(shared_clock=False)
     queues_s = generator.exponential(0.005, (2, 2000))
-    end_s = talk(offset, clock, 0.080 + queues_s[0], 0.080 + queues_s[1])
-    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1], start_s=end_s)
-    assert offset.jumps == 0
-    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
-
-
-def test_a_route_that_gets_longer_changes_nothing() -> None:
-    generator, clock = np.random.default_rng(25), ahead(70.0)
-    offset = ClockOffset(shared_clock=False)
-    queues_s = generator.exponential(0.005, (2, 2000))
-    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1])
-    end_s = talk(offset, clock, 0.140 + queues_s[0], 0.080 + queues_s[1], start_s=end_s)
+    end_s = talk(offset, clock, before_s + queues_s[0], before_s + queues_s[1])
+    end_s = talk(offset, clock, there_s + queues_s[0], back_s + queues_s[1], start_s=end_s)
     assert offset.jumps == 0
     assert abs(error_s(offset, clock, end_s)) < 0.5e-3
 
