@@ -45,7 +45,7 @@ class DelayLine(Generic[Item]):
         self._start_s = start_s
         self._corrupt = corrupt
         self._queue: list[tuple[float, int, Item, float, int, int, bool]] = []
-        """By due time and order of arrival."""
+        """Messages by due time and order of arrival."""
         self._entered = 0
         self._last_due_s = -math.inf
         self._follow(profile)
@@ -130,7 +130,7 @@ class DelayLine(Generic[Item]):
         return self._queue[0][0] if self._queue else None
 
     def backlog_s(self, now_s: float) -> float:
-        """How long what is pushed now would wait, beyond its delay, for what a rate still holds back."""
+        """Time that a message pushed now would wait for a rate, beyond its delay."""
         if self._rate is None:
             return 0.0
         return max(0.0, self._last_due_s - now_s - self._mean_delay_s)

@@ -1,4 +1,4 @@
-"""What a profile is to give in the long run, where theory says so, to stand beside what was achieved."""
+"""Delay and loss of a profile in the long run, where theory gives them, beside the measured ones."""
 
 from typing import Any
 

@@ -67,9 +67,9 @@ class GilbertElliott:
     """
 
     p: Share
-    """From good to bad."""
+    """Probability from good to bad."""
     r: Share
-    """From bad to good: without loss in the good state, bursts of 1 / r messages on average."""
+    """Probability from bad to good: without loss in the good state, bursts of 1 / r messages on average."""
     loss_bad: Share = 1.0
     """1-h."""
     loss_good: Share = 0.0

@@ -21,7 +21,7 @@ NAMED_LINKS: Final[Mapping[str, str]] = MappingProxyType(
         "to_operator: delay 300ms 2ms distribution normal rate 10mbit",
     }
 )
-"""In order of delay."""
+"""The links in order of delay."""
 
 
 def with_names_spelled_out(spec: str) -> str:

@@ -1,4 +1,4 @@
-"""What one direction of one stream does to messages: a frozen, validated profile."""
+"""A frozen, validated profile of one direction of one stream."""
 
 import math
 from dataclasses import dataclass, field
@@ -46,7 +46,7 @@ class LinkProfile:
     reorder: Chance | None = None
     """At once, ahead of what is being delayed."""
     gap: _Count = 1
-    """At most one in this many is reordered."""
+    """The least number of messages from one that is reordered to the next."""
     rate: Rate | None = None
     limit: _Count = QUEUE_LIMIT
     """Messages that may wait; what comes on top is dropped."""
@@ -56,9 +56,9 @@ class LinkProfile:
     retransmit_s: _Recovery | None = None
     """In a stream, how long until a lost message is sent again; None: see `recovery_s`."""
     round_trip_s: _Recovery | None = field(default=None, compare=False)
-    """Of both directions, where the other one is known; None: twice this one."""
+    """The mean delay of both directions, where the other one is known; None: twice this one."""
     words: str = field(default="", compare=False)
-    """In the grammar's words, as they were given."""
+    """The profile in the grammar's words, as given."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -87,7 +87,7 @@ class LinkProfile:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
 
     def mean_delay_s(self) -> float:
-        """Of the delay asked for, without what rate and retransmission add."""
+        """The mean of the delay asked for, without rate and retransmission."""
         if self.trace is not None:
             known_s = [delay_s for delay_s in self.trace.delays_s if delay_s is not None]
             return math.fsum(known_s) / len(known_s)

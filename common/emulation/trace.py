@@ -22,7 +22,7 @@ class Trace:
     """Delays in order of sending: the n-th message gets the n-th, and after the last the first again."""
 
     delays_s: tuple[float | None, ...]
-    """None: that message is lost."""
+    """The delay of each message; None for a lost one."""
 
     def __post_init__(self) -> None:
         if all(delay_s is None for delay_s in self.delays_s):
@@ -50,7 +50,7 @@ class Sample:
     sent_s: float | None
     """On the recording's own clock, where it has that."""
     delay_s: float | None
-    """None: lost."""
+    """The message's delay; None for a lost one."""
 
 
 def read_samples(path: Path, field: str) -> list[Sample]:

@@ -1,4 +1,4 @@
-"""How many connections one port bears: whoever has been introduced stays, and of the others the newest."""
+"""Bound the connections of one port: those that were introduced stay, and of the others the newest."""
 
 from collections.abc import Iterator
 
@@ -35,13 +35,13 @@ class Crowd:
         return self._numbers.get(descriptor, 0)
 
     def went(self, descriptor: int) -> None:
-        """It ended; its number may stand for another one next."""
+        """The connection ended; the descriptor may stand for another one next."""
         self._newcomers.pop(descriptor, None)
         self._known.discard(descriptor)
         self._numbers.pop(descriptor, None)
 
     def surplus(self, now_s: float) -> Iterator[int]:
-        """Whom to hang up on: those who came first of the newcomers, so that one who is quick gets in in any crowd."""
+        """The connections to end: the oldest newcomers, so that a quick one gets in in any crowd."""
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
             if now_s - came_s >= self._introduced_s:

@@ -26,13 +26,13 @@ PEER_LIMIT = 256
 """Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-"""What says nothing of a file or folder: this process or the machine is short of something."""
+"""Errors that say nothing of a file or folder: this process or the machine is short of something."""
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
 def default_folder() -> Path:
-    """Where keys are unless another folder is named."""
+    """The folder of keys unless another one is named."""
     return configuration_folder() / "keys"
 
 
@@ -71,12 +71,12 @@ def read_public_key(key_or_file: str, what: str) -> str:
 
 @dataclass(frozen=True)
 class Peers:
-    """Who is let in, and which files let nobody in."""
+    """The peers that are let in, and the files that let nobody in."""
 
     names: dict[str, str]
     """The name of each key."""
     faults: tuple[str, ...]
-    """What is wrong with the files that hold no key, a line each."""
+    """The faults of files that hold no key, a line each."""
 
 
 @dataclass(frozen=True)
@@ -89,11 +89,11 @@ class KeyFolder:
         object.__setattr__(self, "path", self.path.expanduser())
 
     def secret_path(self, side: Side) -> Path:
-        """Where the side's own secret key stands."""
+        """The file of the side's own secret key."""
         return self.path / f"{side}.secret"
 
     def public_path(self, side: Side) -> Path:
-        """Where its public part stands."""
+        """The file of the public part."""
         return self.path / f"{side}.public"
 
     @property
@@ -170,7 +170,7 @@ class KeyFolder:
         return self.peers().names
 
     def peers(self) -> Peers:
-        """Who is let in: a file that cannot be read, or is gone by now, excludes its own key alone.
+        """The peers that are let in: a file that cannot be read, or is gone by now, excludes its own key alone.
 
         ConfigurationError for a folder that others may write to or that cannot be read; OSError when nothing can be
         read at present, whatever it is.
@@ -191,7 +191,7 @@ class KeyFolder:
         return Peers(names, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
-        """What changes whenever the peers do: each file's name, time of change and number, without reading any.
+        """A value that changes whenever the peers do: each file's name, time of change and number, without reading any.
 
         Errors as in `peers`.
         """
@@ -203,7 +203,7 @@ class KeyFolder:
         return f"feelahead keys {rest}{folder}"
 
     def peer_path(self, name: str) -> Path:
-        """Where the public key of the peer of that name stands; ConfigurationError for what is no name."""
+        """The file of the public key of the peer of that name; ConfigurationError for what is no name."""
         return self.allowed_path / f"{checked_name(name)}.public"
 
     def _allowed_files(self) -> list[Path]:
@@ -250,7 +250,7 @@ def _read_key(path: Path, what: str) -> str:
 
 
 def _stand(path: Path) -> tuple[int, int]:
-    """What changes when a file does, its permissions included, or why that cannot be known."""
+    """Numbers that change when a file or its permissions do, or why they cannot be known."""
     try:
         found = path.stat()
     except OSError as error:

@@ -24,19 +24,19 @@ MOST_CONNECTIONS = 1024
 """To each port, and never more than a quarter of the descriptors that this process may open."""
 _REMEMBERED_PEERS = 1024
 _EVENTS_PER_CALL = 256
-"""Of each port, 5 us each, so that connections that come and go cannot hold the caller."""
+"""Events of each port, 5 us each: connections that come and go cannot hold the caller."""
 
 
 @dataclass
 class _Peer:
-    """What the robot side remembers of a connection."""
+    """The robot side's memory of one connection."""
 
     key: str
     """Whom it authenticated as; empty without keys."""
     descriptor: int = -1
-    """That which its last message came by; -1 where it is not known."""
+    """The descriptor that the last message came by; -1 where it is not known."""
     connection: int | None = None
-    """Which one of the crowd that was, as the descriptor may be another's later; 0: one that ended; None: unknown."""
+    """The number of that connection in the crowd; 0 for one that ended, None while unknown."""
     received: int = 0
     """Messages in the present second."""
 
@@ -103,7 +103,7 @@ class RobotSockets(SocketShell):
         return 0 if self._authenticator is None else self._authenticator.refused
 
     def news(self) -> list[str]:
-        """What a person should know about strangers and keys since the last call, a line each."""
+        """News of strangers and keys since the last call, a line each."""
         news, wrong = [], []
         if self.crowded:
             limit = self._gates[0].crowd.limit
@@ -282,7 +282,7 @@ def _shut_down(descriptor: int) -> None:
 
 
 def _property(frame: zmq.Frame, name: str) -> str:
-    """What ZeroMQ knows of the connection that `frame` came by; empty where it does not."""
+    """A property of the connection that `frame` came by; empty where ZeroMQ has none."""
     try:
         return str(frame.get(name))
     except zmq.ZMQError:

@@ -25,7 +25,7 @@ _MEND: Final = "measure it anew with: feelahead calibrate; or delete the file fo
 
 @dataclasses.dataclass(frozen=True)
 class _Stored:
-    """What a file holds."""
+    """The content of a file."""
 
     version: Literal[1]
     address: str
@@ -39,7 +39,7 @@ class _Stored:
 
 
 def calibration_path(address: str) -> Path:
-    """Where the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff") is; ValueError for another form."""
+    """The file of the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); ValueError for another form."""
     return configuration_folder() / "controllers" / f"{checked_address(address).replace(':', '-')}.toml"
 
 

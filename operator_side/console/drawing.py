@@ -28,7 +28,7 @@ _SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
 """The first look at the tool is from here, relative to it."""
 _LIGHT_FROM: Final = (0.4, -1.0, 1.5)
 _FIELD_OF_VIEW: Final = 0.9
-"""In radians."""
+"""The angle in radians."""
 _STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _GONE: Final = 1e-6
 """The size of what is not to be seen."""
@@ -213,7 +213,7 @@ class Drawing:
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
-    """By its role; towards a trigger's colour the more of it that one's gripper overlaps."""
+    """Colours by role; towards a trigger's colour the more of it that one's gripper overlaps."""
     colors = _ROLE_COLORS[roles]
     for index, by_l2_m3, by_r2_m3 in state.overlaps:
         if 0 <= index < len(roles):

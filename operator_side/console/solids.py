@@ -1,6 +1,6 @@
-"""The shapes of a scene as triangles that a browser draws: one mesh for all that are alike up to their size.
+"""The shapes of a scene as triangles that a browser draws: one mesh for all that differ in size alone.
 
-They are trimesh's, which viser brings.
+The meshes are trimesh's, which viser brings.
 
 Vertices (v, 3) float32 in metres, triangles (t, 3) uint32, seen from outside counterclockwise.
 """
@@ -30,7 +30,7 @@ class Solid(NamedTuple):
 
 
 def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, float, float]]:
-    """What a shape is drawn as: a key that is equal for what shares a mesh, that mesh, and its scale."""
+    """A key that is equal for shapes that share a mesh, that mesh, and the scale."""
     x, y, z = shape.size_m
     if shape.kind == "box":
         return ("box",), box(), (x, y, z)
@@ -59,7 +59,7 @@ def box() -> Solid:
 
 @cache
 def sphere(divisions: int = 2) -> Solid:
-    """Radius 1: an icosahedron whose triangles are divided into four so many times."""
+    """Radius 1: an icosahedron whose triangles are divided into four, `divisions` times."""
     return _solid(trimesh.creation.icosphere(subdivisions=divisions))
 
 

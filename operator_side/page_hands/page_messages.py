@@ -1,4 +1,4 @@
-"""What a page of the console says of its hands and of what it wants tuned: frozen, and validated whole."""
+"""Messages of a page of the console, of hands and of wishes to tune: frozen, and validated whole."""
 
 from typing import Annotated, Literal
 
@@ -14,7 +14,7 @@ _LARGEST = 2**53 - 1
 
 
 class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the hands at one page do; sent 50 times a second while they drive, and at once when anything changes."""
+    """The hands at one page; sent 50 times a second while they drive, and at once when anything changes."""
 
     page: Annotated[str, Meta(min_length=1, max_length=32)]
     """A word by which the page tells itself from others"""
@@ -53,7 +53,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a page wants to be different; None leaves it."""
+    """The wish of a page for another P or link; None leaves it."""
 
     probability: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
     link: Annotated[str, Meta(max_length=200)] | None = None

@@ -18,7 +18,7 @@ from operator_side.dualsense.reports.transport import Transport
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
 SIMPLE_REPORT = bytes.fromhex("01 80808080 080000 0000")
-"""What Bluetooth starts with: nothing touched."""
+"""The first report over Bluetooth: nothing touched."""
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
@@ -33,7 +33,7 @@ class FakeHandle:
     answers: bool = True
     """Whether it answers feature reports."""
     garbled: int = 0
-    """So many feature reports come over the air with a wrong bit."""
+    """Number of feature reports that come over the air with a wrong bit."""
     silent: bool = False
     plugged_in: bool = True
     waiting: list[bytes] = field(default_factory=list)

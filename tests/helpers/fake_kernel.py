@@ -29,7 +29,7 @@ def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
 
 @dataclass
 class FakeKernel(UhidFile):
-    """What the loop reads, waits for and writes; a wait lets the time pass."""
+    """The file that the loop reads, waits for and writes; a wait lets the time pass."""
 
     clock: VirtualClock
     to_say: deque[tuple[float, bytes]] = field(default_factory=deque)

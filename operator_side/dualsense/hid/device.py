@@ -58,21 +58,21 @@ def load_backend() -> HidBackend:
 
 @dataclass(frozen=True)
 class Identity:
-    """What a controller says of itself; None for what it does not tell."""
+    """The facts that a controller tells of itself; None for those that are missing."""
 
     transport: Transport
     address: str | None
-    """Its Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    """The Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
     firmware: Firmware | None
     first_report: bytes
-    """The input report by which the transport was told."""
+    """The input report that shows the transport."""
 
 
 class HidDualSense:
     """The Device port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
-        """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
+        """Open it and ask for its facts, which takes a few reports' time; DeviceError names the fault.
 
         On Bluetooth, asking is also what switches it to full reports.
         """
@@ -100,8 +100,8 @@ class HidDualSense:
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
 
-        One that no controller sends is passed over as long as there is a good one; else the newest is returned as it
-        is, and parsing it says what is wrong.
+        A bad report is passed over as long as there is a good one. Else the newest is returned, and parsing it names
+        the fault.
         """
         del now_s  # a real controller has a clock of its own
         self._require_open()
@@ -162,9 +162,8 @@ class HidDualSense:
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
     """Handles to read and to write by.
 
-    hidapi keeps the text of the last failure with each handle and frees it with every call, so that one handle
-    must not be read and written at once (background_writes.py). Both are opened at once, while the path is
-    certainly still this controller's.
+    hidapi keeps the text of the last failure with each handle and frees it with every call. One handle must not be
+    read and written at once (background_writes.py). Both are opened now, while the path is still this controller's.
     """
     handles: list[HidHandle] = []
     for _ in range(2):
@@ -189,7 +188,7 @@ def _write(handle: HidHandle, report: bytes) -> None:
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:
-    """What the controller is; OSError when it goes away meanwhile."""
+    """Ask the controller for its facts; OSError when it goes away meanwhile."""
     # Bluetooth starts with short reports: this is what ends them, so it comes before the first one is awaited.
     _feature(handle, FIRMWARE_ID, bytes)
     first_report = _first_report(handle, path)

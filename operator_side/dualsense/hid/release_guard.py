@@ -10,9 +10,9 @@ from typing import Final
 
 _WATCHDOG = Path(__file__).with_name("release_watchdog.py")
 _END_TIMEOUT_S = 2.0
-"""It releases what it holds and ends within milliseconds, but on a busy machine its turn may be late."""
+"""The watchdog ends within milliseconds, but a busy machine may let it wait."""
 MOST_REPLACEMENTS: Final = 3
-"""Whatever ends so many watchdogs will end the next one, too."""
+"""A cause that ended this number of watchdogs will end the next one, too."""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
 
 
@@ -104,7 +104,7 @@ class ReleaseGuard:
             self._process.stdin.write(f"{line}\n".encode("ascii"))
 
     def _refusals(self) -> list[str]:
-        """What it answered since the last look; nothing is waited for."""
+        """Read the answers since the last look, without waiting."""
         if self._process is None or self._process.stdout is None:
             return []
         self._answers += self._process.stdout.read(4096) or b""

@@ -1,16 +1,16 @@
-"""A small process that outlives the operator side by a moment, to release the triggers when that was killed.
+"""Release the triggers when the operator side was killed: a small process that outlives it by a moment.
 
     hold PATH REPORT    a controller is in use: when everything else fails, write REPORT to it (both in hexadecimal)
     let-go              it is not in use any more, or has been released already
     beat                an effect is on, or about to be: the next beat follows within SILENCE_S, or `rest` does
     rest                no effect is on: there are no beats until the next one
 
-These lines come on the standard input. When that closes while a controller is held, whoever wrote them has died
-without a word (kill -9, a crash): the report is written and the process ends. When the beats cease, he hangs
-(kill -STOP, a write that never returns): the report is written, once for each silence. Nothing is written otherwise.
+These lines come on the standard input. When that closes while a controller is held, the writer has died without a
+word (kill -9, a crash). Then the report is written and the process ends. When the beats cease, the writer hangs
+(kill -STOP, a write that never returns). Then the report is written, once for each silence.
 Each `hold` is answered on the standard output: `held`, or `refused` when the controller cannot be opened.
 
-It is run as a bare file with `python -I -S`, so that it starts in some 10 ms and stays small: only modules that Python
+The process runs as a bare file with `python -I -S`, to start in some 10 ms and to stay small. Only modules that Python
 has loaded anyway are imported.
 """
 
@@ -21,7 +21,7 @@ import sys
 import time
 
 SILENCE_S = 0.2
-"""Without a beat for this long while an effect is on, nobody looks after it."""
+"""The longest time without a beat while an effect is on."""
 _ATTEMPTS = 3
 """A transfer can fail once while the controller is there; one that is gone refuses each at once."""
 
@@ -55,7 +55,7 @@ class Target:
 
 
 class Watch:
-    """What is held, and until when the next beat is waited for."""
+    """The controller that is held, and the time by which the next beat is due."""
 
     def __init__(self, answer_file: int) -> None:
         """`answer_file`: each `hold` is answered there."""
@@ -64,7 +64,7 @@ class Watch:
         self._deadline_s: float | None = None
 
     def patience_s(self, now_s: float) -> float | None:
-        """How long the next beat may still take; None for as long as it likes."""
+        """Time that the next beat may still take; None for no limit."""
         return None if self._deadline_s is None else max(0.0, self._deadline_s - now_s)
 
     def follow(self, line: bytes, now_s: float) -> None:
@@ -95,7 +95,7 @@ class Watch:
         try:  # noqa: SIM105  # contextlib would have to be imported
             os.write(self._answer_file, b"held\n" if target.usable else b"refused\n")
         except OSError:
-            pass  # whoever asked has died meanwhile, or does not listen: that is no reason to end
+            pass  # the writer has died meanwhile, or does not listen: that is no reason to end
 
 
 def watch(input_file: int, answer_file: int) -> None:
@@ -117,7 +117,7 @@ def watch(input_file: int, answer_file: int) -> None:
 
 
 def _readable(file: int, patience_s: float | None) -> bool:
-    """Wait for something to be read, or for the end; False when there is nothing for so long."""
+    """Wait for something to be read, or for the end; False when nothing came in time."""
     return bool(select.select([file], [], [], patience_s)[0])
 
 

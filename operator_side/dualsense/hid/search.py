@@ -85,7 +85,7 @@ class BackgroundSearch:
         self._thread.start()
 
     def take(self) -> OpenController | DeviceError | None:
-        """What was found, or why nothing was; whatever else went wrong in the thread is raised here."""
+        """The controller, or why there is none; any other failure in the thread is raised here."""
         if self._thread is None or self._thread.is_alive():
             return None
         self._thread = None

@@ -77,7 +77,7 @@ def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Firmware:
-    """What runs in the controller."""
+    """The versions of a controller."""
 
     hardware_version: Word
     firmware_version: Word

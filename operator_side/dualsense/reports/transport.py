@@ -1,4 +1,4 @@
-"""How a controller is attached, and what that changes of its reports: ids, lengths, the common block, the checksum.
+"""Transports and their reports: ids, lengths, the place of the common block, the checksum.
 
 The same block of fields travels on USB and on Bluetooth, one byte further in on Bluetooth and with a checksum at
 the end. Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The transport is told from the
@@ -14,7 +14,7 @@ from common.errors import RemoteProtocolError
 
 
 class Transport(Enum):
-    """What carries the reports."""
+    """The carrier of the reports."""
 
     USB = "USB"
     BLUETOOTH = "Bluetooth"

@@ -43,9 +43,9 @@ SIMULATED_FIRMWARE: Final = Firmware(hardware_version=0x0413, firmware_version=0
 """Made up, but new enough for Linux hid-playstation's present way to rumble (2.21, so 0x0215)."""
 
 _ROUNDING_OF_TICKS = 1e-6
-"""So that a `now_s` of exactly n periods, in floating point, is the n-th report's time."""
+"""Tolerance for a `now_s` of exactly n periods, in floating point."""
 _BLUETOOTH_SEQUENCE = 1
-"""What the common block says on Bluetooth, always (controllers wiki)."""
+"""The constant sequence number of the common block on Bluetooth (controllers wiki)."""
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
@@ -253,7 +253,7 @@ class SimulatedDualSense:
         return build_input_report(self._state(sequence), self.transport, number * INPUT_REPORT_PERIOD_S)
 
     def _state(self, sequence: int) -> ControllerState:
-        """What the sensors say now."""
+        """The present values of the sensors."""
         triggers = {Button.L2: self._l2, Button.R2: self._r2}
         moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
         return replace(

@@ -62,7 +62,7 @@ class UhidIdentity:
     transport: Transport = Transport.USB
     model: Model = Model.DUALSENSE
     unique_id: Annotated[str, Meta(max_length=63)] = ""
-    """As a Bluetooth address; drivers may refuse a second device that has the same."""
+    """A Bluetooth address; drivers may refuse a second device that has the same."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -83,7 +83,7 @@ class UhidIdentity:
 
 @dataclass(slots=True)
 class UhidCounts:
-    """What has passed between the kernel and the controller."""
+    """Counts of messages between the kernel and the controller."""
 
     inputs: int = 0
     outputs: int = 0

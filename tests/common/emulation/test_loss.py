@@ -54,13 +54,11 @@ def test_gilbert_elliott_with_losses_in_both_states() -> None:
         ("exponential", 60.0, 10.0),
     ],
 )
-@pytest.mark.parametrize("correlation", ["", "40% "])
-def test_delays_have_the_moments_of_their_shape(shape: str, mean_ms: float, sd_ms: float, correlation: str) -> None:
-    # netem's correlation leaves delays as they are.
-    delays_s = Run(f"delay 50ms 10ms {correlation}distribution {shape}", 40_000, seed=5).delays_s
+def test_delays_have_the_moments_of_their_shape(shape: str, mean_ms: float, sd_ms: float) -> None:
+    delays_s = Run(f"delay 50ms 10ms 40% distribution {shape}", 40_000, seed=5).delays_s
     assert 1e3 * delays_s.mean() == pytest.approx(mean_ms, abs=0.2)
     assert 1e3 * delays_s.std() == pytest.approx(sd_ms, abs=0.2)
-    assert lag_one(delays_s) == pytest.approx(0.0, abs=0.02)
+    assert lag_one(delays_s) == pytest.approx(0.0, abs=0.02), "netem's correlation leaves delays as they are"
 
 
 def test_exponential_delays_are_exponential() -> None:

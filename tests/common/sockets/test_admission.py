@@ -1,4 +1,4 @@
-"""Who is heard, who is told and who is hung up on: a state machine over the robot side's end, and a crowd's limits."""
+"""Peers that speak, flood, leave and are revoked: a state machine over the robot side's end, and a crowd's limits."""
 
 from collections import Counter
 from types import SimpleNamespace
@@ -75,7 +75,7 @@ class Connections(RuleBasedStateMachine):
 
     @rule(descriptor=st.sampled_from(DESCRIPTORS), key=st.sampled_from(KEYS), comes=st.booleans())
     def leave_or_come(self, descriptor: int, key: str, comes: bool) -> None:
-        """Who has the descriptor leaves; the next one may have it at once."""
+        """The owner of the descriptor leaves; the next one may have it at once."""
         if descriptor in self.owners:
             self.leave(descriptor)
         if comes:

@@ -275,17 +275,3 @@ def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(
         assert getattr(both, part.name) == (older if newer is None else newer)
     assert both.change_from(first).following(first) == both
     assert both.change_from(both) == OutputReport()
-
-
-@pytest.mark.parametrize(
-    ("output", "releases"),
-    [
-        (OutputReport(), True),
-        (RELEASED, True),
-        (OutputReport(r2=Off(), lightbar=(1, 2, 3)), True),
-        (OutputReport(l2=Off(), r2=feedback(3, 6)), False),
-        (OutputReport(rumble=Rumble(right=0.1)), False),
-    ],
-)
-def test_what_holds_or_shakes_releases_nothing(output: OutputReport, releases: bool) -> None:
-    assert output.releases is releases

@@ -106,7 +106,7 @@ def lived(kernel: FakeKernel, until_s: float) -> list[float]:
 
 
 def test_a_life_from_plug_to_unplug() -> None:
-    """What was made before a driver has it is lost, as on a cable that nobody polls."""
+    """Reports from before a driver has it are lost, as on a cable that nobody polls."""
     kernel = FakeKernel(VirtualClock(100.0), deque([(100.0, get_report(1, 5)), (100.001, said(START))]))
     lived(kernel, until_s=100.02)
     kinds = [event[0] for _, event in kernel.heard]
