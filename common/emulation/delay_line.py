@@ -9,8 +9,7 @@ import numpy as np
 
 from common.emulation.clauses import Chance
 from common.emulation.distribution import delays_at
-from common.emulation.expectation import expected
-from common.emulation.figures import LinkFigures
+from common.emulation.figures import LinkFigures, expected
 from common.emulation.loss import decisions, uniform_blocks
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, Stream

@@ -7,8 +7,7 @@ import pytest
 
 from common.emulation.clauses import LinkModel
 from common.emulation.delay_line import DelayLine
-from common.emulation.expectation import expected
-from common.emulation.figures import report_lines
+from common.emulation.figures import expected, report_lines
 from common.emulation.profile import LinkProfile
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.link.samples import play
