@@ -74,18 +74,18 @@ def _check_of(hint: Any) -> _Check | None:
 
 
 def _range_check(meta: Meta, kind: type) -> _Check:
-    # `not low <= value` is true for NaN, `value < low` would let it pass.
+    # No comparison with NaN is true.
     low = -sys.float_info.max if meta.ge is None else meta.ge
     high = sys.float_info.max if meta.le is None else meta.le
     above, below = meta.gt, meta.lt
     kinds = (int,) if kind is int else (int, float)
 
     def check(name: str, value: Any) -> None:
-        if (
-            not isinstance(value, kinds)
-            or not low <= value <= high
-            or (above is not None and value <= above)
-            or (below is not None and value >= below)
+        if not (
+            isinstance(value, kinds)
+            and low <= value <= high
+            and (above is None or value > above)
+            and (below is None or value < below)
         ):
             whole = "a whole number " if kind is int and not isinstance(value, int) else ""
             raise ValueError(f"{name} = {value!r}; valid: {whole}{range_in_words(meta)}")
@@ -107,10 +107,11 @@ def _optional_check(check: _Check) -> _Check:
 
 def _elements_check(check: _Check) -> _Check:
     def check_each(name: str, values: Any) -> None:
-        for place, value in enumerate(values):
-            try:
+        try:
+            for value in values:
                 check(name, value)
-            except ValueError:
+        except ValueError:
+            for place, value in enumerate(values):
                 check(f"{name}[{place}]", value)
 
     return check_each

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
 
 from common.errors import ConfigurationError
 
@@ -66,30 +65,3 @@ def parse_share(text: str, field: str) -> float:
     if not 0.0 <= share <= 1.0:
         raise ConfigurationError(f"{field}: {text!r} is no percentage; valid: 0% to 100%")
     return share
-
-
-def format_duration(seconds: float) -> str:
-    """The shortest text that `parse_duration` reads as the same number of seconds."""
-    return "0ms" if seconds == 0.0 else _shortest(seconds, _PER_SECOND, ("s", "ms", "us"), "s")
-
-
-def format_rate(bits_per_second: float) -> str:
-    """The shortest text that `parse_rate` reads as the same rate."""
-    per_bit_per_second = {unit: 1.0 / _BITS_PER_SECOND[unit] for unit in ("gbit", "mbit", "kbit")}
-    return _shortest(bits_per_second, per_bit_per_second, tuple(per_bit_per_second), "bit")
-
-
-def format_share(share: float) -> str:
-    """The shortest text that `parse_share` reads as the same share, up to a rounding."""
-    short = f"{100.0 * share:.12g}"
-    return f"{short if float(short) / 100.0 == share else repr(100.0 * share)}%"
-
-
-def _shortest(value: float, per_unit: Mapping[str, float], units: Sequence[str], plain: str) -> str:
-    exact = [
-        f"{number}{unit}"
-        for unit in units
-        if "e" not in (number := f"{value * per_unit[unit]:.12g}") and float(number) / per_unit[unit] == value
-    ]
-    # In the plain unit nothing is rounded, so that every digit survives.
-    return min(exact, key=len, default=f"{value!r}{plain}")

@@ -1,4 +1,4 @@
-"""What pages of the console ask for, handed on: hands to a controller, stops and wishes to the core."""
+"""Hand on the words of the console's pages: hands to a controller, stops and wishes to the core."""
 
 import functools
 
@@ -15,7 +15,7 @@ from operator_side.simulated_person.whoever import whoever
 
 
 def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: OperatorSettings) -> SharedHands:
-    """Whoever is to have the simulated controller: a page, and before it the scripted person where there is one."""
+    """Make the hands on the simulated controller: a page, and before it the scripted person where there is one."""
     calibration, swap_sides = settings.calibration, settings.swap_sides
     person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
     alone = settings.device == "browser"
@@ -45,7 +45,7 @@ def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
 
 
 def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
-    """What pages have to know; `shared` None for a real controller."""
+    """Facts for the pages; `shared` None for a real controller."""
     rest_s = pages.rest_s(now_s)
     return HandsFacts(
         may_drive=pages.may_drive,
@@ -68,11 +68,11 @@ def surroundings_of(
     *,
     swap_sides: bool,
 ) -> Surroundings:
-    """What the facts of `now_s` need besides the core; `line`: to the robot side."""
+    """Collect all that the facts of `now_s` need besides the core; `line`: to the robot side."""
     lease = core.lease
     return Surroundings(
         hands="controller" if shared is None else shared.hands,
-        asked_to_robot=line.profile.words(),
+        asked_to_robot=line.profile.words,
         swap_sides=swap_sides,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import secrets
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
@@ -31,9 +30,8 @@ from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
-from operator_side.dualsense.hid.port import OpenController
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import BackgroundSearch, Ready
+from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
 from operator_side.page_hands.driving_page import DrivingPage
@@ -55,7 +53,7 @@ _HELPS = {
 """The stages of a turn, and what makes each of them shorter: sending and receiving; taking in what arrived; what the
 controller is told; what is read from it, and commands. "": all else, such as what is shown."""
 _GUARD_PERIOD_S = 0.5
-"""How often the watchdog is looked after."""
+"""From one look at the watchdog to the next."""
 
 
 def main() -> None:
@@ -94,7 +92,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
             else:
                 loaded = load_backend() if backend is None else backend
-                # Whoever only reads leaves nothing behind.
+                # A reader leaves nothing behind.
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
@@ -136,14 +134,12 @@ def _console(settings: OperatorSettings, stack: ExitStack) -> Console | None:
 
 def _find(find: Finder, preferred: str | None) -> OpenController:
     found = find(preferred)
-    if sys.platform != "linux":
-        return found  # a device is read and written by one thread there
     writes = BackgroundWrites(found.device)
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
 class _People(NamedTuple):
-    """Who is at this side, besides a real controller's hands."""
+    """The people at this side, besides a real controller's hands."""
 
     person: SharedHands | None
     pages: DrivingPage
@@ -167,7 +163,7 @@ class _Loop:
     ) -> None:
         """`travel`: takes on the calibration that is stored for a controller; None where one was given."""
         self.recording: SideRecording | None = None
-        """Who keeps what happens"""
+        """The recording of the run"""
         self._travel = travel
         self._duration_s = settings.duration
         self._core = core
@@ -265,7 +261,7 @@ class _Loop:
             self._viewing.note(text)
 
     def _use_idle_time(self, now_s: float) -> None:
-        """What no message should wait for."""
+        """Do all that no message should wait for."""
         if self.recording is not None:
             for text in self.recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
                 self._viewing.note(text)
@@ -284,7 +280,7 @@ class _Loop:
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 
     def _values(self, now_s: float) -> dict[str, Value]:
-        """What a person is shown."""
+        """The values that a person sees."""
         values: dict[str, Value] = dict(self._core.status(now_s))
         if self._sockets.trouble is not None and values.get("link") != "up":
             values["link"] = self._sockets.trouble

@@ -6,9 +6,10 @@ from typing import Final
 
 from common.command.live_view import Value
 from common.command.status import Status
-from common.protocol.codec import encode
+from common.errors import RemoteProtocolError
+from common.protocol.codec import claims_to_be, decode_view, encode
 from common.protocol.messages import Watch
-from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
+from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.recording.entries import Kind
 from common.recording.side import SideRecording
 from operator_side.console.console import Console
@@ -17,7 +18,6 @@ from operator_side.facts import FACTS_PERIOD_S
 from operator_side.facts_of_core import Surroundings, operator_facts
 from operator_side.following_pages import hear_pages
 from operator_side.page_hands.driving_page import DrivingPage
-from operator_side.scene_figures import SceneFigures
 from operator_side.settings import OperatorSettings
 
 _WATCH_PERIOD_S: Final = 0.25
@@ -28,6 +28,37 @@ def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
     """What to subscribe to: pictures only where they could be shown."""
     scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
     return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
+
+
+class SceneFigures:
+    """Overlaps and ticks of the robot side's scene, as words: unpacked from the newest bytes when somebody asks."""
+
+    def __init__(self) -> None:
+        self._newest: bytes | None = None
+        self._figures: dict[str, Value] = {}
+
+    def take(self, payload: bytes) -> None:
+        """One payload of the topic `scene`; shapes, which are large, are passed over."""
+        if claims_to_be("scene", payload):
+            self._newest = payload
+
+    def figures(self) -> dict[str, Value]:
+        """As status values; empty before the first."""
+        payload, self._newest = self._newest, None
+        if payload is not None:
+            try:
+                state = decode_view(payload)
+            except RemoteProtocolError:
+                return self._figures
+            if isinstance(state, SceneState):
+                by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
+                self._figures = {
+                    "overlap_mm3": 1e9 * max(map(sum, by_trigger), default=0.0),
+                    "tick_us": state.tick_p50_us,
+                    "tick_p99_us": state.tick_p99_us,
+                    "overruns": state.overruns,
+                }
+        return self._figures
 
 
 class Viewing:

@@ -9,11 +9,9 @@ import numpy as np
 
 from common.emulation.clauses import Chance
 from common.emulation.distribution import delays_at
-from common.emulation.expectation import expected
-from common.emulation.figures import LinkFigures
+from common.emulation.figures import LinkFigures, expected
+from common.emulation.loss import decisions, uniform_blocks
 from common.emulation.profile import LinkProfile
-from common.emulation.randomness import decisions, uniform_blocks
-from common.emulation.slots import SlotTimes
 from common.emulation.spec import Direction, Stream
 
 Item = TypeVar("Item")
@@ -45,8 +43,8 @@ class DelayLine(Generic[Item]):
         """Everything that has happened so far."""
         self._start_s = start_s
         self._corrupt = corrupt
-        self._queue: list[tuple[float, float, int, Item, float, int, int, bool]] = []
-        """By time of leaving, due time (earlier than that with slots) and order of arrival."""
+        self._queue: list[tuple[float, int, Item, float, int, int, bool]] = []
+        """Messages by due time and order of arrival."""
         self._entered = 0
         self._last_due_s = -math.inf
         self._follow(profile)
@@ -80,7 +78,6 @@ class DelayLine(Generic[Item]):
         self._duplicates = None if self._in_order else chances(profile.duplicate, 2)
         self._corruptions = chances(profile.corrupt, 3)
         self._reorders = chances(profile.reorder, 4)
-        self._slots = None if profile.slot is None else SlotTimes(profile.slot, generator(5))
         self._bits = generator(6)
         self._lost_again = decisions(generator(7), profile.retransmitted_share())
 
@@ -122,8 +119,8 @@ class DelayLine(Generic[Item]):
         due: list[Item] = []
         queue = self._queue
         while queue and queue[0][0] <= now_s:
-            leaves_s, _, _, item, sent_s, number, size_bytes, copy = heapq.heappop(queue)
-            self.figures.add_delivered(now_s, sent_s, leaves_s, number, size_bytes, copy=copy)
+            due_s, _, item, sent_s, number, size_bytes, copy = heapq.heappop(queue)
+            self.figures.add_delivered(now_s, sent_s, due_s, number, size_bytes, copy=copy)
             due.append(item)
         return due
 
@@ -132,7 +129,7 @@ class DelayLine(Generic[Item]):
         return self._queue[0][0] if self._queue else None
 
     def backlog_s(self, now_s: float) -> float:
-        """How long what is pushed now would wait, beyond its delay, for what a rate still holds back."""
+        """Time that a message pushed now would wait for a rate, beyond its delay."""
         if self._rate is None:
             return 0.0
         return max(0.0, self._last_due_s - now_s - self._mean_delay_s)
@@ -145,7 +142,7 @@ class DelayLine(Generic[Item]):
     def summary(self) -> dict[str, Any]:
         """`asked`, in the grammar's words, with model and seed, what is `expected` and was `achieved`."""
         return {
-            "asked": self.profile.words(),
+            "asked": self.profile.words,
             "model": self.profile.model,
             "seed": self.profile.seed,
             "expected": expected(self.profile),
@@ -221,8 +218,7 @@ class DelayLine(Generic[Item]):
         return due_s
 
     def _enqueue(self, now_s: float, due_s: float, item: Item, number: int, size_bytes: int, *, copy: bool) -> None:
-        leaves_s = due_s if self._slots is None else self._slots.take(due_s, now_s, size_bytes)
-        heapq.heappush(self._queue, (leaves_s, due_s, self._entered, item, now_s, number, size_bytes, copy))
+        heapq.heappush(self._queue, (due_s, self._entered, item, now_s, number, size_bytes, copy))
         self._entered += 1
 
     def _corrupted(self, item: Item) -> Item:

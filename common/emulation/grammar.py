@@ -7,22 +7,19 @@ from typing import Any, TypeVar, cast, get_args
 
 from common.emulation.clauses import Chance, LinkModel, Outage, Rate
 from common.emulation.distribution import Distribution
-from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
-from common.emulation.slots import Slot
+from common.emulation.loss import GilbertElliott, LossModel, RandomLoss
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
 from common.units import parse_duration, parse_rate, parse_share
 
 GRAMMAR = {
     "delay": "delay TIME [JITTER [CORRELATION%]] [distribution uniform|normal|pareto|paretonormal|exponential]",
-    "loss": "loss [random] P% [CORRELATION%] | loss state P13% [P31% [P32% [P23% [P14%]]]] | "
-    "loss gemodel P% [R% [1-H% [1-K%]]]",
+    "loss": "loss [random] P% [CORRELATION%] | loss gemodel P% [R% [1-H% [1-K%]]]",
     "duplicate": "duplicate P% [CORRELATION%]",
     "corrupt": "corrupt P% [CORRELATION%]",
     "reorder": "reorder P% [CORRELATION%] [gap N]",
     "rate": "rate RATE [PACKETOVERHEAD]",
     "limit": "limit MESSAGES",
-    "slot": "slot MIN [MAX] [packets N] [bytes N]",
     "trace": "trace FILE.csv",
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
@@ -112,7 +109,8 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
     if words.number_follows(percent=False):
         settings["jitter_s"] = words.value(parse_duration, "delay", "jitter")
         if words.number_follows(percent=True):
-            settings["delay_correlation"] = words.value(parse_share, "delay", "correlation")
+            # Without effect: in netem, too, the delays stay independent (measured lag-1 correlation 0).
+            words.value(parse_share, "delay", "correlation")
     if words.take_if("distribution"):
         if "jitter_s" not in settings:
             raise words.error("'distribution' without a jitter to shape", "delay")
@@ -130,12 +128,9 @@ def _read_shape(words: _Words) -> Distribution:
 
 def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
     loss: LossModel
-    if words.take_if("state"):
-        p13, *rest = words.shares("loss", ["p13", "p31", "p32", "p23", "p14"])
-        # One probability alone is independent loss: state 3 is left as often as it is not entered.
-        loss = StateLoss(p13, *(rest or [1.0 - p13]))
-    elif words.take_if("gemodel"):
+    if words.take_if("gemodel"):
         p, *rest = words.shares("loss", ["p", "r", "1-h", "1-k"])
+        # One probability alone is independent loss: the bad state is left as often as it is not entered.
         loss = GilbertElliott(p, *(rest or [1.0 - p]))
     else:
         words.take_if("random")
@@ -166,13 +161,6 @@ def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
     settings["limit"] = words.value(_positive, "limit", "limit")
 
 
-def _read_slot(words: _Words, settings: dict[str, Any]) -> None:
-    least_s = words.value(parse_duration, "slot", "least time")
-    most_s = words.value(parse_duration, "slot", "longest time") if words.number_follows(percent=False) else least_s
-    budgets = {name: words.value(_positive, "slot", name) for name in ("packets", "bytes") if words.take_if(name)}
-    settings["slot"] = Slot(least_s, most_s, budgets.get("packets"), budgets.get("bytes"))
-
-
 def _read_trace(words: _Words, settings: dict[str, Any]) -> None:
     settings["trace"] = words.value(lambda path, field: Trace.read(Path(path), field), "trace", "trace")
 
@@ -198,7 +186,6 @@ _READERS: dict[str, Callable[[_Words, dict[str, Any]], None]] = {
     "reorder": _read_reorder,
     "rate": _read_rate,
     "limit": _read_limit,
-    "slot": _read_slot,
     "trace": _read_trace,
     "outage": _read_outage,
     "retransmit": _read_retransmit,

@@ -1,7 +1,6 @@
-"""What one direction of one stream does to messages: a frozen, validated profile."""
+"""A frozen, validated profile of one direction of one stream."""
 
 import math
-import shlex
 from dataclasses import dataclass, field
 from typing import Annotated, get_args
 
@@ -11,11 +10,9 @@ from common.emulation.clauses import QUEUE_LIMIT, Chance, LinkModel, Outage, Rat
 from common.emulation.distribution import Distribution, moments
 from common.emulation.grammar import read_fields
 from common.emulation.loss import LossModel
-from common.emulation.slots import Slot
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
-from common.limits import Share, check_limits
-from common.units import format_duration, format_rate, format_share
+from common.limits import check_limits
 
 _SHORTEST_RECOVERY_S = 1e-3
 _RECOVERY_ROUND_TRIPS = 1.25
@@ -43,26 +40,25 @@ class LinkProfile:
     distribution: Distribution = "uniform"
     seed: int = 0
     model: LinkModel = "datagram"
-    delay_correlation: Share = 0.0
-    """Kept for the words alone: in netem, too, the delays stay independent (measured lag-1 correlation 0)."""
     loss: LossModel | None = None
     duplicate: Chance | None = None
     corrupt: Chance | None = None
     reorder: Chance | None = None
     """At once, ahead of what is being delayed."""
     gap: _Count = 1
-    """At most one in this many is reordered."""
+    """The least number of messages from one that is reordered to the next."""
     rate: Rate | None = None
     limit: _Count = QUEUE_LIMIT
     """Messages that may wait; what comes on top is dropped."""
-    slot: Slot | None = None
     outages: tuple[Outage, ...] = ()
     trace: Trace | None = None
     """Recorded delays instead of delay, jitter and loss."""
     retransmit_s: _Recovery | None = None
     """In a stream, how long until a lost message is sent again; None: see `recovery_s`."""
     round_trip_s: _Recovery | None = field(default=None, compare=False)
-    """Of both directions, where the other one is known; None: twice this one."""
+    """The mean delay of both directions, where the other one is known; None: twice this one."""
+    words: str = field(default="", compare=False)
+    """The profile in the grammar's words, as given."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -86,37 +82,12 @@ class LinkProfile:
         check_seed_and_model(seed, model)
         fields = read_fields(profile, spec, model)
         try:
-            return cls(**fields, seed=seed, model=model)
+            return cls(**fields, seed=seed, model=model, words=" ".join(profile.split()))
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
 
-    def words(self) -> str:
-        """The profile in the words that `parse` reads; empty where nothing is asked for."""
-        clauses = [_format_delay(self)]
-        if self.loss is not None:
-            clauses.append(self.loss.words())
-        clauses += [f"{name} {_format_chance(getattr(self, name))}" for name in ("duplicate", "corrupt", "reorder")]
-        clauses = [clause for clause in clauses if not clause.endswith(" ")]
-        if self.reorder is not None and self.gap > 1:
-            clauses.append(f"gap {self.gap}")
-        if self.rate is not None:
-            overhead = f" {self.rate.overhead_bytes}" if self.rate.overhead_bytes else ""
-            clauses.append(f"rate {format_rate(self.rate.bits_per_second)}{overhead}")
-        if self.limit != QUEUE_LIMIT:
-            clauses.append(f"limit {self.limit}")
-        if self.slot is not None:
-            clauses.append(_format_slot(self.slot))
-        if self.trace is not None:
-            clauses.append(f"trace {shlex.quote(self.trace.name)}")
-        for outage in self.outages:
-            every = "" if outage.every_s is None else f" every {format_duration(outage.every_s)}"
-            clauses.append(f"outage {format_duration(outage.duration_s)} at {format_duration(outage.at_s)}{every}")
-        if self.retransmit_s is not None:
-            clauses.append(f"retransmit {format_duration(self.retransmit_s)}")
-        return " ".join(filter(None, clauses))
-
     def mean_delay_s(self) -> float:
-        """Of the delay asked for, without what rate, slots and retransmission add."""
+        """The mean of the delay asked for, without rate and retransmission."""
         if self.trace is not None:
             known_s = [delay_s for delay_s in self.trace.delays_s if delay_s is not None]
             return math.fsum(known_s) / len(known_s)
@@ -159,32 +130,3 @@ def check_seed_and_model(seed: int, model: LinkModel) -> None:
 def choices(literal: object) -> str:
     """The values of a Literal, for messages."""
     return ", ".join(get_args(literal))
-
-
-def _format_delay(profile: LinkProfile) -> str:
-    if profile.delay_s == 0.0 and profile.jitter_s == 0.0:
-        return ""
-    words = ["delay", format_duration(profile.delay_s)]
-    shape = profile.distribution
-    if profile.jitter_s or profile.delay_correlation or shape != "uniform":
-        words.append(format_duration(profile.jitter_s))
-        if profile.delay_correlation:
-            words.append(format_share(profile.delay_correlation))
-        if shape != "uniform":
-            words += ["distribution", shape]
-    return " ".join(words)
-
-
-def _format_slot(slot: Slot) -> str:
-    words = ["slot", format_duration(slot.least_s), format_duration(slot.most_s)]
-    for name, budget in (("packets", slot.packets), ("bytes", slot.size_bytes)):
-        if budget is not None:
-            words += [name, str(budget)]
-    return " ".join(words)
-
-
-def _format_chance(chance: Chance | None) -> str:
-    if chance is None:
-        return ""
-    correlation = f" {format_share(chance.correlation)}" if chance.correlation else ""
-    return format_share(chance.share) + correlation

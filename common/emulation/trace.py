@@ -21,10 +21,8 @@ _COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where 
 class Trace:
     """Delays in order of sending: the n-th message gets the n-th, and after the last the first again."""
 
-    name: str
-    """The file that it came from."""
     delays_s: tuple[float | None, ...]
-    """None: that message is lost."""
+    """The delay of each message; None for a lost one."""
 
     def __post_init__(self) -> None:
         if all(delay_s is None for delay_s in self.delays_s):
@@ -40,7 +38,7 @@ class Trace:
         """
         rows = read_samples(path, field)
         try:
-            return cls(str(path), tuple(row.delay_s for row in rows))
+            return cls(tuple(row.delay_s for row in rows))
         except ValueError as error:
             raise ConfigurationError(f"{field}: {path}: no message arrives; valid: one or more that do") from error
 
@@ -52,7 +50,7 @@ class Sample:
     sent_s: float | None
     """On the recording's own clock, where it has that."""
     delay_s: float | None
-    """None: lost."""
+    """The message's delay; None for a lost one."""
 
 
 def read_samples(path: Path, field: str) -> list[Sample]:

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from common.limits import Share, check_limits
+from common.limits import Finite, Share, check_limits
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
@@ -31,6 +31,10 @@ _SLOWEST = 1e-6
 _Words = Annotated[str, Meta(max_length=200)]
 _Number = Annotated[int, Meta(ge=0, le=_LARGEST)]
 _Few = Annotated[int, Meta(ge=0, le=1000)]
+_Far = Annotated[float, Meta(ge=0.0, le=_FARTHEST_M)]
+_Place = tuple[Finite, Finite, Finite]
+_Component = Annotated[float, Meta(ge=-1.001, le=1.001)]
+"""A component of a unit vector, with room for rounding."""
 
 # Messages that are made up to 1000 times a second check their ranges by hand: `check_limits` takes four times as long.
 
@@ -48,11 +52,6 @@ def _all_in_range(name: str, low: float, high: float, values: Iterable[float]) -
 def _finite(name: str, value: float) -> None:
     if not math.isfinite(value):
         raise ValueError(f"{name} = {value}; valid: a finite number")
-
-
-def _all_finite(name: str, values: Iterable[float]) -> None:
-    for value in values:
-        _finite(name, value)
 
 
 def _rising(name: str, ways: Ways) -> None:
@@ -251,32 +250,24 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
     """What the operator's screen shows of the robot; never used for control by the robot side."""
 
     state: MotionState
-    tool_position_m: Vector3
+    tool_position_m: _Place
     """Estimated, in the world frame."""
-    tool_speed_m_s: float
+    tool_speed_m_s: _Far
     target: str | None
     """The present target's name; None when there is none."""
-    target_in_tool_m: Vector3 | None
+    target_in_tool_m: _Place | None
     """The perceived target's centre in the tool frame; +z is the approach axis."""
-    up_in_tool: Vector3
+    up_in_tool: tuple[_Component, _Component, _Component]
     """The world's upward direction in the tool frame: an artificial horizon."""
-    gripper_opening_m: float
+    gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
     holding: bool
-    enlargement_m: float
+    enlargement_m: _Far
     """The largest over the gripper's spheres."""
-    l2: float
-    r2: float
+    l2: Share
+    r2: Share
 
     def __post_init__(self) -> None:
-        _all_finite("tool_position_m", self.tool_position_m)
-        _all_in_range("up_in_tool", -1.001, 1.001, self.up_in_tool)
-        if self.target_in_tool_m is not None:
-            _all_finite("target_in_tool_m", self.target_in_tool_m)
-        _in_range("tool_speed_m_s", 0.0, 100.0, self.tool_speed_m_s)
-        _in_range("gripper_opening_m", 0.0, 10.0, self.gripper_opening_m)
-        _in_range("enlargement_m", 0.0, 100.0, self.enlargement_m)
-        _in_range("l2", 0.0, 1.0, self.l2)
-        _in_range("r2", 0.0, 1.0, self.r2)
+        check_limits(self)
 
 
 AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | StiffnessUpdate | Telemetry

@@ -13,13 +13,13 @@ from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
 from common.sockets.allow_list import AllowList
-from common.sockets.keys import KeyFolder, passed_over_note, read_public_key
+from common.sockets.keys import KeyFolder, read_public_key
 from common.sockets.readable import readable
 
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"
 _ANSWERS_PER_CALL = 4
-"""So that a storm of handshakes cannot hold the caller."""
+"""A bound, lest a storm of handshakes hold the caller."""
 _EVENTS_PER_CALL = 16
 _REMEMBERED_REFUSALS = 64
 
@@ -37,14 +37,14 @@ def public_part(secret: str) -> str:
 
 @dataclass(frozen=True)
 class RobotKeys:
-    """What the robot side needs: its own secret key, and whom it lets in."""
+    """Keys of the robot side: the own secret one, and those that are let in."""
 
     secret: str
     allowed: AllowList
 
     @classmethod
     def load(cls, folder: Path) -> "RobotKeys":
-        """From a folder of keys; ConfigurationError with the command that mends it."""
+        """Load a folder of keys; ConfigurationError with the command that mends it."""
         keys = KeyFolder(folder)
         secret = keys.secret("robot")
         allowed = AllowList(keys)
@@ -54,11 +54,11 @@ class RobotKeys:
         return cls(secret, allowed)
 
     def notes(self) -> list[str]:
-        """What a person should know at the start: who is let in, and which files are passed over."""
+        """Name the peers that are let in, for a person at the start."""
         folder, names = self.allowed.folder, ", ".join(sorted(self.allowed.names.values()))
         change = folder.command("allow NAME KEY")
         who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {change}"
-        return [f"keys: {text}" for text in (who, *passed_over_note(folder))]
+        return [f"keys: {who}"]
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
         """Let nobody into `part` but who has an allowed key; before it is bound."""
@@ -70,14 +70,14 @@ class RobotKeys:
 
 @dataclass(frozen=True)
 class OperatorKeys:
-    """What the operator side needs: its own secret key, and the robot side's public one."""
+    """Keys of the operator side: the own secret one, and the robot side's public one."""
 
     secret: str
     robot: str
 
     @classmethod
     def load(cls, folder: Path, robot_key: str | None) -> "OperatorKeys":
-        """From a folder of keys and the robot side's public key; ConfigurationError with the command that mends it."""
+        """Load a folder of keys and the robot side's public key; ConfigurationError with the command that mends it."""
         secret = KeyFolder(folder).secret("operator")
         if robot_key is None:
             raise ConfigurationError(

@@ -1,4 +1,4 @@
-"""How many connections one port bears: whoever has been introduced stays, and of the others the newest."""
+"""Bound the connections of one port: those that were introduced stay, and of the others the newest."""
 
 from collections.abc import Iterator
 
@@ -15,34 +15,39 @@ class Crowd:
         self._newcomers: dict[int, float] = {}
         """When each came, the oldest first."""
         self._known: set[int] = set()
+        self._numbers: dict[int, int] = {}
+        self._accepted = 0
 
     def came(self, descriptor: int, now_s: float) -> None:
         """A connection was accepted."""
         self.went(descriptor)
         self._newcomers[descriptor] = now_s
+        self._accepted += 1
+        self._numbers[descriptor] = self._accepted
 
     def spoke(self, descriptor: int) -> None:
         """A message came by it that only who has been introduced can send."""
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
 
-    def holds(self, descriptor: int) -> bool:
-        """Whether it is there, as far as was said."""
-        return descriptor in self._newcomers or descriptor in self._known
+    def number(self, descriptor: int) -> int:
+        """Which connection the descriptor stands for, counted from 1 in the order of coming; 0 for none."""
+        return self._numbers.get(descriptor, 0)
 
     def went(self, descriptor: int) -> None:
-        """It ended; its number may stand for another one next."""
+        """The connection ended; the descriptor may stand for another one next."""
         self._newcomers.pop(descriptor, None)
         self._known.discard(descriptor)
+        self._numbers.pop(descriptor, None)
 
     def surplus(self, now_s: float) -> Iterator[int]:
-        """Whom to hang up on: those who came first of the newcomers, so that one who is quick gets in in any crowd."""
+        """The connections to end: the oldest newcomers, so that a quick one gets in in any crowd."""
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
             if now_s - came_s >= self._introduced_s:
                 self.spoke(descriptor)
             elif len(self._newcomers) + len(self._known) > self.limit:
-                del self._newcomers[descriptor]
+                self.went(descriptor)
                 self.hung_up += 1
                 yield descriptor
             else:

@@ -26,13 +26,13 @@ PEER_LIMIT = 256
 """Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-"""What says nothing of a file or folder: this process or the machine is short of something."""
+"""Errors that say nothing of a file or folder: this process or the machine is short of something."""
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
 def default_folder() -> Path:
-    """Where keys are unless another folder is named."""
+    """The folder of keys unless another one is named."""
     return configuration_folder() / "keys"
 
 
@@ -71,12 +71,12 @@ def read_public_key(key_or_file: str, what: str) -> str:
 
 @dataclass(frozen=True)
 class Peers:
-    """Who is let in, and which files let nobody in."""
+    """The peers that are let in, and the files that let nobody in."""
 
     names: dict[str, str]
     """The name of each key."""
     faults: tuple[str, ...]
-    """What is wrong with the files that hold no key, a line each."""
+    """The faults of files that hold no key, a line each."""
 
 
 @dataclass(frozen=True)
@@ -89,11 +89,11 @@ class KeyFolder:
         object.__setattr__(self, "path", self.path.expanduser())
 
     def secret_path(self, side: Side) -> Path:
-        """Where the side's own secret key stands."""
+        """The file of the side's own secret key."""
         return self.path / f"{side}.secret"
 
     def public_path(self, side: Side) -> Path:
-        """Where its public part stands."""
+        """The file of the public part."""
         return self.path / f"{side}.public"
 
     @property
@@ -170,15 +170,19 @@ class KeyFolder:
         return self.peers().names
 
     def peers(self) -> Peers:
-        """Who is let in: a file that cannot be read, or is gone by now, excludes its own key alone.
+        """The peers that are let in: a file that cannot be read, or is gone by now, excludes its own key alone.
 
         ConfigurationError for a folder that others may write to or that cannot be read; OSError when nothing can be
         read at present, whatever it is.
         """
         names: dict[str, str] = {}
         faults = []
-        for path in self._peer_files():
+        for path in self._allowed_files():
             try:
+                if _NAME.fullmatch(path.stem) is None:
+                    raise ConfigurationError(
+                        f"allowed: {path}: its name is no peer's; valid: letters, digits, - and _, then .public"
+                    )
                 key = _read_key(path, "allowed")
             except ConfigurationError as error:
                 faults.append(str(error))
@@ -187,11 +191,11 @@ class KeyFolder:
         return Peers(names, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
-        """What changes whenever the peers do: each file's name, time of change and number, without reading any.
+        """A value that changes whenever the peers do: each file's name, time of change and number, without reading any.
 
         Errors as in `peers`.
         """
-        return tuple((path.name, *_stand(path)) for path in self._peer_files())
+        return tuple((path.name, *_stand(path)) for path in self._allowed_files())
 
     def command(self, rest: str) -> str:
         """The command line that does `rest` to this folder."""
@@ -199,18 +203,8 @@ class KeyFolder:
         return f"feelahead keys {rest}{folder}"
 
     def peer_path(self, name: str) -> Path:
-        """Where the public key of the peer of that name stands; ConfigurationError for what is no name."""
+        """The file of the public key of the peer of that name; ConfigurationError for what is no name."""
         return self.allowed_path / f"{checked_name(name)}.public"
-
-    def passed_over(self) -> list[str]:
-        """Files among the allowed keys whose names are no peer's, so that they let nobody in; ConfigurationError."""
-        return [path.name for path in self._allowed_files() if _NAME.fullmatch(path.stem) is None]
-
-    def _peer_files(self) -> list[Path]:
-        files = [path for path in self._allowed_files() if _NAME.fullmatch(path.stem)]
-        if len(files) > PEER_LIMIT:
-            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
-        return files
 
     def _allowed_files(self) -> list[Path]:
         try:
@@ -225,7 +219,10 @@ class KeyFolder:
                 f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder of this user's, mode 0700"
             ) from error
         _refuse_writable(self.allowed_path)
-        return [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
+        files = [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
+        if len(files) > PEER_LIMIT:
+            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
+        return files
 
     @staticmethod
     def _make_folder(path: Path) -> None:
@@ -233,16 +230,6 @@ class KeyFolder:
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigurationError(f"--folder {path}: cannot be made: {error.strerror}") from error
-
-
-def passed_over_note(folder: KeyFolder) -> list[str]:
-    """A line for a person, where keys lie there that let nobody in because of their files' names."""
-    names = folder.passed_over()
-    if not names:
-        return []
-    return [
-        f"passed over, for its name is no peer's: {', '.join(names)}; valid: letters, digits, - and _, then .public"
-    ]
 
 
 def _read_key(path: Path, what: str) -> str:
@@ -263,7 +250,7 @@ def _read_key(path: Path, what: str) -> str:
 
 
 def _stand(path: Path) -> tuple[int, int]:
-    """What changes when a file does, its permissions included, or why that cannot be known."""
+    """Numbers that change when a file or its permissions do, or why they cannot be known."""
     try:
         found = path.stat()
     except OSError as error:

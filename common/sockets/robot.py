@@ -24,17 +24,19 @@ MOST_CONNECTIONS = 1024
 """To each port, and never more than a quarter of the descriptors that this process may open."""
 _REMEMBERED_PEERS = 1024
 _EVENTS_PER_CALL = 256
-"""Of each port, 5 us each, so that connections that come and go cannot hold the caller."""
+"""Events of each port, 5 us each: connections that come and go cannot hold the caller."""
 
 
 @dataclass
 class _Peer:
-    """What the robot side remembers of a connection."""
+    """The robot side's memory of one connection."""
 
     key: str
     """Whom it authenticated as; empty without keys."""
     descriptor: int = -1
-    """That which its last message came by; -1 where it is not known."""
+    """The descriptor that the last message came by; -1 where it is not known."""
+    connection: int | None = None
+    """The number of that connection in the crowd; 0 for one that ended, None while unknown."""
     received: int = 0
     """Messages in the present second."""
 
@@ -71,8 +73,6 @@ class RobotSockets(SocketShell):
         """Connections that were ended because there were too many at once."""
         self._told: list[str] = []
         self._peers: dict[bytes, _Peer] = {}
-        self._spoke_by: dict[int, bytes] = {}
-        """Which peer was the last to take up a descriptor, until it is hung up on."""
         self._all_seen = False
         """Whether what the gates know of the connections was all there was to know."""
         self._second = 0
@@ -103,7 +103,7 @@ class RobotSockets(SocketShell):
         return 0 if self._authenticator is None else self._authenticator.refused
 
     def news(self) -> list[str]:
-        """What a person should know about strangers and keys since the last call, a line each."""
+        """News of strangers and keys since the last call, a line each."""
         news, wrong = [], []
         if self.crowded:
             limit = self._gates[0].crowd.limit
@@ -245,11 +245,12 @@ class RobotSockets(SocketShell):
             if len(self._peers) >= _REMEMBERED_PEERS:
                 del self._peers[next(iter(self._peers))]
             peer = self._peers[name] = _Peer(key)
-        if (descriptor := _descriptor(frame)) != peer.descriptor:
-            peer.descriptor = descriptor
-            self._spoke_by[descriptor] = name
+        crowd, descriptor = self._gates[0].crowd, _descriptor(frame)
+        if descriptor != peer.descriptor or peer.connection is None:
+            self._watch_connections()
+            peer.descriptor, peer.connection = descriptor, crowd.number(descriptor) if self._all_seen else None
         if self._allows(key):
-            self._gates[0].crowd.spoke(descriptor)
+            crowd.spoke(descriptor)
         peer.received += 1
         if not self._allows(key):
             self.revoked += 1
@@ -263,11 +264,11 @@ class RobotSockets(SocketShell):
 
     def _hang_up(self, name: bytes) -> None:
         """End the connection of `name`, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
-        descriptor = self._peers[name].descriptor
-        # The number may stand for another connection by now, or for none.
-        if self._all_seen and self._spoke_by.get(descriptor) == name and self._gates[0].crowd.holds(descriptor):
-            del self._spoke_by[descriptor]
-            _shut_down(descriptor)
+        peer = self._peers[name]
+        # A message may be read long after its sender left: the descriptor may stand for another connection by now.
+        if self._all_seen and peer.connection and self._gates[0].crowd.number(peer.descriptor) == peer.connection:
+            peer.connection = 0
+            _shut_down(peer.descriptor)
 
 
 def _shut_down(descriptor: int) -> None:
@@ -281,7 +282,7 @@ def _shut_down(descriptor: int) -> None:
 
 
 def _property(frame: zmq.Frame, name: str) -> str:
-    """What ZeroMQ knows of the connection that `frame` came by; empty where it does not."""
+    """A property of the connection that `frame` came by; empty where ZeroMQ has none."""
     try:
         return str(frame.get(name))
     except zmq.ZMQError:

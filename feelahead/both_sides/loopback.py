@@ -19,8 +19,7 @@ from feelahead.both_sides.summary import merge_summaries
 from operator_side.assembly import build_operator_side
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.connection import Connection
-from operator_side.dualsense.hid.port import OpenController
-from operator_side.dualsense.hid.search import Ready
+from operator_side.dualsense.hid.search import OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.following_pages import follow_pages
 from operator_side.main import MOTION_PERIOD_S

@@ -15,12 +15,13 @@ from common.clock import Clock, MonotonicClock, VirtualClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
+from common.files.output_file import require_output_file
 from feelahead.commands.calibration_screen import calibration_lines, calibration_screen
 from operator_side.calibration.procedure import CalibrationProcedure, Step
-from operator_side.calibration.store import calibration_path, place_to_write, write_calibration
+from operator_side.calibration.store import calibration_path, write_calibration
 from operator_side.dualsense.hid.device import load_backend
 from operator_side.dualsense.hid.finding import find_controller
-from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.hid.search import Device, OpenController
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import RELEASED
@@ -45,12 +46,13 @@ class CalibrateSettings:
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Write it there instead: a new file in a folder that is there, or one that is replaced."""
 
+    def __post_init__(self) -> None:
+        require_output_file("--out", self.out)
+
 
 def calibrate(arguments: Sequence[str]) -> int:
     """Run the calibration; exit code 1 when it was given up, and nothing is stored."""
     settings = parse_settings(CalibrateSettings, "feelahead calibrate", arguments)
-    if settings.out is not None:
-        place_to_write(settings.out, f"--out {settings.out}")
     clock: Clock
     if settings.device == "simulated":
         clock, simulated = VirtualClock(), SimulatedDualSense()
@@ -72,8 +74,6 @@ def calibrate(arguments: Sequence[str]) -> int:
                     f"{controller.name} does not tell its address, by which a calibration is kept; valid: a controller"
                     " that does"
                 )
-            if kept_at is not None:
-                place_to_write(kept_at)  # before the hands have worked for it
             console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
             with _Screen(console) as show:
                 done = _measure(controller.device, procedure, clock, hands, stop, show)

@@ -8,7 +8,7 @@ from typing import NoReturn, get_args
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import make_key_pair, public_part
-from common.sockets.keys import KeyFolder, Side, checked_name, default_folder, passed_over_note, read_public_key
+from common.sockets.keys import KeyFolder, Side, checked_name, default_folder, read_public_key
 
 _STEPS = """\
 Two machines, from nothing to a link that is encrypted and open to nobody else:
@@ -104,7 +104,7 @@ def _listed(folder: KeyFolder) -> list[str]:
             lines.append(f"own      {side:<32} {public_part(folder.secret(side))}")
     peers = folder.peers()
     lines += [f"allowed  {name:<32} {key}" for key, name in sorted(peers.names.items(), key=lambda item: item[1])]
-    lines += [*passed_over_note(folder), *(f"passed over: {fault}" for fault in peers.faults)]
+    lines += [f"passed over: {fault}" for fault in peers.faults]
     if len(lines) == 1:
         lines.append(f"empty; to begin: {folder.command('make robot')}, or make operator")
     return lines

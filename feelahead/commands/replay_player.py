@@ -18,8 +18,8 @@ from feelahead.recordings.playback import Playback
 from feelahead.recordings.showing import FACTS, ROBOT, VIEW, Seen
 from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
-from operator_side.scene_figures import SceneFigures
 from operator_side.terminal_view.status import TerminalStatus
+from operator_side.viewing import SceneFigures
 
 _PROGRAM: Final = "feelahead replay"
 _STEP_S: Final = 0.01

@@ -17,8 +17,8 @@ from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import INPUT_REPORT_PERIOD_S, SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from operator_side.dualsense.uhid.controller import UhidController, identity
-from operator_side.dualsense.uhid.file import EventFile, UhidFile, offer
+from operator_side.dualsense.uhid.controller import UhidController, UhidIdentity
+from operator_side.dualsense.uhid.file import UhidFile, offer
 
 PULL_PERIOD_S = 4.0
 """R2 and then L2 go down and up in this time, and the left stick once round."""
@@ -61,13 +61,13 @@ def virtual_dualsense(arguments: Sequence[str]) -> int:
 
 
 def live(
-    settings: VirtualDualSenseSettings, file: EventFile, clock: Clock, stopped: Callable[[], bool], say: Say
+    settings: VirtualDualSenseSettings, file: UhidFile, clock: Clock, stopped: Callable[[], bool], say: Say
 ) -> None:
     """One controller from plug to unplug; DeviceError when the kernel lets it go."""
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
-    controller = SimulatedDualSense(transport, Model.EDGE if settings.edge else Model.DUALSENSE)
-    told = identity(transport, controller.model, controller.address)
-    offered = UhidController(_Narrated(controller, say), told)
+    controller = _Narrated(say, transport, Model.EDGE if settings.edge else Model.DUALSENSE)
+    told = UhidIdentity(transport, controller.model, controller.address)
+    offered = UhidController(controller, told)
     start_s = clock.now()
     driver = _DriverWatch(offered, start_s, say)
 
@@ -104,34 +104,26 @@ class _DriverWatch:
             self._say("no driver has taken it so far: sudo modprobe hid-playstation")
 
 
-class _Narrated:
-    """The controller as the kernel is offered it, which says what every output report changes."""
+class _Narrated(SimulatedDualSense):
+    """The controller, which says what every output report from the kernel changes."""
 
-    def __init__(self, controller: SimulatedDualSense, say: Say) -> None:
-        self._controller = controller
+    def __init__(self, say: Say, transport: Transport, model: Model) -> None:
+        super().__init__(transport, model)
         self._say = say
-        self._shown = self._told()
-
-    def read(self, now_s: float) -> bytes | None:
-        """Pass on the controller's own answer."""
-        return self._controller.read(now_s)
-
-    def get_feature(self, report_id: int) -> bytes:
-        """Pass on the controller's own answer."""
-        return self._controller.get_feature(report_id)
+        self._shown = self._doing()
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Pass the report to the controller, and say the changes."""
-        self._controller.take_report(report, now_s)
-        told = self._told()
+        """Take the report, and say the changes."""
+        super().take_report(report, now_s)
+        told = self._doing()
         for part, doing in told.items():
             if doing != self._shown[part]:
                 self._say(f"{part}: {doing}")
         self._shown = told
 
-    def _told(self) -> dict[str, str]:
-        l2, r2 = self._controller.effects
-        rumble, output = self._controller.rumble, self._controller.output
+    def _doing(self) -> dict[str, str]:
+        l2, r2 = self.effects
+        rumble, output = self.rumble, self.output
         return {
             "L2": described(l2),
             "R2": described(r2),

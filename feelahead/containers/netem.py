@@ -53,7 +53,7 @@ def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counte
 
 
 def _direction_words(link: LinkSpec, direction: Direction) -> str:
-    words = {link.profile(direction, stream).words() for stream in CARRIED}
+    words = {link.profile(direction, stream).words for stream in CARRIED}
     if len(words) > 1:
         raise BeyondNetemError(f"{direction}: its streams have links of their own, and netem sees only packets")
     if (beyond := _beyond(link.profile(direction))) is not None:

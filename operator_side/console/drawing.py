@@ -8,10 +8,13 @@ from typing import Any, Final
 import numpy as np
 import viser
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
-from operator_side.console.placing import Floats, approach, compose
 from operator_side.console.solids import Solid, solid_of, sphere
+
+Floats = NDArray[np.float64]
+"""Poses are rows of x, y, z and the quaternion w, x, y, z."""
 
 ROLES: Final = ("obstacle", "target", "support", "ignored")
 _ROLE_COLORS: Final = np.array([(150, 150, 156), (245, 240, 225), (104, 108, 118), (200, 200, 204)], np.float64)
@@ -25,10 +28,17 @@ _SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
 """The first look at the tool is from here, relative to it."""
 _LIGHT_FROM: Final = (0.4, -1.0, 1.5)
 _FIELD_OF_VIEW: Final = 0.9
-"""In radians."""
+"""The angle in radians."""
 _STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _GONE: Final = 1e-6
 """The size of what is not to be seen."""
+
+
+def compose(outer: Floats, inner: Floats) -> Floats:
+    """Poses (n, 7): `inner`, in the frame of `outer`, in the frame that that is in."""
+    turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
+    turns = (turn * inner_turn).as_quat(scalar_first=True)
+    return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
 class _Batch:
@@ -170,7 +180,7 @@ class Drawing:
                 batch.place(links, self._objects, colors)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
-            along = approach(state.tool_pose)
+            along = Rotation.from_quat(state.tool_pose[3:], scalar_first=True).apply([0.0, 0.0, 1.0])
             for ghost, name, ahead_m, terms in zip(
                 self._ghosts, ("L2", "R2"), needed_m, (state.l2, state.r2), strict=True
             ):
@@ -203,7 +213,7 @@ class Drawing:
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
-    """By its role; towards a trigger's colour the more of it that one's gripper overlaps."""
+    """Colours by role; towards a trigger's colour the more of it that one's gripper overlaps."""
     colors = _ROLE_COLORS[roles]
     for index, by_l2_m3, by_r2_m3 in state.overlaps:
         if 0 <= index < len(roles):

@@ -1,35 +1,36 @@
-"""What a page of the console says of its hands and of what it wants tuned: frozen, and validated whole."""
+"""Messages of a page of the console, of hands and of wishes to tune: frozen, and validated whole."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
 from common.errors import RemoteProtocolError
-from common.protocol.messages import Vector2
+from common.limits import Share
 
+Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
 _LARGEST = 2**53 - 1
 """A browser counts exactly up to here."""
-_LONGEST = 200
 
 
 class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the hands at one page do; sent 50 times a second while they drive, and at once when anything changes."""
+    """The hands at one page; sent 50 times a second while they drive, and at once when anything changes."""
 
-    page: str
+    page: Annotated[str, Meta(min_length=1, max_length=32)]
     """A word by which the page tells itself from others"""
-    number: int
+    number: Annotated[int, Meta(ge=0, le=_LARGEST)]
     """Grows with each message of the page"""
     driving: bool = False
     """The person has asked to drive from this page"""
     run: bool = False
     """Hold-to-run is held"""
-    l2: float = 0.0
+    l2: Share = 0.0
     """Calibrated travel of what retreats, 0 to 1"""
-    r2: float = 0.0
+    r2: Share = 0.0
     """Calibrated travel of what advances, 0 to 1"""
-    lateral: Vector2 = (0.0, 0.0)
+    lateral: Deflection = (0.0, 0.0)
     """Across: right and up positive, -1 to 1 each, no dead zone"""
-    turning: Vector2 = (0.0, 0.0)
+    turning: Deflection = (0.0, 0.0)
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens, 1 closes, 0 holds"""
     next_target: bool = False
@@ -38,21 +39,6 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The emergency stop is pressed"""
     give_back: bool = False
     """The person lets the scripted one go on"""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.number <= _LARGEST:
-            raise ValueError(f"number = {self.number}; valid: 0 to {_LARGEST}")
-        if not 1 <= len(self.page) <= 32:
-            raise ValueError(f"page has {len(self.page)} characters; valid: 1 to 32")
-        for name, low, values in (
-            ("l2", 0.0, (self.l2,)),
-            ("r2", 0.0, (self.r2,)),
-            ("lateral", -1.0, self.lateral),
-            ("turning", -1.0, self.turning),
-        ):
-            for value in values:
-                if not low <= value <= 1.0:  # false for NaN, too
-                    raise ValueError(f"{name} = {value}; valid: {low:g} to 1")
 
     @property
     def moves_nothing(self) -> bool:
@@ -67,17 +53,11 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a page wants to be different; None leaves it."""
+    """The wish of a page for another P or link; None leaves it."""
 
-    probability: float | None = None
-    link: str | None = None
+    probability: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
+    link: Annotated[str, Meta(max_length=200)] | None = None
     """Netem's words"""
-
-    def __post_init__(self) -> None:
-        if self.probability is not None and not 0.0 < self.probability < 1.0:
-            raise ValueError(f"probability = {self.probability}; valid: above 0 to below 1")
-        if self.link is not None and len(self.link) > _LONGEST:
-            raise ValueError(f"link has {len(self.link)} characters; valid: up to {_LONGEST}")
 
     def over(self, earlier: "TuneWish | None") -> "TuneWish":
         """This wish, and of an earlier one what this one leaves."""

@@ -1,7 +1,6 @@
 """Every message on the wire: it comes back as it was, is MessagePack, and is refused whole when a field is bad."""
 
 import math
-import random
 import struct
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -204,16 +203,6 @@ def places(content: list[Any], before: tuple[int, ...] = ()) -> list[tuple[int, 
         if isinstance(item, list):
             found += places(item, (*before, position))
     return found
-
-
-def test_the_hostile_mixture_is_refused_or_valid() -> None:
-    generator = random.Random(0)  # noqa: S311
-    outcomes = []
-    for _ in range(5000):
-        payload = bytearray(encode(generator.choice(VALID)))
-        payload[generator.randrange(len(payload))] = generator.randrange(256)
-        outcomes.append(survives(bytes(payload[: generator.randrange(len(payload) // 2, 2 * len(payload))])))
-    assert 1000 < outcomes.count(None) < 5000  # both happen, or this would test nothing
 
 
 # Versions and sizes

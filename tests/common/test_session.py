@@ -1,15 +1,12 @@
 """The session's table: what it promises for every state, and that docs/session.md shows it as it is."""
 
-import subprocess
-import sys
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.session import OWNING, TABLE, TRANSITIONS, Session, SessionEvent, SessionState
 from feelahead.documents.generated_part import with_generated_part
-from feelahead.documents.session_diagram import DOCUMENT, diagram, generated, table
+from feelahead.documents.session_diagram import DOCUMENT, generated
 
 CHANGING = [row for row in TRANSITIONS if row.after is not row.before]
 WAYS_IN = (SessionEvent.ASKED_WHILE_FREE, SessionEvent.LEASE_PASSED)
@@ -98,19 +95,3 @@ def test_the_document_shows_the_table_as_it_is() -> None:
     assert with_generated_part(text, generated()) == text, (
         "out of date: python -m feelahead.documents.session_diagram --write"
     )
-
-
-def test_a_changed_row_changes_the_document() -> None:
-    assert table(TRANSITIONS[1:]) not in DOCUMENT.read_text(encoding="utf-8")
-    assert diagram(TRANSITIONS[:-1]) != diagram()
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize(("flag", "code"), [("--writ", 2), ("--help", 0)])
-def test_the_command_says_what_it_takes(flag: str, code: int) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "feelahead.documents.session_diagram", flag], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code
-    assert "--write" in done.stdout + done.stderr
-    assert "Traceback" not in done.stderr

@@ -12,11 +12,13 @@ from operator_side.dualsense.reports.feature_report import (
     Firmware,
     build_address,
 )
-from operator_side.dualsense.reports.input_report import build_input_report, build_simple_input_report
+from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.transport import Transport
 
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
+SIMPLE_REPORT = bytes.fromhex("01 80808080 080000 0000")
+"""The first report over Bluetooth: nothing touched."""
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
@@ -31,7 +33,7 @@ class FakeHandle:
     answers: bool = True
     """Whether it answers feature reports."""
     garbled: int = 0
-    """So many feature reports come over the air with a wrong bit."""
+    """Number of feature reports that come over the air with a wrong bit."""
     silent: bool = False
     plugged_in: bool = True
     waiting: list[bytes] = field(default_factory=list)
@@ -92,7 +94,7 @@ class FakeHandle:
 
     def _first_report(self) -> bytes:
         if self.transport is BLUETOOTH and not self.full_mode:
-            return build_simple_input_report(ControllerState())
+            return SIMPLE_REPORT
         return self.report()
 
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 from common.clock import VirtualClock
 from common.errors import DeviceError
-from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.uhid.controller import EVENT_LENGTH
+from operator_side.dualsense.uhid.file import UhidFile
 
-START, STOP, OPEN, CLOSE, OUTPUT, GET_REPORT, SET_REPORT = 2, 3, 4, 5, 6, 9, 13
+START, STOP, OUTPUT, GET_REPORT = 2, 3, 6, 9
 FEATURE, OUT = 0, 1
 
 
@@ -25,13 +27,9 @@ def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
     return said(GET_REPORT, struct.pack("=IBB", request, report_id, kind))
 
 
-def set_report(request: int, report: bytes, kind: int = OUT) -> bytes:
-    return said(SET_REPORT, struct.pack("=IBBH", request, report[0], kind, len(report)) + report)
-
-
 @dataclass
-class FakeKernel:
-    """What the loop reads, waits for and writes; a wait lets the time pass."""
+class FakeKernel(UhidFile):
+    """The file that the loop reads, waits for and writes; a wait lets the time pass."""
 
     clock: VirtualClock
     to_say: deque[tuple[float, bytes]] = field(default_factory=deque)
@@ -59,10 +57,11 @@ class FakeKernel:
         return [(now_s, event) for now_s, event in self.heard if event[0] == kind]
 
 
-class PlainController:
+class PlainController(SimulatedDualSense):
     """A report that counts, at each reading; takes what begins with 2, and has feature 5."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.written: list[bytes] = []
         self.reads = 0
 

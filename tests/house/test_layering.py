@@ -62,6 +62,7 @@ ARROWS = """
     operator_side/dualsense/hid: common operator_side/dualsense/reports
     operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
+        operator_side/dualsense/simulated
     operator_side/hands: operator_side/dualsense/effects operator_side/dualsense/reports
     operator_side/feel: common common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
         operator_side/hands

@@ -26,10 +26,7 @@ from operator_side.dualsense.reports.output_report import (
 from tests.helpers.repository import ROOT
 from tests.operator_side.stiffness_source import StiffnessSource
 
-pytestmark = [
-    pytest.mark.processes,
-    pytest.mark.skipif(sys.platform != "linux", reason="a FIFO in the place of a device node"),
-]
+pytestmark = pytest.mark.processes
 LIMIT_S = 600.0
 """Long enough for a machine that is busy with other things, too."""
 REPORT_LENGTH = 48

@@ -86,31 +86,6 @@ def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same
     assert bench.device.write_count == 0
 
 
-def test_a_controller_that_is_found_is_released_before_it_is_told_anew(bench: Bench) -> None:
-    bench.feel(6)
-    stiff = bench.device.effects
-    bench.side.controller_lost(bench.now_s)
-    bench.side.controller_found(bench.now_s)
-    bench.write()
-    assert bench.device.released
-    bench.write()
-    assert bench.device.effects == stiff
-    assert bench.device.write_count == 3
-
-
-def test_a_controller_that_is_back_may_only_stop_before_the_arm_has_stopped(bench: Bench) -> None:
-    bench.feel(2)
-    bench.side.controller_lost(bench.now_s)
-    for state, commands in (("armed", 0), ("armed", 0), ("disarmed", 1), ("armed", 1)):
-        bench.now_s += 0.01
-        bench.side.controller_found(bench.now_s)
-        bench.feel(2, state)  # type: ignore[arg-type]
-        bench.hands(Button.CIRCLE)
-        assert [command.emergency_stop for command in bench.commands()] == [True]
-        bench.hands(Button.L1)
-        assert len(bench.commands()) == commands, state
-
-
 def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench) -> None:
     bench.feel(5)
     assert bench.device.output.lightbar is None

@@ -17,9 +17,8 @@ from operator_side.facts import OperatorFacts
 from operator_side.facts_of_core import Surroundings, operator_facts
 from operator_side.hands.travel_calibration import TriggerTravel
 from operator_side.page_hands.driving_page import DrivingPage
-from operator_side.scene_figures import SceneFigures
 from operator_side.settings import OperatorSettings
-from operator_side.viewing import Viewing, view_topics
+from operator_side.viewing import SceneFigures, Viewing, view_topics
 from tests.operator_side.console_feed import shapes, state
 from tests.operator_side.operator_bench import Bench
 

@@ -1,5 +1,6 @@
 """Checks of a real controller (hidapi, permission, connection) and of a virtual one."""
 
+import contextlib
 import importlib.metadata
 import os
 import re
@@ -191,10 +192,7 @@ def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:
     if identity.firmware is not None:
         version, hardware = identity.firmware.firmware_version, identity.firmware.hardware_version
         firmware = f"0x{version:08x} (hardware 0x{hardware:08x})"
-    try:
+    with contextlib.suppress(RemoteProtocolError):
         state = parse_input_report(identity.first_report).battery
-    except RemoteProtocolError:
-        state = None
-    if state is not None:
         battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"
     return ControllerSeen(model, name, identity.transport.value, identity.address, firmware, battery)

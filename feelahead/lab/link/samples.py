@@ -78,7 +78,7 @@ class LinkSample:
 
 def greatest_delay_s(profile: LinkProfile) -> float:
     """Return the longest delay of a datagram; infinity where there is no such limit or it is not known."""
-    if profile.model == "stream" or profile.slot is not None:
+    if profile.model == "stream":
         return math.inf
     if profile.trace is not None:
         return max(delay_s for delay_s in profile.trace.delays_s if delay_s is not None)
@@ -146,13 +146,7 @@ def independent_delays(profile: LinkProfile) -> bool:
 
     netem's correlation of delays does not count: it leaves them independent.
     """
-    return (
-        profile.model == "datagram"
-        and profile.jitter_s > 0.0
-        and profile.rate is None
-        and profile.slot is None
-        and profile.trace is None
-    )
+    return profile.model == "datagram" and profile.jitter_s > 0.0 and profile.rate is None and profile.trace is None
 
 
 def needs_band(profile: LinkProfile) -> bool:

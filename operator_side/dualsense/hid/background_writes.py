@@ -8,7 +8,7 @@ import threading
 from typing import Final
 
 from common.errors import DeviceError
-from operator_side.dualsense.hid.port import Device
+from operator_side.dualsense.hid.search import Device
 from operator_side.dualsense.reports.output_report import OutputReport
 
 CLOSE_TIMEOUT_S: Final = 0.3
@@ -36,7 +36,7 @@ class BackgroundWrites:
 
     @property
     def released(self) -> bool:
-        """As the device says; False while anything waits, and when a write has not returned."""
+        """Whether the device is released; False while anything waits, and when a write has not returned."""
         with self._changed:
             under_way = self._stuck or self._waiting is not None or self._written_since_s is not None
         return not under_way and self._device.released
@@ -47,7 +47,7 @@ class BackgroundWrites:
             return self._written_since_s is not None and now_s - self._written_since_s > STALL_S
 
     def read(self, now_s: float) -> bytes | None:
-        """As the device's; DeviceError also when a write has failed since."""
+        """Read the device; DeviceError also when a write has failed since."""
         self._raise_failure()
         return self._device.read(now_s)
 

@@ -7,9 +7,8 @@ from enum import StrEnum
 from typing import Final, Protocol
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
-from operator_side.dualsense.hid.port import OpenController
-from operator_side.dualsense.hid.release_guard import Guard
-from operator_side.dualsense.hid.search import Search
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.search import OpenController, Search
 from operator_side.dualsense.reports.output_report import OutputReport
 
 BEAT_PERIOD_S: Final = 0.05
@@ -25,14 +24,14 @@ class ConnectionState(StrEnum):
     """Whether there is a controller; the values are shown to people."""
 
     ABSENT = "absent"
-    """None has been found yet."""
+    """No controller has been found yet."""
     CONNECTED = "connected"
     LOST = "lost"
     """There was one."""
 
 
 class Listener(Protocol):
-    """Who has to know at once that the hands came or went."""
+    """The part that has to know at once that the hands came or went."""
 
     def controller_found(self, now_s: float) -> None:
         """There is one, and nothing is known of what its triggers do."""
@@ -46,10 +45,10 @@ class Listener(Protocol):
 class Connection:
     """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
 
-    def __init__(self, search: Search, listener: Listener, guard: Guard | None = None) -> None:
+    def __init__(self, search: Search, listener: Listener, guard: ReleaseGuard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
-        """How often a controller was found."""
+        """Number of times that a controller was found."""
         self.released = True
         """Whether the last controller that was let go had its triggers released; False for one that was unplugged."""
         self._search = search
@@ -95,8 +94,8 @@ class Connection:
     def beat(self, now_s: float) -> None:
         """While an effect is on, show the watchdog that we live; to be called at every turn, before what is written.
 
-        After a silence in which it may have released the triggers, the listener is told as of a controller that has
-        just been found: nobody knows what they do. A write that does not return is a silence, too.
+        After a long silence the watchdog may have released the triggers. Then the listener hears of a controller that
+        has just been found. A write that does not return is a silence, too.
         """
         if self._guard is None or self._controller is None or not self._held:
             return
@@ -143,7 +142,7 @@ class Connection:
         return True
 
     def take_notes(self) -> list[str]:
-        """What a person has to know since the last call; each trouble is told once, however long it lasts."""
+        """Notes for a person since the last call; each trouble appears once, however long it lasts."""
         notes, self._notes = self._notes, []
         return notes
 
@@ -199,7 +198,7 @@ class Connection:
 
 
 def _introduction(controller: OpenController, known: str | None, *, first: bool) -> str:
-    """Who it is, and whether it is the one from before, whose address is `known`."""
+    """Name the controller, and say whether it is the one from before, whose address is `known`."""
     if first or known is None or controller.address is None:
         return f"controller: {controller.name}"  # nobody can tell whether it is the same
     if controller.address == known:

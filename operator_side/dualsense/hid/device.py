@@ -1,12 +1,11 @@
 """A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
 
-import sys
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol, TypeVar, cast
+from typing import Any, Final, TypeVar
 
 from common.errors import DeviceError, NoDriverError, RemoteProtocolError
-from operator_side.dualsense.hid.device_messages import INSTALL, gone, no_dualsense, not_opened, silent
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     FEATURE_LENGTHS,
@@ -16,9 +15,16 @@ from operator_side.dualsense.reports.feature_report import (
 )
 from operator_side.dualsense.reports.input_report import is_input_report
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
-from operator_side.dualsense.reports.transport import Transport, transport_of_input
+from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
 Read = TypeVar("Read")
+HidHandle = Any
+"""One of hidapi's `device` objects, which has no types."""
+HidBackend = Any
+"""One of hidapi's modules, `hidraw` or `hid`."""
+
+_INSTALL: Final = "pip install --force-reinstall hidapi"
+"""Over another package's module, too; by its own name, for feelahead may come from a folder."""
 
 _READ_LENGTH: Final = 128  # longer than any report, so that each is seen as long as it is
 _MAX_DRAINED: Final = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
@@ -28,95 +34,45 @@ _FEATURE_ATTEMPTS: Final = 3
 """A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
 
 
-class HidHandle(Protocol):
-    """What is used of hidapi's `device` objects."""
-
-    def open_path(self, path: bytes) -> None:
-        """Open; OSError when that fails."""
-        ...
-
-    def set_nonblocking(self, flag: int) -> object:
-        """1: `read` returns an empty list rather than wait."""
-        ...
-
-    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
-        """One report; empty after the timeout, which 0 leaves to set_nonblocking. OSError when the device is gone."""
-        ...
-
-    def write(self, data: bytes) -> int:
-        """The number of bytes written; -1 when the device is gone."""
-        ...
-
-    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
-        """One feature report, with its id; OSError when the device does not answer."""
-        ...
-
-    def close(self) -> None:
-        """Let the device go."""
-        ...
-
-    def error(self) -> str:
-        """What the last failure was."""
-        ...
-
-
-class HidBackend(Protocol):
-    """What is used of hidapi's modules `hidraw` and `hid`."""
-
-    def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
-        """The devices that are there."""
-        ...
-
-    def device(self) -> HidHandle:
-        """A handle that is not open yet."""
-        ...
-
-
 def load_backend() -> HidBackend:
     """Import hidapi; NoDriverError when it is missing, broken or shadowed by the other package called `hid`.
 
-    hidapi's wheel for Linux has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which
-    goes through libusb and does not. Elsewhere there is only `hid`.
+    hidapi's wheel has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which goes through
+    libusb and does not.
     """
     try:
-        if sys.platform == "linux":
-            import hidraw as module  # noqa: PLC0415
-        else:
-            import hid as module  # noqa: PLC0415
+        import hidraw as module  # noqa: PLC0415
     except Exception as error:  # another package's module may fail as it likes
         raise NoDriverError(
-            f"hidapi cannot be imported ({type(error).__name__}: {error}): {INSTALL}, after pip uninstall hid if that"
+            f"hidapi cannot be imported ({type(error).__name__}: {error}): {_INSTALL}, after pip uninstall hid if that"
             " other package is there; or run without a controller: --device simulated"
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
         place = getattr(module, "__file__", None)
         raise NoDriverError(
-            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it (for hid:"
-            f" pip uninstall hid), then {INSTALL}"
+            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it, then"
+            f" {_INSTALL}"
         )
-    return cast(HidBackend, module)
+    return module
 
 
 @dataclass(frozen=True)
 class Identity:
-    """What a controller says of itself; None for what it does not tell."""
+    """The facts that a controller tells of itself; None for those that are missing."""
 
     transport: Transport
     address: str | None
-    """Its Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    """The Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
     firmware: Firmware | None
     first_report: bytes
-    """The input report by which the transport was told."""
+    """The input report that shows the transport."""
 
 
 class HidDualSense:
-    """The Device port on a controller that is open, on USB or Bluetooth.
-
-    On Linux it may be read by one thread and written by another; elsewhere one thread does both.
-    """
+    """The Device port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
-        """Open it and ask what it is, which takes a few reports' time; DeviceError says what is wrong.
+        """Open it and ask for its facts, which takes a few reports' time; DeviceError names the fault.
 
         On Bluetooth, asking is also what switches it to full reports.
         """
@@ -126,7 +82,7 @@ class HidDualSense:
             self._reading.set_nonblocking(1)
         except OSError as error:
             self._close_handles()
-            raise gone(str(error)) from error
+            raise _gone(str(error)) from error
         except DeviceError:
             self._close_handles()
             raise
@@ -144,8 +100,8 @@ class HidDualSense:
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
 
-        One that no controller sends is passed over as long as there is a good one; else the newest is returned as it
-        is, and parsing it says what is wrong.
+        A bad report is passed over as long as there is a good one. Else the newest is returned, and parsing it names
+        the fault.
         """
         del now_s  # a real controller has a clock of its own
         self._require_open()
@@ -157,8 +113,9 @@ class HidDualSense:
                     break
                 drained.append(report)
         except OSError as error:
-            raise gone(str(error)) from error
-        reports = [bytes(report) for report in reversed(drained)]
+            raise _gone(str(error)) from error
+        # Bluetooth may have begun with simple reports before it was asked for more.
+        reports = [report for report in map(bytes, reversed(drained)) if not is_simple_report(report)]
         return next(filter(is_input_report, reports), reports[0] if reports else None)
 
     def write(self, output: OutputReport, now_s: float) -> None:
@@ -190,8 +147,7 @@ class HidDualSense:
 
     def _close_handles(self) -> None:
         self._reading.close()
-        if self._writing is not self._reading:
-            self._writing.close()
+        self._writing.close()
 
     def _require_open(self) -> None:
         if self._closed:
@@ -204,21 +160,20 @@ class HidDualSense:
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
-    """Handles to read and to write by: two where a device may be opened twice, else one for both.
+    """Handles to read and to write by.
 
-    hidapi keeps the text of the last failure with each handle and frees it with every call, so that one handle
-    must not be read and written at once (background_writes.py). Both are opened at once, while the path is
-    certainly still this controller's.
+    hidapi keeps the text of the last failure with each handle and frees it with every call. One handle must not be
+    read and written at once (background_writes.py). Both are opened now, while the path is still this controller's.
     """
     handles: list[HidHandle] = []
-    for _ in range(2 if sys.platform == "linux" else 1):
+    for _ in range(2):
         handle = backend.device()
         try:
             handle.open_path(path)
         except OSError as error:
             for opened in handles:
                 opened.close()
-            raise not_opened(path, handle.error() or str(error)) from error
+            raise _not_opened(path, handle.error() or str(error)) from error
         handles.append(handle)
     return handles[0], handles[-1]
 
@@ -227,33 +182,23 @@ def _write(handle: HidHandle, report: bytes) -> None:
     try:
         written = handle.write(report)
     except OSError as error:
-        raise gone(str(error)) from error
+        raise _gone(str(error)) from error
     if written < len(report):
-        raise gone(handle.error() or f"{written} of {len(report)} bytes written")
-
-
-def write_once(path: bytes, report: bytes) -> None:
-    """Open the controller at `path`, send an output report as it is, and let go; DeviceError when that fails."""
-    handle = load_backend().device()
-    try:
-        handle.open_path(path)
-    except OSError as error:
-        raise not_opened(path, handle.error() or str(error)) from error
-    try:
-        _write(handle, report)
-    finally:
-        handle.close()
+        raise _gone(handle.error() or f"{written} of {len(report)} bytes written")
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:
-    """What the controller is; OSError when it goes away meanwhile."""
+    """Ask the controller for its facts; OSError when it goes away meanwhile."""
     # Bluetooth starts with short reports: this is what ends them, so it comes before the first one is awaited.
     _feature(handle, FIRMWARE_ID, bytes)
     first_report = _first_report(handle, path)
     try:
         transport = transport_of_input(first_report)
     except RemoteProtocolError as error:
-        raise no_dualsense(path, str(error)) from error
+        raise DeviceError(
+            f"the controller at {os.fsdecode(path)} does not speak as a DualSense does ({error}): plug it in again;"
+            " imitations are not supported"
+        ) from error
     return Identity(
         transport=transport,
         address=_feature(handle, ADDRESS_ID, lambda report: parse_address(report, transport)),
@@ -263,11 +208,18 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
 
 
 def _first_report(handle: HidHandle, path: bytes) -> bytes:
+    """The first full report, or a simple one where nothing else comes."""
+    newest = b""
     for _ in range(_FIRST_REPORT_ATTEMPTS):
-        report = handle.read(_READ_LENGTH, _FIRST_REPORT_MS)
-        if report:
-            return bytes(report)
-    raise silent(path)
+        newest = bytes(handle.read(_READ_LENGTH, _FIRST_REPORT_MS)) or newest
+        if newest and not is_simple_report(newest):
+            return newest
+    if not newest:
+        raise DeviceError(
+            f"the controller at {os.fsdecode(path)} sends nothing: press its PS button, and plug it in again if that"
+            " does not help"
+        )
+    return newest
 
 
 def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
@@ -278,3 +230,23 @@ def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) 
         except (OSError, RemoteProtocolError):
             continue
     return None
+
+
+def _not_opened(path: bytes, reason: str) -> DeviceError:
+    """There is one, and the system does not let us at it."""
+    name = os.fsdecode(path)
+    denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
+    if denied or "permission denied" in reason.lower():
+        return DeviceError(
+            f"no permission to open the controller at {name}: `feelahead doctor` prints the udev rule that grants it,"
+            " and the command that puts it in place"
+        )
+    return DeviceError(
+        f"the controller at {name} cannot be opened ({reason}): close other programs that use it (Steam Input), plug"
+        f" it in again, or run without one: --device simulated"
+    )
+
+
+def _gone(reason: str) -> DeviceError:
+    """The controller was there a moment ago."""
+    return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")

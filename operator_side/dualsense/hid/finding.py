@@ -6,8 +6,7 @@ from typing import Final
 
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, Identity
-from operator_side.dualsense.hid.device_messages import none_found
-from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.hid.search import OpenController
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
 from operator_side.dualsense.reports.transport import Transport
@@ -53,7 +52,7 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
     """
     seen = sightings(backend)
     if not seen:
-        raise none_found()
+        raise _none_found()
     opened: list[tuple[Sighting, HidDualSense]] = []
     failure: DeviceError | None = None
     for sighting in seen:
@@ -101,4 +100,14 @@ def _rank(identity: Identity, preferred: str | None) -> tuple[bool, bool]:
     return (
         preferred is not None and identity.address != preferred,
         identity.transport is Transport.BLUETOOTH,
+    )
+
+
+def _none_found() -> NoDeviceError:
+    """No controller is connected, or the system does not show it."""
+    wanted = " or ".join(f"{name} ({SONY_VENDOR_ID:04X}:{product:04X})" for product, name in PRODUCT_IDS.items())
+    return NoDeviceError(
+        f"no {wanted} found: connect one by a USB cable that carries data, or by Bluetooth (hold Create and PS until"
+        " its light flashes, then pair it), or run without one: --device simulated; in a container or virtual machine,"
+        " pass the device through"
     )

@@ -6,34 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Protocol
+from typing import Final
 
-_WATCHDOG = "operator_side.dualsense.hid.release_watchdog"
+_WATCHDOG = Path(__file__).with_name("release_watchdog.py")
 _END_TIMEOUT_S = 2.0
-"""It releases what it holds and ends within milliseconds, but on a busy machine its turn may be late."""
+"""The watchdog ends within milliseconds, but a busy machine may let it wait."""
 MOST_REPLACEMENTS: Final = 3
-"""Whatever ends so many watchdogs will end the next one, too."""
+"""A cause that ended this number of watchdogs will end the next one, too."""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
-
-
-class Guard(Protocol):
-    """Whoever releases a controller when we cannot."""
-
-    def hold(self, path: bytes, release: bytes) -> None:
-        """From now on, should we die, `release` is to be written to the controller at `path`."""
-        ...
-
-    def let_go(self) -> None:
-        """There is nothing to release any more."""
-        ...
-
-    def beat(self) -> None:
-        """An effect is on, and we live: should no further beat follow in time, we hang."""
-        ...
-
-    def rest(self) -> None:
-        """No effect is on: there are no beats until the next one."""
-        ...
 
 
 class ReleaseGuard:
@@ -124,8 +104,8 @@ class ReleaseGuard:
             self._process.stdin.write(f"{line}\n".encode("ascii"))
 
     def _refusals(self) -> list[str]:
-        """What it answered since the last look; nothing is waited for."""
-        if sys.platform == "win32" or self._process is None or self._process.stdout is None:
+        """Read the answers since the last look, without waiting."""
+        if self._process is None or self._process.stdout is None:
             return []
         self._answers += self._process.stdout.read(4096) or b""
         *answers, self._answers = self._answers.split(b"\n")
@@ -134,7 +114,7 @@ class ReleaseGuard:
 
 def _started() -> subprocess.Popen[bytes]:
     process = subprocess.Popen(
-        [sys.executable, *_arguments()],
+        [sys.executable, "-I", "-S", str(_WATCHDOG)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -143,13 +123,6 @@ def _started() -> subprocess.Popen[bytes]:
         start_new_session=True,
     )
     for stream in (process.stdin, process.stdout):
-        if stream is not None and sys.platform != "win32":
+        if stream is not None:
             os.set_blocking(stream.fileno(), False)  # the loop waits for nobody
     return process
-
-
-def _arguments() -> list[str]:
-    """How to run the watchdog: as a bare file where it needs nothing but Python itself."""
-    if sys.platform == "linux":
-        return ["-I", "-S", str(Path(__file__).with_name("release_watchdog.py"))]
-    return ["-P", "-m", _WATCHDOG]

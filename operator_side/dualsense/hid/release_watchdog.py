@@ -1,17 +1,17 @@
-"""A small process that outlives the operator side by a moment, to release the triggers when that was killed.
+"""Release the triggers when the operator side was killed: a small process that outlives it by a moment.
 
     hold PATH REPORT    a controller is in use: when everything else fails, write REPORT to it (both in hexadecimal)
     let-go              it is not in use any more, or has been released already
     beat                an effect is on, or about to be: the next beat follows within SILENCE_S, or `rest` does
     rest                no effect is on: there are no beats until the next one
 
-These lines come on the standard input. When that closes while a controller is held, whoever wrote them has died
-without a word (kill -9, a crash): the report is written and the process ends. When the beats cease, he hangs
-(kill -STOP, a write that never returns): the report is written, once for each silence. Nothing is written otherwise.
+These lines come on the standard input. When that closes while a controller is held, the writer has died without a
+word (kill -9, a crash). Then the report is written and the process ends. When the beats cease, the writer hangs
+(kill -STOP, a write that never returns). Then the report is written, once for each silence.
 Each `hold` is answered on the standard output: `held`, or `refused` when the controller cannot be opened.
 
-It is run as a bare file with `python -I -S` on Linux, so that it starts in some 10 ms and stays small: only modules
-that Python has loaded anyway are imported. Elsewhere it needs hidapi, hence the whole environment.
+The process runs as a bare file with `python -I -S`, to start in some 10 ms and to stay small. Only modules that Python
+has loaded anyway are imported.
 """
 
 import os
@@ -21,12 +21,12 @@ import sys
 import time
 
 SILENCE_S = 0.2
-"""Without a beat for this long while an effect is on, nobody looks after it."""
+"""The longest time without a beat while an effect is on."""
 _ATTEMPTS = 3
 """A transfer can fail once while the controller is there; one that is gone refuses each at once."""
 
 
-class LinuxTarget:
+class Target:
     """The controller, opened while it is still known to be the one: its path may be another device's later."""
 
     def __init__(self, path: bytes, report: bytes) -> None:
@@ -54,34 +54,8 @@ class LinuxTarget:
             self._file = -1
 
 
-class HidapiTarget:
-    """The controller by its path in hidapi, opened when it comes to that: some systems open it only once."""
-
-    def __init__(self, path: bytes, report: bytes) -> None:
-        self._path, self._report = path, report
-        self.usable = True  # as far as can be told before
-
-    def release(self) -> None:
-        """Open, write the report, close."""
-        from common.errors import FeelaheadError  # noqa: PLC0415  # Linux needs nothing of ours
-        from operator_side.dualsense.hid.device import write_once  # noqa: PLC0415  # needs hidapi
-
-        for _ in range(_ATTEMPTS):
-            try:
-                write_once(self._path, self._report)
-                return
-            except FeelaheadError:
-                continue
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-Target = LinuxTarget | HidapiTarget
-
-
 class Watch:
-    """What is held, and until when the next beat is waited for."""
+    """The controller that is held, and the time by which the next beat is due."""
 
     def __init__(self, answer_file: int) -> None:
         """`answer_file`: each `hold` is answered there."""
@@ -90,7 +64,7 @@ class Watch:
         self._deadline_s: float | None = None
 
     def patience_s(self, now_s: float) -> float | None:
-        """How long the next beat may still take; None for as long as it likes."""
+        """Time that the next beat may still take; None for no limit."""
         return None if self._deadline_s is None else max(0.0, self._deadline_s - now_s)
 
     def follow(self, line: bytes, now_s: float) -> None:
@@ -104,7 +78,7 @@ class Watch:
             self._take(None)
         elif len(words) == 3 and words[0] == b"hold":
             path, report = (bytes.fromhex(word.decode("ascii")) for word in words[1:])
-            self._take(LinuxTarget(path, report) if sys.platform == "linux" else HidapiTarget(path, report))
+            self._take(Target(path, report))
 
     def release(self) -> None:
         """Write the report, if a controller is held; what is released now is not waited for again."""
@@ -121,7 +95,7 @@ class Watch:
         try:  # noqa: SIM105  # contextlib would have to be imported
             os.write(self._answer_file, b"held\n" if target.usable else b"refused\n")
         except OSError:
-            pass  # whoever asked has died meanwhile, or does not listen: that is no reason to end
+            pass  # the writer has died meanwhile, or does not listen: that is no reason to end
 
 
 def watch(input_file: int, answer_file: int) -> None:
@@ -143,19 +117,15 @@ def watch(input_file: int, answer_file: int) -> None:
 
 
 def _readable(file: int, patience_s: float | None) -> bool:
-    """Wait for something to be read, or for the end; False when there is nothing for so long."""
-    if sys.platform == "win32":
-        return True  # a pipe cannot be waited for with a limit there: the beats are not counted, the end still is
+    """Wait for something to be read, or for the end; False when nothing came in time."""
     return bool(select.select([file], [], [], patience_s)[0])
 
 
 def main() -> None:
     """Ignore what stops the operator side, which ends us by closing the pipe."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # Windows has no SIGHUP
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    if sys.platform != "win32":
-        os.set_blocking(sys.stdout.fileno(), False)  # an answer is lost rather than waited for
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    os.set_blocking(sys.stdout.fileno(), False)  # an answer is lost rather than waited for
     watch(sys.stdin.fileno(), sys.stdout.fileno())
 
 

@@ -1,32 +1,68 @@
-"""Looking for a controller without keeping anybody waiting: opening one takes a few reports and their time."""
+"""The Device port, what feelahead asks of a controller, and the search for one, which keeps nobody waiting.
+
+Input reports come as bytes, to be read by input_report.py; what to do goes as a value. Opening a controller takes a few
+reports and their time, hence a thread.
+"""
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 from common.errors import DeviceError
-from operator_side.dualsense.hid.port import OpenController
+from operator_side.dualsense.reports.output_report import OutputReport
 
 _CLOSE_TIMEOUT_S = 0.3
 
-Find = Callable[[str | None], OpenController]
-"""Find and open a controller, that of the given address first; DeviceError says why there is none."""
 
+class Device(Protocol):
+    """A controller that is open. Any method may raise DeviceError; the text says what to do about it."""
 
-class Search(Protocol):
-    """One look at a time."""
-
-    def begin(self, preferred: str | None) -> None:
-        """Start to look; the controller of the address `preferred` goes before others."""
+    @property
+    def released(self) -> bool:
+        """Both triggers are free of any effect, as far as anybody can know."""
         ...
 
-    def take(self) -> OpenController | DeviceError | None:
-        """What was found, or why nothing was, once; None while the look goes on or before there was any."""
+    def read(self, now_s: float) -> bytes | None:
+        """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
+        ...
+
+    def write(self, output: OutputReport, now_s: float) -> None:
+        """Have the controller do what `output` sets; ValueError, and nothing sent, for an effect never to be sent."""
         ...
 
     def close(self) -> None:
-        """Give up; what is found from now on is let go."""
+        """Take trigger effects, rumble and a warning light off if any were written, and let the controller go.
+
+        Safe to call again; everything else raises DeviceError afterwards.
+        """
         ...
+
+
+def _never_stalls(now_s: float) -> bool:
+    del now_s
+    return False
+
+
+@dataclass(frozen=True)
+class OpenController:
+    """A controller that a search has found and opened."""
+
+    device: Device
+    name: str
+    """Model and transport, for people."""
+    address: str | None = None
+    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
+    path: bytes | None = None
+    """Device node; None without hardware."""
+    release: bytes = b""
+    """Output report, ready for the wire, that takes every effect off; for the watchdog."""
+    stalls: Callable[[float], bool] = _never_stalls
+    """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""
+
+
+Find = Callable[[str | None], OpenController]
+"""Find and open a controller, that of the given address first; DeviceError says why there is none."""
 
 
 class BackgroundSearch:
@@ -49,7 +85,7 @@ class BackgroundSearch:
         self._thread.start()
 
     def take(self) -> OpenController | DeviceError | None:
-        """What was found, or why nothing was; whatever else went wrong in the thread is raised here."""
+        """The controller, or why there is none; any other failure in the thread is raised here."""
         if self._thread is None or self._thread.is_alive():
             return None
         self._thread = None
@@ -103,3 +139,6 @@ class Ready:
 
     def close(self) -> None:
         """There is nothing to give up."""
+
+
+Search = BackgroundSearch | Ready

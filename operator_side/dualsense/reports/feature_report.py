@@ -13,8 +13,7 @@ from msgspec import Meta
 
 from common.errors import RemoteProtocolError
 from common.limits import check_limits
-from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.reports.transport import Transport, described
+from operator_side.dualsense.reports.transport import CHECKSUM_LENGTH, Seed, Transport, check, described, sealed
 
 CALIBRATION_ID: Final = 0x05
 ADDRESS_ID: Final = 0x09
@@ -78,7 +77,7 @@ def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Firmware:
-    """What runs in the controller."""
+    """The versions of a controller."""
 
     hardware_version: Word
     firmware_version: Word

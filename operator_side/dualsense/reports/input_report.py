@@ -1,23 +1,24 @@
-"""Input reports, bytes to values and back: USB's 0x01, Bluetooth's 0x31 and its simple 0x01.
+"""Input reports, bytes to values and back: USB's 0x01 and Bluetooth's 0x31.
 
 The driver reads them, the simulated controller makes them. Layout: Linux hid-playstation, SDL and the controllers
 wiki, which agree. Touch, motion and the triggers' own feedback are not read, as nothing here uses them.
 """
 
 import struct
+from functools import lru_cache
 from typing import Final
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.reports.battery import BATTERIES, battery_byte
-from operator_side.dualsense.reports.button_codes import AXIS, AXIS_DOWN, TRAVEL, byte_of_axis, code_of, pressed_of
-from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.dualsense.reports.controller_state import BATTERIES, Button, ControllerState, battery_byte
 from operator_side.dualsense.reports.transport import (
+    CHECKSUM_LENGTH,
     INPUT_FRAMING,
-    SIMPLE_REPORT_ID,
-    SIMPLE_REPORT_LENGTH,
+    Seed,
     Transport,
+    check,
+    described,
     is_simple_report,
+    sealed,
     transport_of_input,
 )
 
@@ -28,22 +29,88 @@ _GRAVITY: Final = 8192
 _NOT_TOUCHED: Final = 0x80
 _USB_DATA_AND_POWER: Final = 0x18
 _SENSOR_TICKS_PER_S: Final = 3_000_000
-_SIMPLE: Final = struct.Struct("<4B3B2B")
-_SIMPLE_BUTTONS: Final = 0x03FFFF
-"""The simple report's third byte of buttons has two of them, and a counter of six bits."""
 _HAS_STATE: Final = 0x01
 """In the second byte of Bluetooth's report, below a sequence number: it holds the controller's state (wiki)."""
+
+_HAT_DIRECTIONS: Final = (
+    frozenset({Button.UP}),
+    frozenset({Button.UP, Button.RIGHT}),
+    frozenset({Button.RIGHT}),
+    frozenset({Button.DOWN, Button.RIGHT}),
+    frozenset({Button.DOWN}),
+    frozenset({Button.DOWN, Button.LEFT}),
+    frozenset({Button.LEFT}),
+    frozenset({Button.UP, Button.LEFT}),
+)
+"""Clockwise from up; any other number is HID's null state: no direction."""
+_HAT_NONE: Final = 8
+_DIRECTIONS: Final = frozenset({Button.UP, Button.RIGHT, Button.DOWN, Button.LEFT})
+
+_BUTTON_BITS: Final = {
+    Button.SQUARE: 4,
+    Button.CROSS: 5,
+    Button.CIRCLE: 6,
+    Button.TRIANGLE: 7,
+    Button.L1: 8,
+    Button.R1: 9,
+    Button.L2: 10,
+    Button.R2: 11,
+    Button.CREATE: 12,
+    Button.OPTIONS: 13,
+    Button.L3: 14,
+    Button.R3: 15,
+    Button.PS: 16,
+    Button.TOUCHPAD: 17,
+    Button.MUTE: 18,
+    Button.LEFT_FUNCTION: 20,
+    Button.RIGHT_FUNCTION: 21,
+    Button.LEFT_PADDLE: 22,
+    Button.RIGHT_PADDLE: 23,
+}
+"""Bit numbers in the three bytes as one little-endian number; the low nibble is the directional pad's hat."""
+
+
+def _axis(byte: int) -> float:
+    """-1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
+    return (byte - 128) / (127 if byte > 128 else 128)
+
+
+AXIS: Final = tuple(_axis(byte) for byte in range(256))
+"""A stick's byte to -1 to 1."""
+AXIS_DOWN: Final = tuple(0.0 - _axis(byte) for byte in range(256))
+"""A stick's byte of a vertical axis to -1 to 1: down is positive on the wire."""
+TRAVEL: Final = tuple(byte / 255 for byte in range(256))
+"""A trigger's byte to 0 to 1."""
+
+
+def byte_of_axis(axis: float) -> int:
+    """The nearest byte of -1 to 1."""
+    return 128 + round(axis * (127 if axis > 0.0 else 128))
+
+
+@lru_cache(maxsize=4096)
+def pressed_of(code: int) -> frozenset[Button]:
+    """Decode the three bytes as one number; results are cached, as hands hold few combinations."""
+    pressed = {button for button, bit in _BUTTON_BITS.items() if code >> bit & 1}
+    hat = code & 0x0F
+    return frozenset(pressed | _HAT_DIRECTIONS[hat] if hat < len(_HAT_DIRECTIONS) else pressed)
+
+
+def code_of(pressed: frozenset[Button]) -> int:
+    """The three bytes as one number. `pressed`: no two opposite directions."""
+    directions = pressed & _DIRECTIONS
+    code = _HAT_DIRECTIONS.index(directions) if directions else _HAT_NONE
+    for button in pressed - _DIRECTIONS:
+        code |= 1 << _BUTTON_BITS[button]
+    return code
 
 
 def parse_input_report(report: bytes) -> ControllerState:
     """Read an input report of either transport; every one of a valid id, length and checksum can be read.
 
-    RemoteProtocolError for any other report.
+    RemoteProtocolError for any other report, and for the simple ones that Bluetooth starts with.
     """
-    transport = _checked_transport(report)
-    if is_simple_report(report):
-        return _parse_simple(report)
-    start = INPUT_FRAMING[transport].start
+    start = INPUT_FRAMING[_checked_transport(report)].start
     left_x, left_y, right_x, right_y, l2, r2, sequence, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(
         report, start
     )
@@ -69,22 +136,13 @@ def is_input_report(report: bytes) -> bool:
 
 def _checked_transport(report: bytes) -> Transport:
     transport = transport_of_input(report)
-    if report[0] == INPUT_FRAMING[Transport.BLUETOOTH].report_id:
+    if transport is Transport.BLUETOOTH:
+        if is_simple_report(report):
+            raise RemoteProtocolError(
+                f"input report: {described(report)}: Bluetooth's simple mode; valid: full reports"
+            )
         check(Seed.INPUT, report)
     return transport
-
-
-def _parse_simple(report: bytes) -> ControllerState:
-    left_x, left_y, right_x, right_y, *buttons, l2, r2 = _SIMPLE.unpack_from(report, 1)
-    return ControllerState(
-        left_stick=(AXIS[left_x], AXIS_DOWN[left_y]),
-        right_stick=(AXIS[right_x], AXIS_DOWN[right_y]),
-        l2=TRAVEL[l2],
-        r2=TRAVEL[r2],
-        pressed=pressed_of(int.from_bytes(buttons, "little") & _SIMPLE_BUTTONS),
-        sequence=buttons[2] >> 2,
-        battery=None,
-    )
 
 
 def build_input_report(
@@ -95,7 +153,7 @@ def build_input_report(
     64 bytes on USB, 78 with the checksum on Bluetooth. It lies flat, and nothing touches its pad; `sensor_time_s`: its
     own clock.
     """
-    framing = INPUT_FRAMING[transport]
+    framing, (left_x, left_y), (right_x, right_y) = INPUT_FRAMING[transport], state.left_stick, state.right_stick
     report = bytearray(framing.length)
     report[0] = framing.report_id
     if transport is Transport.BLUETOOTH:
@@ -103,7 +161,7 @@ def build_input_report(
     _COMMON.pack_into(
         report,
         framing.start,
-        *_stick_bytes(state),
+        *(byte_of_axis(axis) for axis in (left_x, -left_y, right_x, -right_y)),
         round(state.l2 * 255),
         round(state.r2 * 255),
         state.sequence,
@@ -112,22 +170,7 @@ def build_input_report(
         round(sensor_time_s * _SENSOR_TICKS_PER_S) % 2**32,
         _NOT_TOUCHED,
         _NOT_TOUCHED,
-        0 if state.battery is None else battery_byte(state.battery),
+        battery_byte(state.battery),
         _USB_DATA_AND_POWER if transport is Transport.USB else 0,
     )
     return bytes(report) if transport is Transport.USB else sealed(Seed.INPUT, bytes(report[:-CHECKSUM_LENGTH]))
-
-
-def build_simple_input_report(state: ControllerState) -> bytes:
-    """Make the short report, 10 bytes, that Bluetooth starts with: sticks, triggers and the buttons it has."""
-    code = code_of(state.pressed) & _SIMPLE_BUTTONS | (state.sequence & 0x3F) << 18
-    report = bytearray(SIMPLE_REPORT_LENGTH)
-    report[0] = SIMPLE_REPORT_ID
-    travels = (round(state.l2 * 255), round(state.r2 * 255))
-    _SIMPLE.pack_into(report, 1, *_stick_bytes(state), *code.to_bytes(3, "little"), *travels)
-    return bytes(report)
-
-
-def _stick_bytes(state: ControllerState) -> tuple[int, int, int, int]:
-    (left_x, left_y), (right_x, right_y) = state.left_stick, state.right_stick
-    return byte_of_axis(left_x), byte_of_axis(-left_y), byte_of_axis(right_x), byte_of_axis(-right_y)

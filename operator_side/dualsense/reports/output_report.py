@@ -23,8 +23,15 @@ from operator_side.dualsense.effects.official import (
     OtherEffect,
     decode_effect,
 )
-from operator_side.dualsense.reports.checksum import CHECKSUM_LENGTH, Seed, check, sealed
-from operator_side.dualsense.reports.transport import OUTPUT_FRAMING, Transport, described
+from operator_side.dualsense.reports.transport import (
+    CHECKSUM_LENGTH,
+    OUTPUT_FRAMING,
+    Seed,
+    Transport,
+    check,
+    described,
+    sealed,
+)
 
 Byte = Annotated[int, Meta(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]
@@ -58,7 +65,7 @@ class Rumble:
 
 @dataclass(frozen=True, slots=True)
 class OutputReport:
-    """What one output report sets; None leaves a part of the controller as it is."""
+    """The parts of a controller that one output report sets; None leaves a part as it is."""
 
     l2: AnyEffect | None = None
     r2: AnyEffect | None = None
@@ -74,7 +81,7 @@ class OutputReport:
             check_limits(self)
 
     def following(self, before: "OutputReport") -> "OutputReport":
-        """What both together set when this one comes after `before`: each part by the newest that sets it."""
+        """Join both, this one after `before`: each part by the newest that sets it."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return OutputReport(*(old if new is None else new for new, old in pairs))
 
@@ -85,7 +92,7 @@ class OutputReport:
 
     @property
     def farewell(self) -> "OutputReport":
-        """What undoes all that this one sets: RELEASED, and the usual light if it sets one."""
+        """The report that undoes this one: RELEASED, and the usual light if this one sets a light."""
         return RELEASED if self.lightbar is None else OutputReport(Off(), Off(), Rumble(), USUAL_LIGHT)
 
     @property
@@ -174,7 +181,7 @@ def transport_of_output(report: bytes) -> Transport:
 
 
 def _common_start(report: bytes) -> int:
-    """Where the common block begins; a Bluetooth report's second byte tells its framing."""
+    """Find the begin of the common block; a Bluetooth report's second byte shows the framing."""
     transport = transport_of_output(report)
     if transport is Transport.USB:
         return OUTPUT_FRAMING[transport].start

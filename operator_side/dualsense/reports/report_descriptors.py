@@ -1,4 +1,4 @@
-"""What a DualSense tells the system of its reports when it is plugged in: their ids, lengths and fields (HID 1.11).
+"""Report descriptors (HID 1.11) of a DualSense: ids, lengths and fields of the reports.
 
 Both were accepted, byte for byte, by Linux hid-playstation.
 """

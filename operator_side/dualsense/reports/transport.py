@@ -1,19 +1,20 @@
-"""How a controller is attached, and what that changes of its reports: ids, lengths, where the common block begins.
+"""Transports and their reports: ids, lengths, the place of the common block, the checksum.
 
 The same block of fields travels on USB and on Bluetooth, one byte further in on Bluetooth and with a checksum at
 the end. Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The transport is told from the
 reports themselves: a virtual controller's bus type and interface number say nothing (measured over uhid).
 """
 
+import zlib
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Final
 
 from common.errors import RemoteProtocolError
 
 
 class Transport(Enum):
-    """What carries the reports."""
+    """The carrier of the reports."""
 
     USB = "USB"
     BLUETOOTH = "Bluetooth"
@@ -31,17 +32,13 @@ class Framing:
 INPUT_FRAMING: Final = {Transport.USB: Framing(0x01, 64, 1), Transport.BLUETOOTH: Framing(0x31, 78, 2)}
 OUTPUT_FRAMING: Final = {Transport.USB: Framing(0x02, 48, 1), Transport.BLUETOOTH: Framing(0x31, 78, 3)}
 
-SIMPLE_REPORT_ID: Final = 0x01
-SIMPLE_REPORT_LENGTH: Final = 10
-"""Bluetooth starts with these short reports, under USB's id, until a feature is read or an effect written."""
-PADDED_REPORT_LENGTH: Final = 78
-"""Some systems pad every report to the longest one, the simple one too (SDL)."""
-
+_SIMPLE_KINDS: Final = ((0x01, 10), (0x01, 78))
+"""Bluetooth starts with short reports under USB's id, until a feature is read or an effect written. Some systems pad
+each to the longest one (SDL)."""
 _INPUT_KINDS: Final = {
     (0x01, 64): Transport.USB,
     (0x31, 78): Transport.BLUETOOTH,
-    (SIMPLE_REPORT_ID, SIMPLE_REPORT_LENGTH): Transport.BLUETOOTH,
-    (SIMPLE_REPORT_ID, PADDED_REPORT_LENGTH): Transport.BLUETOOTH,
+    **dict.fromkeys(_SIMPLE_KINDS, Transport.BLUETOOTH),
 }
 
 
@@ -57,10 +54,48 @@ def transport_of_input(report: bytes) -> Transport:
 
 
 def is_simple_report(report: bytes) -> bool:
-    """A Bluetooth input report of the simple mode: sticks, triggers and buttons only."""
-    return report[:1] == b"\x01" and len(report) in (SIMPLE_REPORT_LENGTH, PADDED_REPORT_LENGTH)
+    """Whether it is one of those that Bluetooth starts with, which nothing here reads."""
+    return report[:1] == b"\x01" and (0x01, len(report)) in _SIMPLE_KINDS
 
 
 def described(report: bytes) -> str:
     """The id and the length of a report, for an error's text."""
     return f"id 0x{report[0]:02x}, {len(report)} bytes" if report else "no bytes"
+
+
+# Every Bluetooth report ends in a CRC-32 (zlib's) over a byte that is not sent, and the report (hid-playstation).
+
+CHECKSUM_LENGTH: Final = 4
+
+
+class Seed(IntEnum):
+    """The unsent byte: the Bluetooth HID header of each kind of report."""
+
+    INPUT = 0xA1
+    OUTPUT = 0xA2
+    FEATURE = 0xA3
+    """A feature that was read."""
+
+
+_STARTS: Final = {seed: zlib.crc32(bytes([seed])) for seed in Seed}
+"""The checksum of the header byte alone, from which the report's goes on."""
+_RESIDUE: Final = 0x2144DF1C
+"""The CRC-32 of anything that its own CRC-32 follows."""
+
+
+def checksum(seed: Seed, content: bytes) -> int:
+    """The CRC-32 of a report without its last four bytes."""
+    return zlib.crc32(content, _STARTS[seed])
+
+
+def sealed(seed: Seed, content: bytes) -> bytes:
+    """`content` with its checksum after it, little-endian."""
+    return content + checksum(seed, content).to_bytes(CHECKSUM_LENGTH, "little")
+
+
+def check(seed: Seed, report: bytes) -> None:
+    """RemoteProtocolError for a report that does not end in its checksum."""
+    if zlib.crc32(report, _STARTS[seed]) != _RESIDUE or len(report) <= CHECKSUM_LENGTH:
+        found = int.from_bytes(report[-CHECKSUM_LENGTH:], "little")
+        valid = checksum(seed, report[:-CHECKSUM_LENGTH])
+        raise RemoteProtocolError(f"{seed.name.lower()} report: checksum 0x{found:08x}; valid: 0x{valid:08x}")

@@ -1,13 +1,20 @@
 """A simulated DualSense: the same port as a real one, with a simulated person's hands on it."""
 
 import math
-from dataclasses import replace
 from typing import Final
+
+from msgspec.structs import replace
 
 from common.errors import DeviceError, RemoteProtocolError
 from operator_side.dualsense.effects.official import AnyEffect, Off
-from operator_side.dualsense.reports.battery import Battery, BatteryState
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState, Stick
+from operator_side.dualsense.reports.controller_state import (
+    SENSED_TRAVEL,
+    Battery,
+    BatteryState,
+    Button,
+    ControllerState,
+    Stick,
+)
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     CALIBRATION_ID,
@@ -16,7 +23,7 @@ from operator_side.dualsense.reports.feature_report import (
     build_address,
     build_calibration,
 )
-from operator_side.dualsense.reports.input_report import build_input_report, build_simple_input_report
+from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
@@ -36,10 +43,9 @@ SIMULATED_FIRMWARE: Final = Firmware(hardware_version=0x0413, firmware_version=0
 """Made up, but new enough for Linux hid-playstation's present way to rumble (2.21, so 0x0215)."""
 
 _ROUNDING_OF_TICKS = 1e-6
-"""So that a `now_s` of exactly n periods, in floating point, is the n-th report's time."""
+"""Tolerance for a `now_s` of exactly n periods, in floating point."""
 _BLUETOOTH_SEQUENCE = 1
-"""What the common block says on Bluetooth, always (controllers wiki)."""
-_FULL_MODE_FEATURES = frozenset({ADDRESS_ID, FIRMWARE_ID})
+"""The constant sequence number of the common block on Bluetooth (controllers wiki)."""
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
@@ -49,7 +55,7 @@ class SimulatedDualSense:
 
     It wakes at the first `now_s` it is given and makes an input report at once, then one a period. What the
     `set_*` methods change holds from the last `now_s` on, until it is set again; at first nobody touches it. Forces are
-    those of trigger_model: assumptions. On Bluetooth it starts with the simple reports.
+    those of trigger_model: assumptions. On Bluetooth it sends full reports from the start.
     """
 
     def __init__(
@@ -88,7 +94,6 @@ class SimulatedDualSense:
         self._woke_s: float | None = None
         self._newest_report = -1
         self._unread: bytes | None = None
-        self._simple = self.transport is Transport.BLUETOOTH
         self._told = RELEASED
         self._apply(RELEASED)
 
@@ -150,11 +155,6 @@ class SimulatedDualSense:
         """The motors' present drive."""
         return self._told.rumble or Rumble()
 
-    @property
-    def simple_mode(self) -> bool:
-        """It sends Bluetooth's simple reports: nobody has asked for more."""
-        return self._simple
-
     # The cable, or the radio
 
     def unplug(self) -> None:
@@ -184,7 +184,6 @@ class SimulatedDualSense:
         """Do what `output` sets from `now_s` on; DeviceError when it is unplugged or closed."""
         self._require_open()
         self._advance(now_s)
-        self._simple = False
         self._apply(output)
         self.write_count += 1
 
@@ -209,14 +208,12 @@ class SimulatedDualSense:
     def get_feature(self, report_id: int) -> bytes:
         """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
 
-        The latter two end Bluetooth's simple mode. DeviceError for another id, and when it is unplugged or closed.
+        DeviceError for another id, and when it is unplugged or closed.
         """
         self._require_open()
         if report_id not in self._features:
             valid = ", ".join(f"0x{known:02x}" for known in self._features)
             raise DeviceError(f"the simulated controller has no feature report 0x{report_id:02x}; valid: {valid}")
-        if report_id in _FULL_MODE_FEATURES:
-            self._simple = False
         return self._features[report_id]
 
     def _require_open(self) -> None:
@@ -252,13 +249,11 @@ class SimulatedDualSense:
         self._now_s = to_s
 
     def _report(self, number: int) -> bytes:
-        if self._simple:
-            return build_simple_input_report(self._state(number % 64))
         sequence = number % 256 if self.transport is Transport.USB else _BLUETOOTH_SEQUENCE
         return build_input_report(self._state(sequence), self.transport, number * INPUT_REPORT_PERIOD_S)
 
     def _state(self, sequence: int) -> ControllerState:
-        """What the sensors say now."""
+        """The present values of the sensors."""
         triggers = {Button.L2: self._l2, Button.R2: self._r2}
         moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
         return replace(

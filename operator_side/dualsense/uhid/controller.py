@@ -1,66 +1,89 @@
-"""A simulated controller offered to Linux through /dev/uhid: its side of the protocol, without I/O."""
+"""A simulated controller offered to Linux through /dev/uhid: its side of the protocol, bytes only, without I/O.
 
+Each read and each write is one `struct uhid_event` of linux/uhid.h: a type and, packed, what belongs to it. The
+kernel fills short writes up with zeros, and a reader does the same with short reads. Integers are in the machine's
+byte order.
+"""
+
+import struct
 from dataclasses import dataclass
-from typing import Protocol
+from enum import IntEnum
+from typing import Annotated, Final
+
+from msgspec import Meta
 
 from common.errors import DeviceError
+from common.limits import check_limits
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID, Model
 from operator_side.dualsense.reports.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.uhid.protocol import (
-    BUS_BLUETOOTH,
-    BUS_USB,
-    FEATURE_REPORT,
-    OUTPUT_REPORT,
-    GetReport,
-    Output,
-    SetReport,
-    Started,
-    Stopped,
-    UhidIdentity,
-    create,
-    destroy,
-    get_report_reply,
-    input_report,
-    parse_event,
-    set_report_reply,
-)
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+
+EVENT_LENGTH: Final = 4380
+"""sizeof(struct uhid_event), padded to 8 bytes; the length to ask for with each read."""
+_REPORT_MAX_LENGTH: Final = 4096
+BUS: Final = {Transport.USB: 0x03, Transport.BLUETOOTH: 0x05}
+_FEATURE_REPORT, _OUTPUT_REPORT = 0, 1
+_INPUT_OUTPUT_ERROR: Final = 5
+"""EIO, which hidraw and drivers report for an answer with an error."""
+_VERSION, _COUNTRY = 0x0100, 0
 
 
-class OfferedController(Protocol):
-    """What is used of a simulated controller."""
+class _Type(IntEnum):
+    """enum uhid_event_type, without what is obsolete or not heeded."""
 
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report, or None when there is no new one."""
-        ...
+    DESTROY = 1
+    START = 2
+    STOP = 3
+    OUTPUT = 6
+    GET_REPORT = 9
+    GET_REPORT_REPLY = 10
+    CREATE2 = 11
+    INPUT2 = 12
+    SET_REPORT = 13
+    SET_REPORT_REPLY = 14
 
-    def take_report(self, report: bytes, now_s: float) -> None:
-        """Take an output report; ValueError, and nothing changed, for one that it cannot read."""
-        ...
 
-    def get_feature(self, report_id: int) -> bytes:
-        """The answer to a feature report, its id in front; DeviceError for one that it does not have."""
-        ...
+_TYPE = struct.Struct("=I")
+# Name, physical place, unique id; the descriptor's size, bus; vendor, product, version, country.
+_CREATE = struct.Struct("=I128s64s64sHHIIII")
+_INPUT = struct.Struct("=IH")
+_OUTPUT_TAIL = struct.Struct("=HB")  # size and kind, after the full length of the data
+_GET = struct.Struct("=IBB")
+_GET_REPLY = struct.Struct("=IIHH")
+_SET = struct.Struct("=IBBH")
+_SET_REPLY = struct.Struct("=IIH")
 
 
-def identity(transport: Transport = Transport.USB, model: Model = Model.DUALSENSE, unique_id: str = "") -> UhidIdentity:
-    """The identity of a controller on USB or on Bluetooth, for the kernel."""
-    bluetooth = transport is Transport.BLUETOOTH
-    maker = "" if bluetooth else "Sony Interactive Entertainment "
-    return UhidIdentity(
-        name=f"{maker}{model.title} Wireless Controller",
-        vendor_id=SONY_VENDOR_ID,
-        product_id=model.value,
-        bus=BUS_BLUETOOTH if bluetooth else BUS_USB,
-        descriptor=BLUETOOTH_DESCRIPTOR if bluetooth else USB_DESCRIPTOR,
-        unique_id=unique_id,
-        physical_place="feelahead/virtual-dualsense",
-    )
+@dataclass(frozen=True, slots=True)
+class UhidIdentity:
+    """Identity of a DualSense, for the kernel."""
+
+    transport: Transport = Transport.USB
+    model: Model = Model.DUALSENSE
+    unique_id: Annotated[str, Meta(max_length=63)] = ""
+    """A Bluetooth address; drivers may refuse a second device that has the same."""
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+
+    @property
+    def name(self) -> str:
+        """The name that the kernel shows."""
+        maker = "Sony Interactive Entertainment " if self.transport is Transport.USB else ""
+        return f"{maker}{self.model.title} Wireless Controller"
+
+    def create(self) -> bytes:
+        """UHID_CREATE2: let the device appear."""
+        descriptor = USB_DESCRIPTOR if self.transport is Transport.USB else BLUETOOTH_DESCRIPTOR
+        texts = (text.encode() for text in (self.name, "feelahead/virtual-dualsense", self.unique_id))
+        numbers = (SONY_VENDOR_ID, self.model.value, _VERSION, _COUNTRY)
+        return _CREATE.pack(_Type.CREATE2, *texts, len(descriptor), BUS[self.transport], *numbers) + descriptor
 
 
 @dataclass(slots=True)
 class UhidCounts:
-    """What has passed between the kernel and the controller."""
+    """Counts of messages between the kernel and the controller."""
 
     inputs: int = 0
     outputs: int = 0
@@ -72,7 +95,7 @@ class UhidCounts:
 class UhidController:
     """One controller on one file of /dev/uhid: each method gives what is to be written to it."""
 
-    def __init__(self, controller: OfferedController, told: UhidIdentity) -> None:
+    def __init__(self, controller: SimulatedDualSense, told: UhidIdentity) -> None:
         self.counts = UhidCounts()
         self.driven = False
         """A driver has taken the device."""
@@ -81,28 +104,40 @@ class UhidController:
 
     def plug_in(self) -> bytes:
         """Let it appear. The kernel asks it for its features next, so `handle` must be called soon."""
-        return create(self._identity)
+        return self._identity.create()
 
     def unplug(self) -> bytes:
-        """Let it disappear; `plug_in` may follow."""
+        """UHID_DESTROY: let it disappear; `plug_in` may follow."""
         self.driven = False
-        return destroy()
+        return _TYPE.pack(_Type.DESTROY)
 
     def handle(self, event: bytes, now_s: float) -> bytes | None:
-        """Take what the kernel said; the answer, if it wants one."""
-        match parse_event(event):
-            case Started():
+        """Take what the kernel said; the answer, if it wants one. ValueError for an impossible length.
+
+        Questions wait up to 5 s for the answer with the same number. All else is passed over: somebody opened or closed
+        the device, or a newer kernel said something.
+        """
+        if not _TYPE.size <= len(event) <= EVENT_LENGTH:
+            raise ValueError(f"event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
+        payload = event[_TYPE.size :].ljust(EVENT_LENGTH - _TYPE.size, b"\0")
+        match _TYPE.unpack_from(event)[0]:
+            case _Type.START:
                 self.driven = True
-            case Stopped():
+            case _Type.STOP:
                 self.driven = False
-            case Output(report, kind):
-                self._write(report, kind, now_s)
-            case GetReport(request, report_id, kind):
-                return get_report_reply(request, self._answer(report_id, kind))
-            case SetReport(request, kind, report):
-                return set_report_reply(request, accepted=self._write(report, kind, now_s))
-            case None:
-                pass  # somebody opened or closed it, or a newer kernel said something
+            case _Type.OUTPUT:
+                size, kind = _OUTPUT_TAIL.unpack_from(payload, _REPORT_MAX_LENGTH)
+                self._write(_sized(payload, size), kind, now_s)
+            case _Type.GET_REPORT:
+                request, report_id, kind = _GET.unpack_from(payload)
+                answer = self._answer(report_id, kind)
+                error = _INPUT_OUTPUT_ERROR if answer is None else 0
+                head = _GET_REPLY.pack(_Type.GET_REPORT_REPLY, request, error, len(answer or b""))
+                return head + (answer or b"")
+            case _Type.SET_REPORT:
+                request, _, kind, size = _SET.unpack_from(payload)
+                taken = self._write(_sized(payload[_SET.size :], size), kind, now_s)
+                return _SET_REPLY.pack(_Type.SET_REPORT_REPLY, request, 0 if taken else _INPUT_OUTPUT_ERROR)
         return None
 
     def next_input(self, now_s: float) -> bytes | None:
@@ -111,12 +146,12 @@ class UhidController:
         if report is None or not self.driven:
             return None
         self.counts.inputs += 1
-        return input_report(report)
+        return _INPUT.pack(_Type.INPUT2, len(report)) + report
 
     def _write(self, report: bytes, kind: int, now_s: float) -> bool:
         try:
-            if kind != OUTPUT_REPORT:
-                raise ValueError(f"kind = {kind}; valid: {OUTPUT_REPORT}")
+            if kind != _OUTPUT_REPORT:
+                raise ValueError(f"kind = {kind}; valid: {_OUTPUT_REPORT}")
             self._controller.take_report(report, now_s)
         except ValueError:
             self.counts.refused += 1
@@ -126,11 +161,17 @@ class UhidController:
 
     def _answer(self, report_id: int, kind: int) -> bytes | None:
         try:
-            if kind != FEATURE_REPORT:
-                raise ValueError(f"kind = {kind}; valid: {FEATURE_REPORT}")
+            if kind != _FEATURE_REPORT:
+                raise ValueError(f"kind = {kind}; valid: {_FEATURE_REPORT}")
             answer = self._controller.get_feature(report_id)
         except (ValueError, DeviceError):
             self.counts.refused += 1
             return None
         self.counts.features += 1
         return answer
+
+
+def _sized(payload: bytes, size: int) -> bytes:
+    if size > _REPORT_MAX_LENGTH:
+        raise ValueError(f"an event's report has {size} bytes; valid: up to {_REPORT_MAX_LENGTH}")
+    return payload[:size]

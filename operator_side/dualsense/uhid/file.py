@@ -7,13 +7,12 @@ import select
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Protocol
+from typing import Final
 
 from common.clock import Clock
 from common.errors import ConfigurationError, DeviceError
 from common.realtime.pacing import Pacer, wait_for_turn
-from operator_side.dualsense.uhid.controller import UhidController
-from operator_side.dualsense.uhid.protocol import EVENT_LENGTH
+from operator_side.dualsense.uhid.controller import EVENT_LENGTH, UhidController
 
 UHID_PATH: Final = Path("/dev/uhid")
 
@@ -81,24 +80,8 @@ class UhidFile:
         return self._descriptor
 
 
-class EventFile(Protocol):
-    """What the loop uses of it."""
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for the kernel to say something; whether it has."""
-        ...
-
-    def read(self) -> bytes | None:
-        """One event, or None when there is none."""
-        ...
-
-    def write(self, event: bytes) -> None:
-        """Tell the kernel; DeviceError when it does not have the device."""
-        ...
-
-
 def offer(
-    file: EventFile,
+    file: UhidFile,
     controller: UhidController,
     clock: Clock,
     period_s: float,

@@ -1,4 +1,4 @@
-"""netem's grammar: what it reads, that it reads again what it writes, and what it refuses, in one line."""
+"""netem's grammar: what it reads, and what it refuses, in one line."""
 
 from pathlib import Path
 
@@ -7,9 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.emulation.clauses import Chance, Outage, Rate
-from common.emulation.loss import GilbertElliott, LossModel, RandomLoss, StateLoss
+from common.emulation.loss import GilbertElliott, RandomLoss
 from common.emulation.profile import LinkProfile
-from common.emulation.slots import Slot
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError
 
@@ -23,14 +22,12 @@ repeatable = settings(derandomize=True, deadline=None)
         ("delay 50ms", LinkProfile(0.050)),
         ("delay 0ms", LinkProfile()),
         ("delay 50ms 10ms", LinkProfile(0.050, 0.010, "uniform")),
-        ("delay 50ms 10ms 25%", LinkProfile(0.050, 0.010, delay_correlation=0.25)),
+        ("delay 50ms 10ms 25%", LinkProfile(0.050, 0.010)),
         (" delay  0.2s 1500us   distribution normal ", LinkProfile(0.2, 0.0015, "normal")),
-        ("delay 50ms 10ms 5% distribution pareto", LinkProfile(0.050, 0.010, "pareto", delay_correlation=0.05)),
+        ("delay 50ms 10ms 5% distribution pareto", LinkProfile(0.050, 0.010, "pareto")),
         ("delay 50ms 10ms distribution exponential", LinkProfile(0.050, 0.010, "exponential")),
         ("loss 1%", LinkProfile(loss=RandomLoss(0.01))),
         ("loss random 1% 25%", LinkProfile(loss=RandomLoss(0.01, 0.25))),
-        ("loss state 1%", LinkProfile(loss=StateLoss(0.01, 0.99))),
-        ("loss state 1% 20% 30% 40% 5%", LinkProfile(loss=StateLoss(0.01, 0.2, 0.3, 0.4, 0.05))),
         ("loss gemodel 1% 25%", LinkProfile(loss=GilbertElliott(0.01, 0.25))),
         ("loss gemodel 1% 25% 80% 0.1%", LinkProfile(loss=GilbertElliott(0.01, 0.25, 0.8, 0.001))),
         ("duplicate 1% 5% corrupt 2%", LinkProfile(duplicate=Chance(0.01, 0.05), corrupt=Chance(0.02))),
@@ -39,9 +36,6 @@ repeatable = settings(derandomize=True, deadline=None)
         ("rate 1mbps", LinkProfile(rate=Rate(8e6))),
         ("rate 500kbit -14", LinkProfile(rate=Rate(500e3, -14))),
         ("limit 7", LinkProfile(limit=7)),
-        ("slot 800us 1ms", LinkProfile(slot=Slot(0.0008, 0.001))),
-        ("slot 2ms", LinkProfile(slot=Slot(0.002, 0.002))),
-        ("slot 2ms 3ms packets 5 bytes 900", LinkProfile(slot=Slot(0.002, 0.003, 5, 900))),
         ("outage 2s at 10s", LinkProfile(outages=(Outage(2.0, 10.0),))),
         (
             "outage 2s at 10s every 30s outage 1s at 0s",
@@ -50,56 +44,10 @@ repeatable = settings(derandomize=True, deadline=None)
         ("rate 2mbit loss 1% delay 5ms", LinkProfile(0.005, loss=RandomLoss(0.01), rate=Rate(2e6))),
     ],
 )
-def test_reads_netem_and_reads_again_what_it_writes(spec: str, expected: LinkProfile) -> None:
+def test_reads_netem_and_keeps_the_words(spec: str, expected: LinkProfile) -> None:
     profile = LinkProfile.parse(spec)
     assert profile == expected
-    assert LinkProfile.parse(profile.words()) == expected
-
-
-per_mille = st.integers(0, 1000).map(lambda number: number / 1000)
-below_half = st.integers(0, 500).map(lambda number: number / 1000)
-microseconds = st.integers(0, 10_000_000).map(lambda number: number * 1e-6)
-
-
-@repeatable
-@given(
-    microseconds,
-    microseconds,
-    st.sampled_from(["uniform", "normal", "pareto", "paretonormal", "exponential"]),
-    per_mille,
-    st.one_of(
-        st.none(),
-        st.builds(RandomLoss, per_mille, per_mille),
-        st.builds(StateLoss, below_half, below_half, below_half, per_mille, below_half),
-        st.builds(GilbertElliott, per_mille, per_mille, per_mille, per_mille),
-    ),
-    st.one_of(st.none(), st.builds(Rate, st.integers(1, 10**10).map(float), st.integers(-99, 99))),
-    st.lists(st.builds(Outage, microseconds.filter(bool), microseconds), max_size=2),
-)
-def test_every_profile_is_read_as_it_is_written(
-    delay_s: float,
-    jitter_s: float,
-    shape: str,
-    correlation: float,
-    loss: LossModel | None,
-    rate: Rate | None,
-    outages: list[Outage],
-) -> None:
-    profile = LinkProfile(
-        delay_s,
-        jitter_s,
-        shape,  # type: ignore[arg-type]
-        delay_correlation=correlation,
-        loss=loss,
-        rate=rate,
-        outages=tuple(outages),
-    )
-    again = LinkProfile.parse(profile.words())
-    assert again.words() == profile.words()
-    if delay_s or jitter_s:
-        assert (again.delay_s, again.jitter_s, again.distribution) == (delay_s, jitter_s, shape)
-    assert again.rate == rate
-    assert again.outages == tuple(outages)
+    assert profile.words == " ".join(spec.split())
 
 
 WORDS = (
@@ -123,24 +71,24 @@ WORDS = (
         ("loss", "'loss' without probability", "loss [random]"),
         ("loss 1", "'1'", "0% to 100%"),
         ("loss 1% 2% 3%", "'3%'", "delay TIME"),
-        ("loss state 60% 10% 0% 100% 60%", "p13 + p14 = 1.2", "at most 1"),
         ("reorder 25%", "'reorder' without a delay", "delay TIME"),
         ("delay 1ms reorder 25% gap", "'reorder' without gap", "reorder P%"),
         ("delay 1ms reorder 25% gap 0", "'0'", "from 1"),
         ("rate", "'rate' without rate", "rate RATE"),
         ("rate 0mbit", "'0mbit'", "more than 0bit"),
+        ("rate 1e-320bit", "", "valid"),
+        ("delay 1e308s", "", "valid"),
+        ("delay 1s 1e20s 50%", "", "valid"),
+        ("delay 2000000s", "delay_s = ", "0 to 1000000"),
         ("rate 10mbit 1.5", "'1.5'", "whole number"),
         ("limit 99999999999", "'99999999999'", "to 999999999"),
-        ("slot 0ms", "from 0ms", "0.1ms"),
-        ("slot 2ms 1ms", "from 2ms to 1ms", "shorter one first"),
-        ("slot 2ms packets 0", "packets: '0'", "from 1"),
-        ("slot 2ms bytes", "'slot' without bytes", "slot MIN"),
         ("trace", "'trace' without", "trace FILE"),
         ("trace nowhere.csv", "'nowhere.csv'", "delay_ns"),
         ("outage 2s", "'outage' without 'at'", "outage DURATION at TIME"),
         ("outage 0s at 1s", "duration_s = 0.0", "above 0"),
         ("rate 10mbit 42 48", "'48'", "delay TIME"),
-        ("slot distribution normal 1ms 1ms", "'distribution'", "50ms"),
+        ("slot 1ms", "'slot' is unknown", "delay TIME"),
+        ("loss state 1%", "'state'", "0% to 100%"),
         ("delay 5ms 1ms distribution my.dist", "'my.dist'", "paretonormal, exponential"),
         ("outage 2s at 1s every 2s", "every 2.0 s", "longer than the 2 s"),
         ("retransmit 200ms", "'retransmit'", "retransmit TIME"),

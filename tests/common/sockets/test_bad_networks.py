@@ -1,7 +1,6 @@
 """Networks that swallow what is sent, and names that nobody resolves: neither keeps a link down, or slows the other."""
 
 import socket
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -35,7 +34,6 @@ def attempts(port: int) -> set[str]:
     return {row[1] for row in rows if row[3] == _SYN_SENT and row[2].endswith(f":{port:04X}")}
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells its connections in /proc")
 def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:
     seen = attempts(deaf_port)  # the last filler's
     with OperatorSockets(f"tcp://127.0.0.1:{deaf_port}", "tcp://127.0.0.1:9") as operator:

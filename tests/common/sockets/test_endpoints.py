@@ -1,7 +1,7 @@
 """What the sockets make of addresses: which are refused, in what words, and what follows from the given ones."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -13,12 +13,6 @@ from tests.helpers.socket_talk import (
     greet,
     publish_until_seen,
 )
-
-
-@pytest.fixture
-def robot() -> Iterator[RobotSockets]:
-    with RobotSockets(EPHEMERAL) as opened:
-        yield opened
 
 
 def test_reports_the_ports_that_the_system_chose(robot: RobotSockets) -> None:

@@ -12,7 +12,7 @@ from common.sockets.inbox import Inbox
 from common.sockets.operator import OperatorSockets
 from common.sockets.readable import readable as readable_now
 from common.sockets.robot import RobotSockets
-from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, greet, publish_until_seen
+from tests.helpers.socket_talk import PATIENT_S, greet, publish_until_seen
 
 
 @pytest.fixture
@@ -89,18 +89,6 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     inbox.used()
     assert inbox.has_some()
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
-
-
-@pytest.fixture
-def robot() -> Iterator[RobotSockets]:
-    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as opened:
-        yield opened
-
-
-@pytest.fixture
-def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
-    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as opened:
-        yield opened
 
 
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(

@@ -196,18 +196,6 @@ def test_a_bad_file_excludes_its_own_key_alone_until_it_is_mended(
     assert (allowed.names, allowed.faults) == ({KEY: "anna", OTHER: "ben"}, ())
 
 
-def test_who_comes_and_goes_beside_a_bad_file_is_noticed(folder: KeyFolder) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
-    make_dangling(folder.peer_path("ben"))
-    allowed.refresh()
-    folder.revoke("anna")
-    assert allowed.refresh() == {KEY}
-    folder.allow("anna", OTHER)
-    allowed.refresh()
-    assert allowed.names == {OTHER: "anna"}
-
-
 def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
     folder: KeyFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,14 +84,6 @@ def test_a_minute_of_symmetric_jitter_averages_out(skew: float) -> None:
     assert offset.skew == pytest.approx(skew, abs=15e-6)
 
 
-def test_unlike_jitter_that_is_symmetric_takes_the_mean() -> None:
-    generator, clock = np.random.default_rng(12), ahead(0.0)
-    offset = ClockOffset(shared_clock=False)
-    end_s = talk(offset, clock, generator.normal(0.050, 0.010, 5000), generator.normal(0.050, 0.002, 5000))
-    assert offset.estimator == "mean"
-    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
-
-
 def test_a_slow_queue_under_symmetric_jitter_takes_no_mean() -> None:
     generator, clock = np.random.default_rng(13), ahead(0.0)
     offset = ClockOffset(shared_clock=False)
@@ -164,12 +156,6 @@ def test_a_shared_clock_needs_no_estimate() -> None:
     exchange(offset, 2.0, 0.3, 0.0, 0.1, ahead(0.0))
     assert (offset.offset_s, offset.bound_s) == (0.0, 0.0)
     assert offset.round_trip_s == pytest.approx(0.4)
-
-
-def test_a_shared_clock_with_another_shape_stays_exact() -> None:
-    offset = ClockOffset(shared_clock=True)
-    talk(offset, ahead(0.0), np.full(500, 0.3), np.full(500, 0.1))
-    assert offset.offset_s == 0.0
 
 
 @pytest.mark.parametrize("jump_s", [-3600.0, -5.0, -0.150, -0.070, 0.070, 0.150, 5.0, 3600.0])
@@ -253,22 +239,13 @@ def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool
         assert abs(error_s(offset, clock, now_s)) < 0.5e-3
 
 
-def test_a_route_that_gets_shorter_is_no_jump() -> None:
+@pytest.mark.parametrize(("before_s", "there_s", "back_s"), [(0.080, 0.040, 0.040), (0.040, 0.140, 0.080)])
+def test_a_route_that_gets_shorter_or_longer_is_no_jump(before_s: float, there_s: float, back_s: float) -> None:
     generator, clock = np.random.default_rng(24), ahead(70.0)
     offset = ClockOffset(shared_clock=False)
     queues_s = generator.exponential(0.005, (2, 2000))
-    end_s = talk(offset, clock, 0.080 + queues_s[0], 0.080 + queues_s[1])
-    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1], start_s=end_s)
-    assert offset.jumps == 0
-    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
-
-
-def test_a_route_that_gets_longer_changes_nothing() -> None:
-    generator, clock = np.random.default_rng(25), ahead(70.0)
-    offset = ClockOffset(shared_clock=False)
-    queues_s = generator.exponential(0.005, (2, 2000))
-    end_s = talk(offset, clock, 0.040 + queues_s[0], 0.040 + queues_s[1])
-    end_s = talk(offset, clock, 0.140 + queues_s[0], 0.080 + queues_s[1], start_s=end_s)
+    end_s = talk(offset, clock, before_s + queues_s[0], before_s + queues_s[1])
+    end_s = talk(offset, clock, there_s + queues_s[0], back_s + queues_s[1], start_s=end_s)
     assert offset.jumps == 0
     assert abs(error_s(offset, clock, end_s)) < 0.5e-3
 

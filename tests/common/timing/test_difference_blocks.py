@@ -51,18 +51,6 @@ def test_what_was_chosen_for_being_early_counts_for_the_least_alone() -> None:
     assert block.mean_s == pytest.approx(0.20)
 
 
-def test_blocks_without_moments_merge() -> None:
-    without, whole = BlockTrack(), block_of([(0.5, 0.2), (0.6, 0.4)])
-    without.add(0.1, 0.1, fair=False)
-    early = without.close()
-    assert early is not None
-    for merged in (early.merged(whole), whole.merged(early)):
-        assert (merged.least_s, merged.least_at_s) == (0.1, 0.1)
-        assert merged.count == 2
-        assert (merged.mean_s, merged.mean_at_s) == pytest.approx((0.3, 0.55))
-    assert early.merged(early).count == 0
-
-
 @pytest.mark.parametrize(("shape", "expected"), [("normal", 0.0), ("exponential", 2.0), ("uniform", 0.0)])
 def test_skewness_tells_shapes_apart(shape: str, expected: float) -> None:
     generator = np.random.default_rng(4)
@@ -81,10 +69,6 @@ def test_a_few_or_equal_samples_have_no_shape() -> None:
     assert block_of([(0.0, 0.1 + 20e-6 * (k % 7)) for k in range(100)]).skewness is None
 
 
-def test_an_empty_block_is_none() -> None:
-    assert BlockTrack().close() is None
-
-
 def test_a_track_keeps_what_is_new_and_no_more_than_its_number() -> None:
     track = BlockTrack()
     for second in range(200):
@@ -98,16 +82,3 @@ def test_a_track_keeps_what_is_new_and_no_more_than_its_number() -> None:
     assert block is not None
     track.keep(block, oldest_s=198.0)
     assert [block.least_at_s for block in track.blocks] == [198.0, 199.0, 500.0]
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 7, 8])
-def test_coarser_blocks_hold_the_same_samples(count: int) -> None:
-    track = BlockTrack()
-    for second in range(count):
-        track.add(float(second), 0.1 * second)
-        block = track.close()
-        assert block is not None
-        track.keep(block, oldest_s=-1.0)
-    track.coarsen()
-    assert len(track.blocks) == -(-count // 2)
-    assert sum(block.count for block in track.blocks) == count

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from common.timing.difference_blocks import Block, BlockTrack
 from common.timing.offset_fits import TYPICAL_SKEW, Average, fit_envelope, fit_mean, typical_skewness
-from common.timing.offset_interval import OffsetInterval
 
 repeatable = settings(derandomize=True, deadline=None)
 MAX_SKEW = 600e-6
@@ -71,17 +70,6 @@ def test_the_envelope_is_the_likeliest_of_all_slopes(seed: int) -> None:
     assert found == pytest.approx(best, abs=0.3e-6)
 
 
-@pytest.mark.parametrize("skew", [-200e-6, 0.0, 30e-6])
-def test_both_fits_find_a_line_without_noise(skew: float) -> None:
-    to_peer, from_peer = both_ways(np.full(2500, 0.05), np.full(2500, 0.05), 0.7, skew)
-    for line in (
-        fit_envelope(to_peer, from_peer, MAX_SKEW, 0.0).line,
-        fit_mean(Average(to_peer), Average(from_peer), MAX_SKEW),
-    ):
-        assert line.value(10.0) == pytest.approx(0.7 + skew * 10.0, abs=20e-6)
-        assert line.skew == pytest.approx(skew, abs=2e-6)
-
-
 def test_a_moment_of_noise_says_nothing_about_the_skew() -> None:
     generator = np.random.default_rng(6)
     there_s, back_s = generator.normal(0.05, 0.01, (2, 50))
@@ -118,41 +106,3 @@ def test_wander_tells_slow_from_independent_delays() -> None:
     assert Average(blocks_of(times_s, values_s)).wander(0.0) == pytest.approx(0.67, abs=0.2)
     slow_s = values_s + 0.03 * np.sin(times_s)
     assert Average(blocks_of(times_s, slow_s)).wander(0.0) > 3.0
-
-
-# The certain interval
-
-
-def test_the_interval_is_infinite_until_both_bounds_are_known() -> None:
-    interval = OffsetInterval(100e-6)
-    assert interval.at(5.0) == (-np.inf, np.inf)
-    interval.advance(0.0)
-    assert interval.take_least(1.0, 0.0)
-    assert interval.at(0.0) == (1.0, np.inf)
-    assert interval.take_greatest(3.0, 0.0, 0.0)
-    assert interval.at(0.0) == (1.0, 3.0)
-
-
-def test_the_interval_loosens_with_time_and_tightens_by_samples() -> None:
-    interval = OffsetInterval(100e-6)
-    interval.advance(0.0)
-    interval.take_least(1.0, 0.0)
-    interval.take_greatest(3.0, 0.0, 0.0)
-    assert interval.at(1000.0) == pytest.approx((0.9, 3.1))
-    interval.advance(1000.0)
-    interval.take_least(0.5, 0.0)  # says less than what is known
-    assert interval.at(1000.0) == pytest.approx((0.9, 3.1))
-    interval.take_least(2.0, 0.25)
-    interval.take_greatest(2.5, 0.0, 0.0)  # a thousand seconds old
-    assert interval.at(1000.0) == pytest.approx((1.75, 2.6))
-
-
-def test_what_contradicts_the_interval_is_refused() -> None:
-    interval = OffsetInterval(100e-6)
-    interval.advance(0.0)
-    interval.take_least(1.0, 0.0)
-    interval.take_greatest(3.0, 0.0, 0.0)
-    assert not interval.take_least(3.1, 0.0)
-    assert not interval.take_greatest(0.9, 0.0, 0.0)
-    assert interval.at(0.0) == (1.0, 3.0)
-    assert interval.take_least(3.1, 0.2)

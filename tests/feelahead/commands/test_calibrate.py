@@ -114,15 +114,12 @@ def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
     assert handle.closed == handle.times_opened > 0
 
 
-@pytest.mark.parametrize(
-    ("out", "said"),
-    [("/dev/null", "is no regular file"), ("new/mine.toml", "there is no folder"), (".", "is a folder")],
-)
+@pytest.mark.parametrize("out", ["new/mine.toml", "."])
 def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_measured(
-    out: str, said: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    out: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigurationError, match=f"--out {out}: .*{said}"):
+    with pytest.raises(ConfigurationError, match=f"--out {out}: is a folder, or its folder is not there"):
         command(["calibrate", "--out", out])
     assert handle.now_s == 0.0
     assert list(tmp_path.iterdir()) == []

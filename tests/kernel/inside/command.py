@@ -9,7 +9,7 @@ from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
-from operator_side.dualsense.uhid.controller import identity
+from operator_side.dualsense.uhid.controller import UhidIdentity
 from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.evdev import ABS_RZ, ABS_X, InputDevice
@@ -24,7 +24,7 @@ _COMMAND = (
 
 def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path: Path) -> None:
     transport = Transport.BLUETOOTH
-    told = identity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
+    told = UhidIdentity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
     command = [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"]
     said = tmp_path / "said"
 

@@ -55,7 +55,6 @@ def test_hid_playstation_takes_it(plugged: Plugged) -> None:
     assert counts.features >= 3
     assert counts.outputs >= 1, "the driver has not set the lights"
     assert counts.refused == 0
-    assert not plugged.ask(lambda controller: controller.simple_mode), "it still sends Bluetooth's simple reports"
     assert plugged.ask(lambda controller: controller.output.lightbar) is not None
 
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from operator_side.dualsense.uhid.protocol import UhidIdentity
+from operator_side.dualsense.reports.models import SONY_VENDOR_ID
+from operator_side.dualsense.uhid.controller import BUS, UhidIdentity
 
 
 class KernelView:
@@ -34,6 +35,6 @@ class KernelView:
 
 def seen_device(identity: UhidIdentity) -> KernelView | None:
     """The HID device with these ids; None when there is none."""
-    ids = f"{identity.bus:04X}:{identity.vendor_id:04X}:{identity.product_id:04X}."
+    ids = f"{BUS[identity.transport]:04X}:{SONY_VENDOR_ID:04X}:{identity.model.value:04X}."
     found = sorted(Path("/sys/bus/hid/devices").glob(f"{ids}*"))
     return KernelView(found[0]) if found else None

@@ -11,7 +11,7 @@ from common.clock import MonotonicClock
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.dualsense.uhid.controller import UhidController, identity
+from operator_side.dualsense.uhid.controller import UhidController, UhidIdentity
 from operator_side.dualsense.uhid.file import UhidFile, offer
 from tests.helpers.machines.waiting import wait_until
 
@@ -42,7 +42,7 @@ class Plugged:
 
     def __init__(self, variant: Variant) -> None:
         self.variant = variant
-        self.identity = identity(variant.transport, variant.model, ADDRESS)
+        self.identity = UhidIdentity(variant.transport, variant.model, ADDRESS)
         self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS)
         self.offered = UhidController(self._simulated, self.identity)
         self._asked: deque[Callable[[], None]] = deque()

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from common.protocol.view_messages import Shape, ShapeKind
-from operator_side.console.placing import approach, compose, rotated
+from operator_side.console.drawing import compose
 from operator_side.console.solids import box, solid_of
 
 STILL = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -63,5 +63,3 @@ def test_poses_are_put_together_as_scipy_does() -> None:
     np.testing.assert_allclose(both[:, :3], outer[:, :3] + turns[0].apply(inner[:, :3]), atol=1e-12)
     matrices = Rotation.from_quat(both[:, 3:], scalar_first=True).as_matrix()
     np.testing.assert_allclose(matrices, (turns[0] * turns[1]).as_matrix(), atol=1e-12)
-    np.testing.assert_allclose(rotated(outer[:, 3:], inner[:, :3]), turns[0].apply(inner[:, :3]), atol=1e-12)
-    np.testing.assert_allclose(approach(tuple(outer[0])), turns[0][0].apply([0.0, 0.0, 1.0]), atol=1e-12)

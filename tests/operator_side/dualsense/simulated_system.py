@@ -8,8 +8,9 @@ from common.clock import VirtualClock
 from common.errors import DeviceError
 from operator_side.dualsense.hid.background_writes import STALL_S
 from operator_side.dualsense.hid.device import HidHandle
-from operator_side.dualsense.hid.port import Device, OpenController
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S
+from operator_side.dualsense.hid.search import BackgroundSearch, Device, OpenController
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID
 from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -129,46 +130,46 @@ class StallingWrites:
             self._device.close()
 
 
-class VirtualSearch:
+class VirtualSearch(BackgroundSearch):
     """A look that needs no thread."""
 
     def __init__(self, find: Callable[[str | None], OpenController], stalled: Callable[[], bool]) -> None:
         self.looks = 0
         self._find = find
         self._stalled = stalled
-        self._result: OpenController | DeviceError | None = None
+        self._taken: OpenController | DeviceError | None = None
 
     def begin(self, preferred: str | None) -> None:
         self.looks += 1
         try:
             found = self._find(preferred)
         except DeviceError as error:
-            self._result = error
+            self._taken = error
             return
         writes = StallingWrites(found.device, self._stalled)
-        self._result = replace(found, device=writes, stalls=writes.stalls)
+        self._taken = replace(found, device=writes, stalls=writes.stalls)
 
     def take(self) -> OpenController | DeviceError | None:
-        result, self._result = self._result, None
-        return result
+        taken, self._taken = self._taken, None
+        return taken
 
     def close(self) -> None:
         pass
 
 
-class VirtualWatchdog:
+class VirtualWatchdog(ReleaseGuard):
     """The release watchdog's law, whose processes have tests of their own."""
 
     def __init__(self, system: SimulatedSystem) -> None:
-        self._held: tuple[SimulatedDualSense, bytes] | None = None
+        self._holds: tuple[SimulatedDualSense, bytes] | None = None
         self._system = system
         self._deadline_s: float | None = None
 
     def hold(self, path: bytes, release: bytes) -> None:
-        self._held, self._deadline_s = (self._system.devices[path], release), None
+        self._holds, self._deadline_s = (self._system.devices[path], release), None
 
     def let_go(self) -> None:
-        self._held = self._deadline_s = None
+        self._holds = self._deadline_s = None
 
     def beat(self) -> None:
         self._deadline_s = self._system.clock.now() + SILENCE_S
@@ -184,5 +185,5 @@ class VirtualWatchdog:
     def release(self) -> None:
         """Write the report, at up to three attempts."""
         self._deadline_s = None
-        if self._held is not None:
-            any(self._system.transfer(*self._held) for _ in range(3))
+        if self._holds is not None:
+            any(self._system.transfer(*self._holds) for _ in range(3))

@@ -13,20 +13,26 @@ import operator_side.dualsense.hid.background_writes
 from common.errors import DeviceError, NoDriverError
 from operator_side.dualsense.effects.official import Off, OtherEffect
 from operator_side.dualsense.hid.background_writes import CLOSE_TIMEOUT_S, STALL_S, BackgroundWrites
-from operator_side.dualsense.hid.device import HidDualSense, load_backend, write_once
-from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.dualsense.reports.input_report import build_simple_input_report
+from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     USUAL_LIGHT,
     WARNING_LIGHT,
     OutputReport,
     Rumble,
-    build_output_report,
     parse_output_report,
 )
 from operator_side.dualsense.reports.transport import Transport
-from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FIRMWARE, USB, FakeBackend, FakeHandle, valid_checksum
+from tests.helpers.fake_hid import (
+    ADDRESS,
+    BLUETOOTH,
+    FIRMWARE,
+    SIMPLE_REPORT,
+    USB,
+    FakeBackend,
+    FakeHandle,
+    valid_checksum,
+)
 from tests.helpers.felt import feedback
 
 PATH = b"/dev/hidraw3"
@@ -53,9 +59,15 @@ def test_what_it_is_is_asked_and_nothing_is_written(transport: Transport) -> Non
     assert (identity.transport, identity.address, identity.firmware) == (transport, None, None)
 
 
-def test_bluetooth_is_told_even_from_a_short_report() -> None:
-    handle = FakeHandle(BLUETOOTH, waiting=[build_simple_input_report(ControllerState())])
-    assert open_fake(handle).identity.transport is BLUETOOTH
+def test_bluetooth_is_told_from_short_reports_which_are_passed_over() -> None:
+    assert open_fake(FakeHandle(BLUETOOTH, waiting=[SIMPLE_REPORT] * 9)).identity.transport is BLUETOOTH
+    handle = FakeHandle(BLUETOOTH, waiting=[SIMPLE_REPORT] * 2)
+    device = open_fake(handle)
+    assert device.identity.first_report == handle.report()
+    handle.waiting = [handle.report(1), SIMPLE_REPORT, SIMPLE_REPORT.ljust(78, b"\0")]
+    assert (device.read(0.1), handle.waiting) == (handle.report(1), [])
+    handle.waiting = [SIMPLE_REPORT]
+    assert device.read(0.2) is None
 
 
 @pytest.mark.parametrize(
@@ -66,9 +78,7 @@ def test_bluetooth_is_told_even_from_a_short_report() -> None:
         (FakeHandle(plugged_in=False), "gone"),
         (
             FakeHandle(opens=False, reason="Failed to open a device with path '/x': Permission denied"),
-            "no permission to open the controller at /dev/hidraw3: `feelahead doctor`"
-            if sys.platform == "linux"
-            else "",
+            "no permission to open the controller at /dev/hidraw3: `feelahead doctor`",
         ),
     ],
 )
@@ -79,7 +89,6 @@ def test_what_cannot_be_used_is_let_go_and_named(handle: FakeHandle, message: st
     assert handle.closed == handle.times_opened
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="device nodes of Linux")
 def test_permission_is_seen_even_where_hidapi_does_not_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     node = tmp_path / "hidraw3"
     node.touch()
@@ -90,16 +99,12 @@ def test_permission_is_seen_even_where_hidapi_does_not_say(tmp_path: Path, monke
         HidDualSense(FakeBackend({}), b"/dev/nowhere")
 
 
-def test_the_other_package_called_hid(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = types.ModuleType("hid")
-    module.enumerate = list  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "hid", module)
-    monkeypatch.setattr(sys, "platform", "darwin")
-    with pytest.raises(NoDriverError, match="pip uninstall hid"):
+def test_another_package_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "hidraw", types.ModuleType("hidraw"))
+    with pytest.raises(NoDriverError, match="is not hidapi's: uninstall the package that brings it"):
         load_backend()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="hidraw is Linux's")
 def test_the_installed_hidapi_has_what_is_used() -> None:
     hidraw = pytest.importorskip("hidraw")
     backend = load_backend()
@@ -223,21 +228,6 @@ def test_close_undoes_what_was_written(
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
         device.write(OutputReport(), 1.0)
-
-
-def test_writing_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    handle = FakeHandle()
-    backend = FakeBackend({0x0CE6: {PATH: handle}})
-    monkeypatch.setattr("operator_side.dualsense.hid.device.load_backend", lambda: backend)
-    report = build_output_report(RELEASED)
-    write_once(PATH, report)
-    assert (handle.written, handle.closed) == ([report], 1)
-    handle.plugged_in = False
-    with pytest.raises(DeviceError, match="gone"):
-        write_once(PATH, report)
-    assert (handle.written, handle.closed) == ([report], 2)
-    with pytest.raises(DeviceError, match="cannot be opened"):
-        write_once(b"/dev/nowhere", report)
 
 
 # Writing by a thread

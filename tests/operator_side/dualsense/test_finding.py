@@ -6,8 +6,7 @@ import pytest
 
 from common.errors import DeviceError, NoDeviceError
 from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
-from operator_side.dualsense.hid.port import OpenController
-from operator_side.dualsense.hid.search import BackgroundSearch, Find
+from operator_side.dualsense.hid.search import BackgroundSearch, Find, OpenController
 from operator_side.dualsense.hid.udev import RULES
 from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle

@@ -16,7 +16,6 @@ from operator_side.dualsense.effects.official import (
     TriggerEffect,
     decode_effect,
 )
-from operator_side.dualsense.reports.checksum import Seed, sealed
 from operator_side.dualsense.reports.output_report import (
     RELEASED,
     OutputReport,
@@ -25,7 +24,7 @@ from operator_side.dualsense.reports.output_report import (
     parse_output_report,
     transport_of_output,
 )
-from operator_side.dualsense.reports.transport import Transport
+from operator_side.dualsense.reports.transport import Seed, Transport, sealed
 from tests.helpers.felt import feedback
 
 REPEATABLE = settings(derandomize=True, deadline=None)
@@ -276,17 +275,3 @@ def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(
         assert getattr(both, part.name) == (older if newer is None else newer)
     assert both.change_from(first).following(first) == both
     assert both.change_from(both) == OutputReport()
-
-
-@pytest.mark.parametrize(
-    ("output", "releases"),
-    [
-        (OutputReport(), True),
-        (RELEASED, True),
-        (OutputReport(r2=Off(), lightbar=(1, 2, 3)), True),
-        (OutputReport(l2=Off(), r2=feedback(3, 6)), False),
-        (OutputReport(rumble=Rumble(right=0.1)), False),
-    ],
-)
-def test_what_holds_or_shakes_releases_nothing(output: OutputReport, releases: bool) -> None:
-    assert output.releases is releases

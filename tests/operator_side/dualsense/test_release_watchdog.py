@@ -14,13 +14,10 @@ import pytest
 
 import operator_side.dualsense.hid.release_guard
 from operator_side.dualsense.hid.release_guard import MOST_REPLACEMENTS, ReleaseGuard
-from operator_side.dualsense.hid.release_watchdog import SILENCE_S, LinuxTarget, Watch
+from operator_side.dualsense.hid.release_watchdog import SILENCE_S, Target, Watch
 from tests.helpers.repository import ROOT
 
-pytestmark = [
-    pytest.mark.processes,
-    pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it needs a controller that hidapi finds"),
-]
+pytestmark = pytest.mark.processes
 LIMIT_S = 600.0
 REPORT = bytes(range(48))
 
@@ -246,7 +243,7 @@ def test_a_controller_that_refuses_is_tried_a_few_times() -> None:
         attempts += 1
         raise OSError(f"{len(report)} bytes to {file}")
 
-    target = LinuxTarget(os.fsencode(os.devnull), REPORT)
+    target = Target(os.fsencode(os.devnull), REPORT)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "write", refuse)
         target.release()

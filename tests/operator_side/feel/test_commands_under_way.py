@@ -77,13 +77,6 @@ def test_it_is_what_a_fine_stepping_of_time_gives(
     assert found.speed_m_s == pytest.approx(reference.speed_m_s, abs=2e-3)
 
 
-def test_an_arm_that_follows_at_once_needs_no_acceleration() -> None:
-    commands = sent_every([0.0, 1.0, -1.0])
-    found = displacement(commands, 0.012, 0.0, 0.004, acceleration_m_s2=math.inf)
-    assert found == pytest.approx((0.0, -FULL_M_S), abs=1e-15)
-    assert displacement(commands, 0.010, 0.0, 0.004, acceleration_m_s2=math.inf).way_m == pytest.approx(0.5e-3)
-
-
 @given(COMMANDS, SPEED, TRAVEL, st.data())
 def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_asked_for(
     travels: list[float], speed: float, gives: float, data: st.DataObject
@@ -105,11 +98,6 @@ def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() ->
     # Without another command after it, `held` is as long as it says.
     alone = sent_every([1.0])
     assert displacement(alone, 0.1, 0.0, 0.030, speed).way_m == pytest.approx(0.07 * speed)
-
-
-def test_commands_after_now_do_not_count() -> None:
-    commands = sent_every([0.0] * 10 + [1.0] * 10)
-    assert displacement(commands, 0.036, 0.0).way_m == 0.0
 
 
 @pytest.mark.parametrize(
@@ -148,19 +136,6 @@ def test_there_is_no_answer_from_before_the_first_command() -> None:
 
 def test_a_held_that_drifting_clocks_make_too_long_is_now() -> None:
     assert displacement(sent_every([1.0]), 0.1, 0.0, 0.1005, 0.2) == Displacement(0.0, 0.2)
-
-
-@given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=300), st.floats(0.05, 1.0))
-def test_what_is_kept_is_the_window_and_the_command_that_counted_as_it_began(
-    gaps_s: list[float], window_s: float
-) -> None:
-    commands = CommandsUnderWay(window_s)
-    sent_s: list[float] = []
-    for gap_s in gaps_s:
-        sent_s.append((sent_s[-1] if sent_s else 0.0) + gap_s)
-        commands.sent(sent_s[-1], 0.0)
-    within = sum(time_s > sent_s[-1] - window_s for time_s in sent_s)
-    assert len(commands) <= within + 1
 
 
 def test_memory_is_bounded_whatever_the_rate() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 from common.protocol.messages import Telemetry
 from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.simulated_person.whoever import Whoever
 
 PERIOD_S = 0.02
@@ -41,7 +42,7 @@ Does = Callable[[float], dict[str, Any] | None]
 class AtThePage:
     """Whoever has the controller, and somebody at a page who does as told: for whole runs."""
 
-    def __init__(self, page: TalkingPage, whoever: Whoever, does: Does) -> None:
+    def __init__(self, page: TalkingPage, whoever: Whoever | SharedHands, does: Does) -> None:
         self.page = page
         self.whoever = whoever
         self.does = does

@@ -10,7 +10,6 @@ from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport, Rumble
 from operator_side.dualsense.simulated.trigger_model import (
-    NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
 )
@@ -262,20 +261,6 @@ def test_a_target_that_comes_no_nearer_is_taken_for_as_near_as_it_gets() -> None
     assert 2.5 < desk.until("close", armed((0.0, 0.0, 0.03)), 4.0) < 3.5
 
 
-def test_no_finger_ever_pushes_harder_than_a_normal_one_or_with_both_hands() -> None:
-    desk = Desk(PersonSettings(attempts=2, trust=0.0), seed=3)
-    desk.arm()
-    for number in range(60):
-        desk.resist(feedback(0, number % 9), feedback(0, number % 5))
-        place = (0.01 * math.sin(number), 0.01 * math.cos(1.3 * number), 0.4 * math.sin(0.7 * number))
-        desk.watch(armed(place, holding=number % 11 > 8), 0.3)
-    forces = [(hands.l2_n, hands.r2_n) for hands in desk.hands]
-    assert all(0.0 <= force_n <= NORMAL_FINGER_FORCE_N for pair in forces for force_n in pair)
-    assert all(min(pair) == 0.0 for pair in forces)
-    assert min(max(l2_n for l2_n, _ in forces), max(r2_n for _, r2_n in forces)) > 1.0
-    assert not any(hands.buttons & {Button.CIRCLE, Button.TRIANGLE} for hands in desk.hands)
-
-
 def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:
     desk = Desk()
     desk.arm()
@@ -316,20 +301,6 @@ def habitual_travel(force_n: float) -> float:
     )
 
 
-def depth_pulls(seed: int) -> list[Hands]:
-    desk = Desk(PersonSettings(depth_error_sd_m=0.01), seed)
-    desk.arm()
-    desk.watch(armed((0.002, 0.001, 0.05)), 1.0)
-    desk.watch(armed((0.0, 0.0, -GRASP_M)), 8.0)
-    return desk.hands
-
-
-def test_the_same_seed_gives_the_same_hands() -> None:
-    first = depth_pulls(1)
-    assert depth_pulls(1) == first
-    assert depth_pulls(2) != first
-
-
 def test_misjudged_distances_spread_as_they_are_said_to() -> None:
     errors_m = []
     for seed in range(60):
@@ -343,6 +314,3 @@ def test_misjudged_distances_spread_as_they_are_said_to() -> None:
     # Three standard errors.
     assert abs(mean) < 3 * 0.01 / math.sqrt(60)
     assert sd == pytest.approx(0.01, rel=3 / math.sqrt(2 * 59))
-
-
-# Pulling only
