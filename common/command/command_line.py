@@ -55,7 +55,7 @@ def parse_settings(
             )
     except SystemExit as stop:
         if stop.code:
-            raise ConfigurationError(_one_line(complaint.getvalue(), program)) from None
+            raise ConfigurationError(_one_line(complaint.getvalue(), program, settings_type)) from None
         raise
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
@@ -157,7 +157,7 @@ def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path
             _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.", elsewhere)
 
 
-def _one_line(box: str, program: str) -> str:
+def _one_line(box: str, program: str, settings_type: type) -> str:
     """The first paragraph of tyro's complaint as one line; its box is drawn in ASCII where nothing else can be."""
     words: list[str] = []
     for line in box.splitlines()[1:]:
@@ -168,7 +168,13 @@ def _one_line(box: str, program: str) -> str:
         if not ruled:
             words += text.split()
     said = " ".join(words).removeprefix("Error parsing ")
-    said = re.sub(r"^\w+Settings: ", "", said)
+    said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class whose check it was
+    if named := re.match(r"(?:([\w.]+): )?(\w+) = ", said):
+        place = f"{named[1]}.{named[2]}" if named[1] else named[2]
+        if place.partition(".")[0] in get_type_hints(settings_type):
+            said = f"--{place.replace('_', '-')} = {said[named.end() :]}"
+    if "; valid: " in said:
+        return _shortened(said)
     said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
     if fits:
         return f"{_shortened(said)}; valid: a number"

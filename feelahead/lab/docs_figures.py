@@ -67,8 +67,9 @@ def make_figures(arguments: Sequence[str]) -> int:
     # The same interpreter's console scripts come first.
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     shown, failed = Table("figure", "is", "command"), False
-    with progress("figures", float(len(wanted) or 1)) as advance:
+    with progress("figures", float(len(wanted) or 1)) as shown_progress:
         for command in wanted:
+            shown_progress.begin(command)
             before = pictures(docs)
             done = subprocess.run(command, shell=True, cwd=_ROOT, env=environment, check=False)  # noqa: S602  # ours
             failed |= done.returncode != 0
@@ -78,7 +79,7 @@ def make_figures(arguments: Sequence[str]) -> int:
                 same = "the same" if before.get(path) == after.get(path) else "changed"
                 change = "failed" if done.returncode else same
                 shown.add_row(path, change, command)
-            advance(1.0)
+            shown_progress.advance(1.0)
     console.print(shown)
     return 1 if failed else 0
 

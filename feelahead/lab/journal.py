@@ -50,9 +50,9 @@ class Journal:
             self._file.close()
 
     def keep(self, key: str, rows: list[Row]) -> None:
-        """Write one finished piece; FeelaheadError when the disk does not take it."""
-        self._write(json.dumps({"key": key, "rows": rows}).encode())
+        """Write one finished piece, which is done even when the disk does not take it: FeelaheadError then."""
         self.done[key] = rows
+        self._write(json.dumps({"key": key, "rows": rows}).encode())
 
     def _load(self, path: Path, file: FileIO, first: bytes) -> None:
         file.seek(0)
