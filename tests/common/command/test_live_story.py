@@ -26,11 +26,6 @@ def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
     return [line for line in lines if line is not None]
 
 
-@pytest.mark.parametrize("start_s", [0.0, 0.3, 1234.5678])
-def test_the_first_call_is_told_at_once_whatever_the_clock_shows(start_s: float) -> None:
-    assert Story().tell(start_s, RESTING) == "   0.0 s  link up; resting"
-
-
 def test_a_run_reads_as_a_story() -> None:
     near = replace(ADVANCING, nearest="carton", nearest_mm=10.0, target_mm=10.0, r2=TriggerView(0.5, 0.3))
     lines = told(
