@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from common.errors import ConfigurationError
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 
 pytestmark = pytest.mark.processes
@@ -62,20 +61,6 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
         *("enlargement_mm", "overlap_mm3", "stiffness", "zones", "min_distance_mm", "contacts", "stops", "errors"),
     ):
         assert key in summary
-
-
-def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
-    path = tmp_path / "out.json"
-    with demo("--duration", "60", "--status", "json", "--summary", str(path)) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if json.loads(line).get("link") == "up":
-                break
-        process.send_signal(signal.SIGINT)
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 0, complaint
-    assert complaint == ""
-    assert json.loads(path.read_text())["errors"] == []
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -135,11 +120,3 @@ def test_anothers_interrupt_is_one() -> None:
         side.wait(LIMIT_S)
         with pytest.raises(SideFailedError, match="code -9"):
             side.check()
-
-
-def test_a_side_that_fails_says_why() -> None:
-    with (
-        SideProcess("robot_side.main", "robot", ["--probability=2"]) as side,
-        pytest.raises(ConfigurationError, match="probability"),
-    ):
-        side.wait_for("listening", LIMIT_S)

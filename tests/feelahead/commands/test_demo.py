@@ -42,19 +42,18 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
-def test_what_was_said_is_passed_on_even_where_it_is_the_default() -> None:
+def test_what_was_said_is_passed_on_even_where_it_is_the_default_to_who_takes_it(tmp_path: Path) -> None:
     robot, operator = passed_on("--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime")
     assert {"--seed=0", "--link=delay 5ms", "--probability=0.99", "--realtime"} <= set(robot)
     assert {"--seed=0", "--link=delay 5ms", "--haptics", "--realtime"} <= set(operator)
-    assert "--no-haptics" in passed_on("--no-haptics")[1]
-
-
-def test_the_demos_own_file_counts_as_said(tmp_path: Path) -> None:
     config = tmp_path / "demo.toml"
     config.write_text('link = "delay 5ms"\nhaptics = false\nlaw = "paper"\ncompensation = "robot"\n')
     robot, operator = passed_on("--config", str(config))
     assert {"--link=delay 5ms", "--law=paper"} <= set(robot)
     assert {"--no-haptics", "--compensation=robot"} <= set(operator)
+    # Each side takes what it is told, and is not told what the other takes.
+    assert parse_settings(RobotSettings, "robot", robot).law == "paper"
+    assert parse_settings(OperatorSettings, "operator", operator).compensation == "robot"
 
 
 def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_alone(
@@ -68,18 +67,6 @@ def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_
         robot, operator = passed_on("--scene", scene)
         assert parse_settings(RobotSettings, "robot", robot).scene == scene
         assert not [flag for flag in operator if flag.startswith("--scene")]
-
-
-@pytest.mark.parametrize(("law", "compensation"), [("swept", "robot"), ("paper", "operator")])
-def test_the_robot_side_is_told_the_law_and_the_operator_side_who_reckons(law: str, compensation: str) -> None:
-    robot, operator = passed_on("--law", law, "--compensation", compensation)
-    assert [flag for flag in robot if flag.startswith(("--law", "--compensation"))] == [f"--law={law}"]
-    assert [flag for flag in operator if flag.startswith(("--law", "--compensation"))] == [
-        f"--compensation={compensation}"
-    ]
-    # Each side takes what it is told.
-    assert parse_settings(RobotSettings, "robot", robot).law == law
-    assert parse_settings(OperatorSettings, "operator", operator).compensation == compensation
 
 
 def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
