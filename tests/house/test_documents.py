@@ -1,9 +1,6 @@
 """Commands in the documents exist and parse, and the examples are true."""
 
-import os
 import re
-import subprocess
-import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +14,6 @@ import feelahead.main
 import operator_side.main
 import robot_side.main
 from common.command.command_line import load_toml
-from common.errors import ConfigurationError
 from feelahead.commands import keys
 from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.demo import DemoSettings
@@ -25,7 +21,7 @@ from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.documents import Document, typed, words
 from tests.helpers.repository import DATA, ROOT
-from tests.two_hosts.guide import Step, steps
+from tests.two_hosts.guide import steps
 
 README = "README.md"
 TO_BE_TYPED = [README, "docs/two-machines.md", "docs/systemd/README.md"]
@@ -141,13 +137,6 @@ def test_every_command_is_known(name: str) -> None:
             require_known(split)
 
 
-@pytest.mark.usefixtures("parse")
-@pytest.mark.parametrize("command", ["feelahead-robot --probabilty 1", "make demmo", "make demo ARGS='--durration 3'"])
-def test_a_misspelt_command_is_found(command: str) -> None:
-    with pytest.raises((AssertionError, ConfigurationError)):
-        require_known(filled(command))
-
-
 def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
     [section] = re.findall(r"## Every command\n(.*?)\n## ", (ROOT / README).read_text(), re.DOTALL)
     named = {name.partition(" ")[0] for name in re.findall(r"`([a-z-]+(?: NAME)?)`", section)}
@@ -181,26 +170,7 @@ def test_the_python_in_the_readme_runs() -> None:
         assert (given["volumes"] > 0.0).all()
 
 
-@pytest.mark.processes
-def test_an_arm_of_ones_own(tmp_path: Path) -> None:
-    """Run the README's command, on a port and for a time that suit a test."""
-    [command] = [line for line in indented(README) if "my_arm.xml" in line]
-    program, *arguments = filled(command.replace("pinch", "tool"))
-    assert program == "feelahead-robot"
-    short = ["--bind", "tcp://127.0.0.1:0", "--duration", "0.3", "--status", "none"]
-    ended = subprocess.run(
-        [sys.executable, "-P", "-m", "robot_side", *arguments, *short],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same(tmp_path: Path) -> None:
+def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -> None:
     """`make test-two-hosts` follows it."""
     said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
     made = [(where, split[2]) for where, split in said if split[:2] == ["feelahead", "keys"]]
@@ -210,7 +180,3 @@ def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same(tmp
     commands = [line.strip() for line in section.splitlines() if line.startswith("    ")]
     assert len(commands) > 5
     assert set(commands) <= {step.command for step in steps()}
-    (tmp_path / "guide.md").write_text("On the robot's machine:\n\n    one\n\n# Next\n\nDo:\n\n    two\n")
-    with pytest.raises(AssertionError, match="neither machine"):
-        steps(tmp_path / "guide.md")
-    assert Step("robot", "allow anna OPERATOR-KEY").filled_in({"OPERATOR-KEY": KEY}) == f"allow anna {KEY}"
