@@ -10,8 +10,7 @@ from common.errors import ConfigurationError
 from common.recording.content import Content
 from common.recording.entries import Kind, entry, pack_block, unpack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.mending import mend
-from common.recording.reading import Message, open_recording
+from common.recording.reading import open_recording
 from common.recording.topics import FORMAT
 from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, as_json, stamped
 
@@ -133,20 +132,3 @@ def test_another_format_another_program_and_a_pipe_are_told(tmp_path: Path) -> N
     os.mkfifo(tmp_path / "pipe.mcap")
     with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
         open_recording(tmp_path / "pipe.mcap")
-
-
-def test_a_cut_file_is_made_whole(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
-    content, ends = short
-    cut, whole = tmp_path / "cut.mcap", tmp_path / "whole.mcap"
-    cut.write_bytes(content[: ends[3] + 50])
-
-    def everything(path: Path) -> list[Message]:
-        return list(open_recording(path).messages())
-
-    assert mend(cut, whole) == len(everything(cut))
-    assert not open_recording(cut).whole
-    assert open_recording(whole).whole
-    assert everything(whole) == everything(cut)
-    assert open_recording(whole).headers == open_recording(cut).headers
-    with pytest.raises(ConfigurationError, match="is there already"):
-        mend(cut, whole)
