@@ -1,4 +1,4 @@
-"""Make every figure of the documents anew, by the commands beside them; git says which changed: `make figures`.
+"""Make every figure of the documents anew, by the commands beside them: `make figures`.
 
 A command is an indented line of a page that names a place in docs/ or is `make pictures`; a backslash continues it.
 """
@@ -44,7 +44,7 @@ def commands(docs: Path) -> Iterator[str]:
 
 
 def make_figures(arguments: Sequence[str]) -> int:
-    """Run the commands, and let git say what changed; 1 where a command failed."""
+    """Run the commands; 1 where one failed."""
     settings = parse_settings(DocsFigures, "make figures", arguments)
     docs = _ROOT / "docs"
     if not docs.is_dir():
@@ -62,9 +62,7 @@ def make_figures(arguments: Sequence[str]) -> int:
             done = subprocess.run(command, shell=True, cwd=_ROOT, env=environment, check=False)  # noqa: S602  # ours
             failed += [f"failed: {command}\n"] if done.returncode else []
             shown.advance(1.0)
-    sys.stdout.write("".join(failed) + "changed:\n")
-    sys.stdout.flush()
-    subprocess.run(["git", "status", "--short", "docs"], cwd=_ROOT, check=False)
+    sys.stdout.write("".join(failed))
     return 1 if failed else 0
 
 
