@@ -7,7 +7,6 @@ import queue
 import select
 import threading
 from collections.abc import Callable
-from types import TracebackType
 from typing import Final, TextIO
 
 _WAITING: Final = 64
@@ -40,9 +39,7 @@ class PatientOutput(io.TextIOBase):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         self._open = False
         self._waiting.put(None)
         self._thread.join(_END_S)

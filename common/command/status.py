@@ -3,7 +3,6 @@
 import json
 import sys
 from collections.abc import Callable, Mapping
-from types import TracebackType
 from typing import IO, Any, Literal, cast
 
 import msgspec
@@ -60,14 +59,12 @@ class Status:
             self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: Any) -> None:
         try:
             if self._live is not None:
                 self._live.stop()
         finally:
-            self._output.__exit__(kind, error, trace)
+            self._output.__exit__(*error)
 
     @property
     def wants_facts(self) -> bool:

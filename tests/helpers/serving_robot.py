@@ -1,7 +1,6 @@
 """A robot side without an arm: real sockets and the real session, in a thread."""
 
 import threading
-from types import TracebackType
 from typing import Self
 
 import msgpack
@@ -47,9 +46,7 @@ class ServingRobot:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ends.set()
         self._thread.join()
         self.sockets.close()

@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow import parquet
-from scipy.stats import binom
 
 from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import try_out
@@ -24,7 +23,6 @@ from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, st
 from feelahead.lab.journal import Journal
 from feelahead.lab.progress import progress
 from feelahead.lab.sweep import ask, generator, sweep
-from feelahead.lab.table import Table
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting
 from tests.helpers.repository import ROOT
 
@@ -134,16 +132,28 @@ def test_bad_input_ends_the_sweep_at_once(tmp_path: Path) -> None:
     [
         (["--workers", "2"], "--workers 2: try counting measures time"),
         (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1: try counting measures time"),
+        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
+        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
         (["--picture", "/a.png"], "--picture /a.png: try counting has no figure"),
         (["--picture", "/a.bmp"], "ends in .png, .svg, .pdf"),
         (["--workers", "0"], "--workers = 0; valid: at least 1"),
         (["--seeds", "0"], "--seeds = 0; valid: at least 1"),
+        (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
+        (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
         (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or its folder is not there"),
+        (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
+        (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
+        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_line(arguments: list[str], said: str) -> None:
+def test_what_cannot_be_would_lose_work_or_never_end_is_refused_in_a_line(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
     with pytest.raises(ConfigurationError, match=re.escape(said)):
         ask(TIMED, arguments)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 def test_all_files_hold_the_same_rows_and_the_settings_stand_beside_them(tmp_path: Path, expected: bytes) -> None:
@@ -161,24 +171,9 @@ def test_all_files_hold_the_same_rows_and_the_settings_stand_beside_them(tmp_pat
     assert {"versions", "code", "frozen", "question"} <= beside.keys()
 
 
-def test_tables_select_and_group() -> None:
-    table = Table([{"a": 1, "b": None}, {"a": 2, "c": [1]}, {"a": 1, "b": 3.0}])
-    assert table.columns == ["a", "b"]
-    assert table.values("b") == [3.0]
-    assert len(table.where(a=1)) == 2
-    assert [(key, len(rows)) for key, rows in table.groups("a")] == [((1,), 2), ((2,), 1)]
-
-
-@given(of=st.integers(1, 200), share=st.floats(0.0, 1.0))
-def test_the_exact_interval_leaves_as_much_on_either_side(of: int, share: float) -> None:
-    count = round(share * of)
-    low, high = share_interval(count, of)
-    assert low <= count / of <= high
-    assert count == 0 or binom.sf(count - 1, of, low) == pytest.approx(0.025, abs=1e-6)
-    assert count == of or binom.cdf(count, of, high) == pytest.approx(0.025, abs=1e-6)
-
-
 def test_intervals_of_few_and_of_equal_values_are_told_apart() -> None:
+    # Clopper and Pearson: 1 - 0.025^(1/10) for none of ten.
+    assert share_interval(0, 10) == pytest.approx((0.0, 1.0 - 0.025**0.1))
     # Six lose it and none gains it: 2 / 2^6.
     assert mcnemar_p([True] * 6 + [False] * 4, [False] * 10) == pytest.approx(2.0 / 2**6)
     assert mcnemar_p([True, False], [True, False]) == 1.0
@@ -348,28 +343,6 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "1s")
     with pytest.raises(ConfigurationError, match=r"--scheduler tcp://127\.0\.0\.1:1: no dask scheduler answers there"):
         ask(QUESTION, ["--scheduler", "tcp://127.0.0.1:1"])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
-        (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
-        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
-        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
-        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
-        (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
-        (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
-    ],
-)
-def test_what_would_lose_work_or_never_end_is_refused(
-    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    with pytest.raises(ConfigurationError, match=re.escape(said)):
-        ask(QUESTION, arguments)
-    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 @pytest.mark.parametrize(
