@@ -73,8 +73,8 @@ def _open(path: Path | None) -> Recording:
     if path is None:
         raise ConfigurationError("no recording given; valid: the path of a file that --record made")
     recording = open_recording(path)
-    if recording.readable is not None or not recording.whole:
-        why = "is damaged" if recording.readable is not None else "was cut off"
+    if recording.damaged or not recording.whole:
+        why = "is damaged" if recording.damaged else "was cut off"
         sys.stderr.write(f"feelahead: {path}: {why}; what can be read of it: {recording.length_s():.1f} s\n")
     return recording
 

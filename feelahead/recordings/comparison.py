@@ -89,7 +89,7 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
             )
             return
         yield from block.unpacked()
-    if recording.readable is not None:
+    if recording.damaged:
         notes.append("the file is damaged: compared up to there")
     elif not recording.whole:
         notes.append("the file was cut off: compared up to its last complete second")
