@@ -95,37 +95,24 @@ def start(module: str, output: int, *arguments: str) -> Iterator["subprocess.Pop
             process.kill()  # where a test has failed
 
 
-STALLS = pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
-
-
 @pytest.mark.processes
-@STALLS
-def test_a_signal_ends_the_robot_side_whoever_stalls_its_output(kind: str, mode: str) -> None:
+@pytest.mark.parametrize("side", ["robot", "operator"])
+@pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
+def test_a_signal_ends_a_side_whoever_stalls_its_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
     control, view = (f"tcp://127.0.0.1:{port}" for port in free_ports(2))
-    arguments = [f"--connect={control}", f"--view-connect={view}", "--device=simulated"]
+    robot = [f"--bind={control}", f"--view-bind={view}"]
+    operator = [f"--connect={control}", f"--view-connect={view}", "--device=simulated", f"--summary={path}"]
+    stalls, other = (robot, operator) if side == "robot" else (operator, robot)
     with (
         stalled(kind) as output,
-        start("robot_side", output, f"--bind={control}", f"--view-bind={view}", f"--status={mode}") as robot,
-        SideProcess("operator_side", "operator", arguments) as operator,
+        start(f"{side}_side", output, *stalls, f"--status={mode}") as process,
+        SideProcess("operator_side" if side == "robot" else "robot_side", "other", other) as watching,
     ):
-        assert any(operator.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5000))
-        robot.send_signal(signal.SIGTERM)
-        _, complaint = robot.communicate(timeout=LIMIT_S)
-        assert (robot.returncode, complaint) == (0, "")
-
-
-@pytest.mark.processes
-@STALLS
-def test_a_signal_ends_the_operator_side_whoever_stalls_its_output(kind: str, mode: str, tmp_path: Path) -> None:
-    path = tmp_path / "out.json"
-    with SideProcess("robot_side", "robot", ROBOT) as robot, stalled(kind) as output:
-        listening = robot.wait_for("listening", LIMIT_S)
-        ends = (f"--connect={listening['control']}", f"--view-connect={listening['view']}", "--device=simulated")
-        with start("operator_side", output, *ends, f"--status={mode}", f"--summary={path}") as operator:
-            assert any(robot.wait_for("status", LIMIT_S)["state"] == "armed" for _ in range(5000))
-            operator.send_signal(signal.SIGTERM)
-            _, complaint = operator.communicate(timeout=LIMIT_S)
-        assert (operator.returncode, complaint) == (0, "")
+        assert any(watching.wait_for("status", LIMIT_S).get("state") == "armed" for _ in range(5000))
+        process.send_signal(signal.SIGTERM)
+        _, complaint = process.communicate(timeout=LIMIT_S)
+        assert (process.returncode, complaint) == (0, "")
     assert json.loads(path.read_text())["triggers_released"] is True
 
 

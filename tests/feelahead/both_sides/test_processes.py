@@ -43,7 +43,7 @@ def operator(listening: dict[str, Any], *arguments: str) -> SideProcess:
     return SideProcess("operator_side.main", "operator", [*endpoints, "--device=simulated", *arguments])
 
 
-@pytest.mark.parametrize("more", [(), ("--compensation", "robot"), ("--law", "paper")], ids=["usual", "robot", "paper"])
+@pytest.mark.parametrize("more", [("--realtime",), ("--compensation", "robot"), ("--law", "paper")])
 def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: tuple[str, ...]) -> None:
     path = tmp_path / "out.json"
     with demo("--duration", "4", "--link", "delay 20ms", "--summary", str(path), *more) as process:
@@ -61,6 +61,14 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
         *("enlargement_mm", "overlap_mm3", "stiffness", "zones", "min_distance_mm", "contacts", "stops", "errors"),
     ):
         assert key in summary
+    for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
+        assert paced["overruns"] >= 0
+        assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
+    # Before the robot side knows its operator, a late tick reads no more of what waits than of anybody's.
+    assert summary["strangers"].pop("unread") >= 0
+    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "crowded": 0, "malformed": 0}
+    # A deadline is met by a tick or counted as an overrun (test_pacing.py: each of them), and none is both.
+    assert 0 < summary["ticks"] <= summary["ticks"] + summary["overruns"] <= summary["duration_s"] * 1000 + 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
