@@ -24,10 +24,6 @@ class StopSignal:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
-    def set(self) -> None:
-        """Ask the loop to end, as a signal would."""
-        self.is_set = True
-
     def _handle(self, number: int, frame: FrameType | None) -> None:
         del number, frame
         self.is_set = True
