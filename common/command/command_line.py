@@ -23,7 +23,7 @@ Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What the system says where standard output leads to a file that cannot grow."""
+"""The system's errors where standard output leads to a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
@@ -101,7 +101,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
     except BrokenPipeError:
-        # Whoever read our output has gone, as `head` does.
+        # The reader of our output has gone, as `head` does.
         ignore_broken_output()
         code = 0
     except OSError as error:
@@ -189,5 +189,5 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
 
 
 def _shortened(text: str) -> str:
-    """So that a value of a thousand digits does not bury what is wrong with it."""
+    """Cut a value of a thousand digits, which would bury what is wrong with it."""
     return text if len(text) <= _LONGEST_COMPLAINT else f"{text[:_LONGEST_COMPLAINT]}..."

@@ -42,7 +42,7 @@ def say_output_failed(program: str, error: OSError) -> int:
 
 
 def leave_at_once_on_signals() -> None:
-    """Until a `StopSignal` opens, a stop signal ends the process on the spot, with code 0.
+    """Let a stop signal end the process on the spot, with code 0, until a `StopSignal` opens.
 
     An exception could be caught by a module that is half imported, or lost in a compiler's callback, and the process
     would go on.

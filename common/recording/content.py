@@ -1,4 +1,4 @@
-"""What the recorder makes of each message of a side: inputs as they are, and beside them what people and tools read."""
+"""Sort each message of a side: inputs stay as they are, and beside them stands what people and tools read."""
 
 import json
 from collections.abc import Iterable

@@ -36,7 +36,7 @@ class Drawing:
         self._file.draw(f"/camera/{frame.view}", now_s, image)
 
     def shapes(self, scene: SceneShapes, now_s: float) -> None:
-        """What there is, each time that it is something else."""
+        """Draw the shapes, each time that they have changed."""
         self._links, self._objects, self._version = scene.links, scene.objects, scene.version
         if self._drawn == (scene.links, scene.objects, scene.shapes):
             return
@@ -50,7 +50,7 @@ class Drawing:
         self._file.draw("/scene", now_s, update)
 
     def state(self, scene: SceneState, now_s: float) -> None:
-        """Where everything is."""
+        """Draw where everything is."""
         if scene.version != self._version:
             return
         stamp = self._stamp(now_s)

@@ -15,7 +15,7 @@ from common.recording.topics import BINARY, ENCODING, PROFILE, schema_of
 
 _NANOSECONDS: Final = 1e9
 
-# What cannot be written is kept in `error`, and told once by whoever records.
+# A failure to write is kept in `error`, and told once by the recorder.
 logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 
 
@@ -28,7 +28,7 @@ class RecordingFile:
         self.kept_bytes = 0
         """Up to the end of the last whole chunk"""
         self.kept_s = 0.0
-        """From the first message to the last one of that chunk"""
+        """The time from the first message to the last one of that chunk"""
         self._first_s: float | None = None
         self._last_s = 0.0
         self._offset_s = wall_offset_s
@@ -97,7 +97,7 @@ class RecordingFile:
         self._output.finish(None if self.error is None else self.kept_bytes)
 
     def figures(self) -> dict[str, Any]:
-        """What is known to be on the disk."""
+        """Tell what is known to be on the disk."""
         return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
 
     def _own_channel(self, topic: str, first: bytes) -> foxglove.Channel:
@@ -128,7 +128,7 @@ class _Output:
         self.end = 0
         self._given_up = False
         self._position = 0
-        """Where the library takes itself to be: it panics where it is not"""
+        """The library's own idea of its place: it panics where it is wrong"""
         self._file = path.open("xb", buffering=0)
 
     def write(self, data: bytes | bytearray) -> int:

@@ -19,7 +19,7 @@ from common.recording.topics import FORMAT, PROFILE
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _RECORD: Final = struct.Struct("<BQ")
 _SPAN: Final = struct.Struct("<QQ")
-"""At the beginning of a chunk: its first and last stamp"""
+"""The beginning of a chunk: its first and last stamp"""
 _METADATA: Final = 0x0C
 _CHUNK: Final = 0x06
 _DATA_END: Final = 0x0F
@@ -41,7 +41,7 @@ class Recording:
 
     path: Path
     headers: Mapping[str, Mapping[str, Any]]
-    """What each recorded side's core was made from, by side"""
+    """Settings and versions that each recorded side's core was made from, by side"""
     whole: bool
     """Whether it was finished; else it ends at the last complete second"""
     damaged: bool = False
@@ -99,7 +99,7 @@ def open_recording(path: Path) -> Recording:
 
 
 def _described(path: Path, content: bytes) -> tuple[str, Mapping[str, str]]:
-    """What holds for the whole file: a name with texts."""
+    """Read a name with texts that hold for the whole file."""
     from mcap.records import Metadata  # noqa: PLC0415
 
     try:

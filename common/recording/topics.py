@@ -3,7 +3,7 @@
 from typing import Any, Final
 
 ENCODING: Final = "x-feelahead"
-"""Of what is ours and binary: blocks of entries (common/recording/entries.py), and view payloads."""
+"""The encoding of what is ours and binary: blocks of entries (common/recording/entries.py), and view payloads."""
 PROFILE: Final = "feelahead"
 FORMAT: Final = 1
 """Grows with a change that an older reader would misread."""

@@ -65,7 +65,7 @@ class StartedSide:
         return self._process.poll() is None
 
     def events(self) -> list[dict[str, Any]]:
-        """What it has said since the last call."""
+        """Return what it has said since the last call."""
         said, self._passed_over = self._passed_over, []
         while not self._events.empty():
             said.append(self._events.get_nowait())
@@ -84,7 +84,7 @@ class StartedSide:
         stop: StopSignal | None,
         meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> dict[str, Any] | None:
-        """As `wait_for`, but None as soon as `stop` is set; other events go to `meanwhile`, or wait for `events`."""
+        """Wait like `wait_for`, but None as soon as `stop` is set; other events go to `meanwhile`, or wait for `events`."""
         remaining_s = timeout_s
         while True:
             try:
@@ -128,7 +128,7 @@ class StartedSide:
             self._process.send_signal(signal.SIGINT)
 
     def wait(self, timeout_s: float) -> int:
-        """Its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
+        """Return its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
         return self._process.wait(timeout=timeout_s)
 
     def stop(self, timeout_s: float = 10.0) -> int:

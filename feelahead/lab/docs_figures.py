@@ -1,4 +1,4 @@
-"""Make every figure of the documents anew, by the commands beside them: `make figures`.
+"""Make every figure of the documents again, by the commands beside them: `make figures`.
 
 A command is an indented line of a page that names a place in docs/ or is `make pictures`; a backslash continues it.
 """

@@ -17,7 +17,7 @@ from feelahead.lab.progress import Shown
 from feelahead.lab.table import Row
 
 _RESTARTS = 3
-"""How often a pool is started again after one of its processes was killed."""
+"""Restarts of a pool after one of its processes was killed."""
 _WORKERS = 2
 
 

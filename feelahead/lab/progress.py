@@ -1,4 +1,4 @@
-"""How far long work has got, with the time left: a bar for people, a line now and then for a log."""
+"""Show how far long work has got, with the time left: a bar for people, a line a minute for a log."""
 
 import sys
 import threading
@@ -26,7 +26,7 @@ _WHOLE_RUN_S = 1e6
 
 
 class Shown(Protocol):
-    """What the work tells of itself."""
+    """Take what the work tells of itself."""
 
     def begin(self, piece: str) -> None:
         """Name the piece of work that takes its time now."""
@@ -107,7 +107,7 @@ class _Log:
             sys.stderr.flush()
 
     def line(self, now_s: float) -> str:
-        """How far it is, what is at work, and the time that is left."""
+        """Say how far it is, what is at work, and the time that is left."""
         left = "time left unknown"
         if self._done > 0.0:
             left = f"about {(now_s - self._start_s) * (self._total / self._done - 1.0) / 60.0:.0f} min left"

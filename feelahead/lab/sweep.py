@@ -60,7 +60,7 @@ class Sweep:
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """Write the table there, and settings, versions and hashes to FILE.csv.json beside it."""
     parquet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.parquet")] = None
-    """The same as Parquet."""
+    """Write the same as Parquet."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write all figures there, lists included: those of the one run, or of several as `runs`."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
@@ -163,13 +163,13 @@ def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
 
 @dataclass(frozen=True)
 class Swept:
-    """What came of a sweep."""
+    """Hold what came of a sweep."""
 
     table: Table
     failures: list[str]
     """A line for each cell that failed."""
     left: int
-    """How many runs are neither finished nor failed."""
+    """Number of runs that are neither finished nor failed."""
     ended: str | None = None
     """Why it ended before its time."""
     interrupted: bool = False
@@ -225,7 +225,7 @@ def generator(cell: object, seed: int) -> np.random.Generator:
 
 @functools.cache
 def _code_hash(own: Path) -> str:
-    """Hash the code that figures come from: the packages', and the question's own file wherever it lies."""
+    """Hash the code that figures come from: the packages', and the question's own file."""
     digest = hashlib.sha256(own.read_bytes())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*.py")):

@@ -15,7 +15,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 
 LEASE_S = 59.0
-"""So that an owner who says nothing stays one."""
+"""Long enough for an owner who says nothing to stay one."""
 
 
 class ServingRobot:

@@ -26,7 +26,7 @@ class Inner:
 
 @dataclass(frozen=True)
 class Options(RunOptions):
-    """What a test runs."""
+    """The options that a test runs with."""
 
     probability: float = 0.99
     camera: Inner = field(default_factory=Inner)

@@ -1,4 +1,4 @@
-"""What a file is told of a run: every change that a person cares about, once, and nothing in between."""
+"""A file is told of a run: every change that a person cares about, once, and nothing in between."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A recording opens wherever it was cut, up to the last complete second; what is none is told in one line."""
+"""A recording that was cut anywhere opens, up to the last complete second; what is none is told in one line."""
 
 import os
 from pathlib import Path

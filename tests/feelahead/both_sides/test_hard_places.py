@@ -146,7 +146,7 @@ def test_strangers_who_only_connect_cost_nobody_the_session(tmp_path: Path) -> N
             for endpoint in (listening["control"], listening["view"]):
                 for _ in range(300):
                     crowd.enter_context(contextlib.closing(RawConnection(port_of(endpoint))))
-            # The list of keys is looked at anew, and the view is opened anew, in the crowd.
+            # The list of keys is looked at again, and the view is opened again, in the crowd.
             folder.revoke("ben")
             robot.events()
             for _ in range(10):

@@ -35,7 +35,7 @@ episodes = pytest.mark.xdist_group("episodes")
 
 @dataclass(frozen=True)
 class Moment:
-    """What the person does and feels."""
+    """The person's doing and feeling."""
 
     phase: Phase
     l2: Strengths
