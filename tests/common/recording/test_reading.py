@@ -1,14 +1,17 @@
-"""A recording that was cut anywhere opens, up to the last complete second; what is none is told in one line."""
+"""A recording's bytes: blocks of entries, a file cut anywhere, and a disk that is full."""
 
 import os
+import resource
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
 from common.recording.content import Content
-from common.recording.entries import Kind, entry, pack_block, unpack_block
+from common.recording.entries import Entry, Kind, entry, pack_block, split_text, text, unpack_block
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.topics import FORMAT
@@ -132,3 +135,62 @@ def test_another_format_another_program_and_a_pipe_are_told(tmp_path: Path) -> N
     os.mkfifo(tmp_path / "pipe.mcap")
     with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
         open_recording(tmp_path / "pipe.mcap")
+
+
+ENTRIES = st.lists(
+    st.builds(
+        Entry,
+        st.sampled_from(Kind),
+        st.floats(allow_nan=False),
+        st.binary(max_size=300),
+    ),
+    max_size=20,
+)
+
+
+@given(ENTRIES, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_what_is_packed_is_unpacked(entries: list[Entry], number: int, dropped: int) -> None:
+    packed = b"".join(entry(Kind(one.kind), one.now_s, one.content[:1], one.content[1:]) for one in entries)
+    block = unpack_block(pack_block(number, dropped, 1.0, 2.0, packed))
+    assert (block.number, block.dropped, block.first_s, block.last_s) == (number, dropped, 1.0, 2.0)
+    assert list(block.unpacked()) == entries
+
+
+@given(ENTRIES.filter(bool), st.data())
+def test_a_block_that_ends_within_an_entry_is_refused(entries: list[Entry], data: st.DataObject) -> None:
+    packed = b"".join(entry(Kind(one.kind), one.now_s, one.content) for one in entries)
+    last = len(entry(Kind(entries[-1].kind), entries[-1].now_s, entries[-1].content))
+    end = data.draw(st.integers(len(packed) - last + 1, len(packed) - 1))
+    with pytest.raises(ValueError, match="ends within one"):
+        list(unpack_block(pack_block(0, 0, 0.0, 0.0, packed[:end])).unpacked())
+
+
+@given(st.binary(max_size=255), st.binary(max_size=100))
+def test_text_before_bytes(short: bytes, rest: bytes) -> None:
+    assert split_text(text(short) + rest) == (short, rest)
+    with pytest.raises(ValueError, match="ends within"):
+        split_text((text(short) + rest)[: len(short)] if short else b"")
+
+
+@pytest.mark.parametrize("room", [500_001, 511_117, 532_003, 563_333, 594_567, 600_001])
+def test_a_full_disk_is_kept_as_an_error_and_nothing_else_is_said(
+    room: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    generator = np.random.default_rng(room)
+    path = tmp_path / "run.mcap"
+    file = RecordingFile(path, 0.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        for number in range(100):
+            file.write("/robot/inputs", 0.01 * number, generator.bytes(20_000))
+            if number % 10 == 9:
+                file.flush()
+        file.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert file.error is not None
+    assert 0 < file.kept_bytes == path.stat().st_size <= room
+    assert "".join(capfd.readouterr()) == ""
+    # Outside of a test, who logs with nobody set up to hear it speaks on stderr.
+    assert caplog.records == []

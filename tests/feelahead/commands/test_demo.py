@@ -1,12 +1,15 @@
-"""The demo's arguments to the two sides, and its words when something ends early."""
+"""The demo: its arguments to the two sides, its page and its words when something ends early."""
 
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
+import webbrowser
+from collections.abc import Callable
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -14,13 +17,15 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import ConfigurationError
-from feelahead.both_sides.summary import both_statuses
+from feelahead.both_sides.summary import both_statuses, merge_summaries
 from feelahead.commands import demo as module
+from feelahead.commands import open_browser
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from robot_side.simulation.built_in_scenes import SceneName
 from tests.helpers.repository import ROOT
+from tests.operator_side.terminal_view.on_terminal import OnTerminal
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
 
@@ -145,3 +150,96 @@ def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) 
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=600)
     assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+def test_the_demo_is_drawn_from_the_facts_of_both_sides_and_gives_the_terminal_back() -> None:
+    demo = OnTerminal([sys.executable, "-P", "-m", "feelahead", "demo", "--tui", "--no-console", "--duration", "600"])
+    try:
+        # The delay and the zones are the operator side's, the nearest thing and the ticks the robot side's.
+        for said in (b"starting", b"link ", b" mean ", b"R2 advances", b"nearest ", b"tick p99", b"ARMED"):
+            demo.read_until(_shows(said))
+        assert demo.end(b"contacts with obstacles") == 0
+        assert demo.is_put_back()
+        # The report is what stays on the first screen.
+        assert b"feelahead demo: delay: " in demo.seen.rpartition(b"\x1b[?1049l")[2]
+    finally:
+        demo.close()
+
+
+def _shows(said: bytes) -> Callable[[bytes], bool]:
+    return lambda seen: said in seen
+
+
+ADDRESS = "http://127.0.0.1:1/token/"
+
+
+@pytest.mark.parametrize(
+    ("terminal", "display", "opens"), [(True, ":0", True), (True, "", False), (False, ":0", False)]
+)
+def test_it_opens_in_a_terminal_with_a_display_alone(
+    terminal: bool, display: str, opens: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, done = [], threading.Event()
+
+    def open_it(address: str) -> None:
+        opened.append(address)
+        done.set()
+
+    monkeypatch.setattr(webbrowser, "open", open_it)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    open_browser.show_address(ADDRESS, Status("none", "test"))
+    if opens:
+        done.wait(20.0)
+    assert opened == [ADDRESS] * opens
+
+
+ROBOT: dict[str, Any] = {
+    "ticks": 10_000,
+    "messages": {"stiffness_sent": 990, "motion_received": 240, "rejected": 3, "stale": 5},
+    "delay_ms": {"to_robot": {"mean": 50.0, "p99": 71.0}},
+    "applied_age_ms": {"to_robot": {"mean": 48.0}},
+    "stops": [{"time_s": 3.0, "reason": "no command for 100 ms"}],
+    "task": {"lifted_mm": 100.0},
+    "min_distance_mm": None,
+    "errors": ["robot: out of paper"],
+}
+OPERATOR: dict[str, Any] = {
+    "messages": {"stiffness_received": 980, "motion_sent": 250, "rejected": 1, "stale": 20},
+    "delay_ms": {"to_operator": {"mean": 20.0}, "round_trip": {"mean": 70.0}},
+    "applied_age_ms": {"to_operator": {"mean": 19.0}},
+    "errors": ["operator: asleep"],
+}
+
+
+def test_what_each_side_alone_knows_stands_beside_the_others() -> None:
+    merged = merge_summaries(ROBOT, OPERATOR, [])
+    assert merged["ticks"] == 10_000
+    assert merged["min_distance_mm"] is None
+    assert merged["stops"] == ROBOT["stops"]
+    assert merged["task"] == {"lifted_mm": 100.0}
+    assert merged["delay_ms"] == {
+        "to_robot": {"mean": 50.0, "p99": 71.0},
+        "to_operator": {"mean": 20.0},
+        "round_trip": {"mean": 70.0},
+    }
+    assert merged["applied_age_ms"] == {"to_robot": {"mean": 48.0}, "to_operator": {"mean": 19.0}}
+    # Counts that both have are added.
+    assert merged["messages"] == {
+        "stiffness_sent": 990,
+        "stiffness_received": 980,
+        "motion_sent": 250,
+        "motion_received": 240,
+        "rejected": 4,
+        "stale": 25,
+    }
+
+
+def test_a_side_that_left_no_summary_takes_nothing_from_the_other_and_every_error_is_kept() -> None:
+    alone = merge_summaries(ROBOT, {}, ["the operator side failed"])
+    assert alone == ROBOT | {"errors": ["robot: out of paper", "the operator side failed"]}
+    assert merge_summaries({}, OPERATOR, []) == OPERATOR
+    assert merge_summaries(ROBOT, OPERATOR, [])["errors"] == ["robot: out of paper", "operator: asleep"]
