@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.helpers.machines.waiting import wait_until
-from tests.kernel.inside.evdev import (
+from tests.kernel.inside.kernel_view import (
     ABS_HAT0X,
     ABS_HAT0Y,
     ABS_RX,
@@ -18,8 +18,9 @@ from tests.kernel.inside.evdev import (
     BTN_SOUTH,
     BTN_TL,
     InputDevice,
+    KernelView,
+    seen_device,
 )
-from tests.kernel.inside.kernel_view import KernelView, seen_device
 from tests.kernel.inside.plugged import Plugged
 
 
