@@ -138,9 +138,8 @@ def export(arguments: Sequence[str]) -> int:
 
 def _export(kind: str, recording: Recording, folder: Path) -> str:
     """Write a folder of tables, and say what was written."""
-    from feelahead.recordings.export_tables import export_csv, export_parquet  # noqa: PLC0415
     from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
-    from feelahead.recordings.tables import read_tables  # noqa: PLC0415
+    from feelahead.recordings.tables import export_csv, export_parquet, read_tables  # noqa: PLC0415
 
     tables = read_tables(recording)
     if kind == "lerobot":

@@ -14,9 +14,8 @@ from common.recording.reading import Recording, open_recording
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
-from feelahead.recordings.playback import Playback
+from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
-from feelahead.recordings.showing import Seen, seen
 from robot_side.assembly import build_robot_side
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
