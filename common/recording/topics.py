@@ -9,11 +9,17 @@ FORMAT: Final = 1
 """Grows with a change that an older reader would misread."""
 BINARY: Final = {"/robot/inputs": "feelahead.Block", "/operator/inputs": "feelahead.Block", "/view": "feelahead.View"}
 """Topics of bytes, with the names of their schemas."""
+_USUAL: Final[dict[str, dict[str, Any]]] = {
+    "/overlap": {"objects": [{"object": "post", "l2_mm3": 0.0, "r2_mm3": 0.0}]},
+    "/telemetry": {"target": "post"},
+    "/robot/status": {"stopped_because": "a gap", "nearest": "post", "target": "post"},
+}
+"""Values of fields that are empty in a first message."""
 
 
 def schema_of(topic: str, first: dict[str, Any]) -> dict[str, Any]:
     """The schema of a topic of JSON, by its first message; later ones may hold more."""
-    return {"title": f"feelahead.{topic.title().replace('/', '')}", **_type_of(first)}
+    return {"title": f"feelahead.{topic.title().replace('/', '')}", **_type_of(first | _USUAL.get(topic, {}))}
 
 
 def _type_of(value: Any) -> dict[str, Any]:
