@@ -140,7 +140,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
     if done.ended is not None:
         goes_on = f"the same command with --resume {settings.resume} goes on"
         if settings.resume is None:
-            goes_on = "valid: --resume FILE.jsonl, with which the same command goes on after an end"
+            goes_on = "with --resume FILE.jsonl from the start, the same command goes on"
         sys.stderr.write(f"feelahead {question.name}: {done.ended}; {done.left} runs are left; {goes_on}\n")
     if done.interrupted:
         return _INTERRUPTED

@@ -292,7 +292,7 @@ def test_a_worker_that_is_killed_again_and_again_leaves_what_is_finished(
     assert f"{finished} rows" in said.out
     [line] = said.err.splitlines()
     assert re.fullmatch(
-        r"feelahead try counting: a worker process was ended from outside; \d+ runs are left; valid: --resume FILE.*",
+        r"feelahead try counting: a worker process was ended from outside; \d+ runs are left; with --resume FILE.*",
         line,
     )
 
@@ -310,7 +310,7 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: by
         _, complaint = driver.communicate(timeout=60.0)
     assert driver.returncode == 130
     [line] = complaint.splitlines()
-    goes_on = f"the same command with --resume {kept} goes on" if journal else "valid: --resume FILE.jsonl"
+    goes_on = f"the same command with --resume {kept} goes on" if journal else "with --resume FILE.jsonl"
     assert re.search(r": interrupted; \d+ of 12 runs are finished; \d+ runs are left; ", line)
     assert goes_on in line
     assert rows.exists()
@@ -380,6 +380,17 @@ def test_a_disk_that_takes_no_more_is_named_and_what_is_finished_is_shown(
     [line] = said.err.splitlines()
     assert f"--resume {path}: cannot be written: No space left on device; 1 runs are left; the same command" in line
     assert ask(QUESTION, grid) == 0
+
+
+def test_ctrl_c_before_the_first_cell_is_one_line_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("feelahead.commands.bench_and_try.import_module", interrupted)
+    assert try_out(["soak"]) == 130
+    assert capsys.readouterr().err == "feelahead try soak: interrupted\n"
 
 
 def test_a_table_that_cannot_be_written_is_still_shown(capsys: pytest.CaptureFixture[str]) -> None:
