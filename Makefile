@@ -76,6 +76,7 @@ pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of cons
 # Hours: each command that stands beside a figure. One alone: make figures ARGS="--only scenes".
 figures: $(VENV)/.installed $(VENV)/.kernels ## every figure of the documents anew, and which of them changed
 	$(BIN)/python -m feelahead.lab.docs_figures $(ARGS)
+	@git status --short docs
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand

@@ -23,7 +23,7 @@ Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What the system says where standard output leads to a file that cannot grow."""
+"""The system's errors where standard output leads to a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
@@ -55,7 +55,7 @@ def parse_settings(
             )
     except SystemExit as stop:
         if stop.code:
-            raise ConfigurationError(_one_line(complaint.getvalue(), program)) from None
+            raise ConfigurationError(_one_line(complaint.getvalue(), program, settings_type)) from None
         raise
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
@@ -101,7 +101,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
     except BrokenPipeError:
-        # Whoever read our output has gone, as `head` does.
+        # The reader of our output has gone, as `head` does.
         ignore_broken_output()
         code = 0
     except OSError as error:
@@ -157,7 +157,7 @@ def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path
             _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.", elsewhere)
 
 
-def _one_line(box: str, program: str) -> str:
+def _one_line(box: str, program: str, settings_type: type) -> str:
     """The first paragraph of tyro's complaint as one line; its box is drawn in ASCII where nothing else can be."""
     words: list[str] = []
     for line in box.splitlines()[1:]:
@@ -168,7 +168,13 @@ def _one_line(box: str, program: str) -> str:
         if not ruled:
             words += text.split()
     said = " ".join(words).removeprefix("Error parsing ")
-    said = re.sub(r"^\w+Settings: ", "", said)
+    said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class whose check it was
+    if named := re.match(r"(?:([\w.]+): )?(\w+) = ", said):
+        place = f"{named[1]}.{named[2]}" if named[1] else named[2]
+        if place.partition(".")[0] in get_type_hints(settings_type):
+            said = f"--{place.replace('_', '-')} = {said[named.end() :]}"
+    if "; valid: " in said:
+        return _shortened(said)
     said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
     if fits:
         return f"{_shortened(said)}; valid: a number"
@@ -183,5 +189,5 @@ def _one_line(box: str, program: str) -> str:
 
 
 def _shortened(text: str) -> str:
-    """So that a value of a thousand digits does not bury what is wrong with it."""
+    """Cut a value of a thousand digits, which would bury what is wrong with it."""
     return text if len(text) <= _LONGEST_COMPLAINT else f"{text[:_LONGEST_COMPLAINT]}..."

@@ -2,12 +2,10 @@
 
 from rich.cells import cell_len
 
-from common.command.live_view import SLOW, LiveView, TriggerView
+from common.command.live_view import SLOW, LiveView
 
 _BETWEEN = "  "
 UNKNOWN = "–"
-_ROOM_FOR_NAMES = 129
-"""So many columns hold every usual line in long words and with a name; one that is there only at times would jump."""
 _LONGEST_NAME = 12
 """An object with a longer name is shown without it."""
 
@@ -16,9 +14,9 @@ _Fact = tuple[int, str]
 
 
 def live_line(view: LiveView, width: int) -> str:
-    """`view` in at most `width` columns: in long words, in short ones, or only the facts that have room."""
-    long, short = _in_long_words(view, named=width >= _ROOM_FOR_NAMES), _in_short_words(view)
-    for facts, between in ((long, _BETWEEN), (short, _BETWEEN), (short, " ")):
+    """`view` in at most `width` columns: all facts, closer together where it is tight, or those that have room."""
+    facts = _facts(view)
+    for between in (_BETWEEN, " "):
         line = _BETWEEN.join((facts[0][1], between.join(text for _, text in facts[1:])))
         if cell_len(line) <= width:
             return line
@@ -46,55 +44,29 @@ def percent(share: float | None, digits: int = 0) -> str:
     return f"{UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
 
 
-def _in_long_words(view: LiveView, *, named: bool) -> list[_Fact]:
-    nearest = "nearest "
-    if named and view.nearest is not None and cell_len(view.nearest) <= _LONGEST_NAME:
-        nearest += f"{view.nearest} "
-    return [
-        *_what(view),
-        (2, f"L2 {_long_trigger(view.l2, view)}"),
-        (2, f"R2 {_long_trigger(view.r2, view)}"),
-        (4, nearest + millimetres(view.nearest_mm, " ", 3)),
-        (3, _target(view, " ", 3)),
-        *([(5, f"link {_delay(view, ' ')}")] if view.linked else []),
-    ]
-
-
-def _in_short_words(view: LiveView) -> list[_Fact]:
-    pulled = f"{percent(view.l2.pulled)}/{percent(view.r2.pulled)}%"
-    resist = f"{percent(view.l2.resists)}/{percent(view.r2.resists)}%"
-    return [
-        *_what(view),
-        (2, f"L2/R2 pull {pulled} {'resist' if view.haptics else 'danger'} {resist}"),
-        (4, f"near {millimetres(view.nearest_mm, '')}"),
-        (3, _target(view, "", 0)),
-        *([(5, f"link {_delay(view, '')}")] if view.linked else []),
-    ]
-
-
-def _what(view: LiveView) -> list[_Fact]:
+def _facts(view: LiveView) -> list[_Fact]:
     facts = [(0, view.phase)]
     if view.reason is not None:
         facts.append((1, view.reason))
     if view.real_time is not None and view.real_time < SLOW:
         facts.append((1, f"{percent(view.real_time)} % of real time"))
+    pulled = f"{percent(view.l2.pulled)}/{percent(view.r2.pulled)}%"
+    resist = f"{percent(view.l2.resists)}/{percent(view.r2.resists)}%"
+    facts += [
+        (2, f"L2/R2 pull {pulled} {'resist' if view.haptics else 'danger'} {resist}"),
+        (4, f"near {millimetres(view.nearest_mm, '')}"),
+        (3, _target(view)),
+    ]
+    if view.linked:
+        facts.append((5, f"link {UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}ms"))
     return facts
 
 
-def _long_trigger(trigger: TriggerView, view: LiveView) -> str:
-    resists = "resists" if view.haptics else "danger"
-    return f"pulled {percent(trigger.pulled, 3)} % {resists} {percent(trigger.resists, 3)} %"
-
-
-def _target(view: LiveView, space: str, digits: int) -> str:
+def _target(view: LiveView) -> str:
     if view.holding is not None:
         return f"holding {view.holding}" if cell_len(view.holding) <= _LONGEST_NAME else "holding"
     if view.has_target is False:
         return "no target"
     if view.target_mm is None and view.target_centre_mm is not None:
-        return f"target centre {millimetres(view.target_centre_mm, space, digits)}"
-    return f"target {millimetres(view.target_mm, space, digits)}"
-
-
-def _delay(view: LiveView, space: str) -> str:
-    return f"{UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}{space}ms"
+        return f"target centre {millimetres(view.target_centre_mm, '')}"
+    return f"target {millimetres(view.target_mm, '')}"

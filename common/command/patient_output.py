@@ -7,13 +7,12 @@ import queue
 import select
 import threading
 from collections.abc import Callable
-from types import TracebackType
 from typing import Final, TextIO
 
 _WAITING: Final = 64
 """Texts that wait for a reader; the oldest is dropped for one more."""
 _END_S: Final = 0.5
-"""How long the context's end waits for the last of them."""
+"""The context's end waits so long for the last of them."""
 
 
 class PatientOutput(io.TextIOBase):
@@ -22,7 +21,7 @@ class PatientOutput(io.TextIOBase):
     Results are written after it: behind all that waits, and for as long as the reader takes. A reader that has gone is
     told within the context only, by the first write that comes later: there it ends a run.
 
-    Not through the stream's buffer: whoever flushes that at the end would wait for the thread.
+    The stream's buffer is not used: a flush of it at the end would wait for the thread.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -40,9 +39,7 @@ class PatientOutput(io.TextIOBase):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         self._open = False
         self._waiting.put(None)
         self._thread.join(_END_S)
@@ -89,7 +86,7 @@ class PatientOutput(io.TextIOBase):
 
 
 def _sink(stream: TextIO | None) -> Callable[[str], object]:
-    """What writes a text to `stream` at once."""
+    """Make what writes a text to `stream` at once."""
     if stream is None:
         return len
     try:

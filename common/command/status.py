@@ -3,7 +3,6 @@
 import json
 import sys
 from collections.abc import Callable, Mapping
-from types import TracebackType
 from typing import IO, Any, Literal, cast
 
 import msgspec
@@ -32,7 +31,7 @@ class _Console(Console):
 class Status:
     """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error.
 
-    Nothing waits for whoever reads: what a reader that stalls has no room for is dropped. A note after the context is
+    Nothing waits for the reader: what one that stalls has no room for is dropped. A note after the context is
     a result, which waits for its reader.
     """
 
@@ -45,7 +44,7 @@ class Status:
         self._story = Story()
         self._next_s = -1.0
         self.also: Callable[[str], None] | None = None
-        """Who is told each note, too"""
+        """A second place that each note goes to"""
 
     def __enter__(self) -> "Status":
         self._output.__enter__()
@@ -60,14 +59,12 @@ class Status:
             self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: Any) -> None:
         try:
             if self._live is not None:
                 self._live.stop()
         finally:
-            self._output.__exit__(kind, error, trace)
+            self._output.__exit__(*error)
 
     @property
     def wants_facts(self) -> bool:
@@ -113,6 +110,6 @@ class Status:
         if self._mode in _LINES_OF_JSON:
             self.event("note", text=text)
         elif self._mode == "line":
-            # Wrapped between words for a person, left whole for whoever searches a file.
+            # Wrapped between words for a person, left whole for a search in a file.
             whole = not self._console.is_terminal
             self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=whole)

@@ -4,7 +4,7 @@ import os
 import select
 import signal
 import sys
-from types import FrameType, TracebackType
+from types import FrameType
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal, too: a controller must not be left with stiff triggers."""
@@ -20,15 +20,9 @@ class StopSignal:
         self._previous = {number: signal.signal(number, self._handle) for number in STOP_SIGNALS}
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
-
-    def set(self) -> None:
-        """Ask the loop to end, as a signal would."""
-        self.is_set = True
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         del number, frame
@@ -48,7 +42,7 @@ def say_output_failed(program: str, error: OSError) -> int:
 
 
 def leave_at_once_on_signals() -> None:
-    """Until a `StopSignal` opens, a stop signal ends the process on the spot, with code 0.
+    """Let a stop signal end the process on the spot, with code 0, until a `StopSignal` opens.
 
     An exception could be caught by a module that is half imported, or lost in a compiler's callback, and the process
     would go on.

@@ -1,6 +1,6 @@
 """What one operator is to the robot side: one table of states, events and what follows, which the code runs from.
 
-docs/session.md shows this very table and its diagram; `python -m feelahead.documents.session_diagram` writes them anew.
+docs/session.md shows this very table and its diagram.
 A pair of state and event that the table does not name changes nothing.
 """
 

@@ -1,7 +1,8 @@
-"""What the recorder makes of each message of a side: inputs as they are, and beside them what people and tools read."""
+"""Sort each message of a side: inputs stay as they are, and beside them stands what people and tools read."""
 
 import json
-from typing import Any, Final, Protocol
+from collections.abc import Iterable
+from typing import Any, Final
 
 import msgspec
 
@@ -9,40 +10,17 @@ from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
 from common.recording.decoding import Decoder, Shown, shown_view, view_message
 from common.recording.drawing import Drawing
 from common.recording.entries import unpack_block
+from common.recording.mcap_file import RecordingFile
 from common.recording.topics import FORMAT
 from common.recording.wire import BLOCK, FACTS, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
 
 _OTHER: Final = {"robot": "operator", "operator": "robot"}
 
 
-class File(Protocol):
-    """Where it goes."""
-
-    def describe(self, name: str, values: dict[str, str]) -> None:
-        """Keep what holds for the whole file."""
-        ...
-
-    def write(self, topic: str, now_s: float, content: bytes) -> None:
-        """One message of a topic of ours."""
-        ...
-
-    def log(self, topic: str, now_s: float, content: Any, make: Any) -> None:
-        """One message of one of Foxglove's types."""
-        ...
-
-    def typed(self, kind: str) -> Any:
-        """Something that makes channels of a type."""
-        ...
-
-    def wall_ns(self, now_s: float) -> int:
-        """The wall clock's nanoseconds at a stamp."""
-        ...
-
-
 class Content:
     """Sorts messages of one or both sides into topics."""
 
-    def __init__(self, file: File) -> None:
+    def __init__(self, file: RecordingFile) -> None:
         self._file = file
         self._sides: dict[int, str] = {}
         self._decoders: dict[str, Decoder] = {}
@@ -121,8 +99,7 @@ class Content:
             if why is not None:
                 self._drawing.log(side, now_s, f"stopped: {why}", warning=True)
 
-    def _write(self, messages: Any) -> None:
-        shown: Shown
+    def _write(self, messages: Iterable[Shown]) -> None:
         for shown in messages:
             self._file.write(*shown)
 

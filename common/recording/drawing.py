@@ -1,36 +1,21 @@
 """Foxglove's own messages: pictures, the scene with its transforms, and the log."""
 
-from typing import Any, Final, Protocol
+from typing import Final
 
 import numpy as np
 from foxglove import messages
 
 from common.protocol.view_messages import SceneShapes, SceneState, Shape, VideoFrame
+from common.recording.mcap_file import RecordingFile
 
 _WORLD: Final = "world"
 _POSE: Final = 7
 
 
-class Where(Protocol):
-    """The file, as far as it is needed here."""
-
-    def log(self, topic: str, now_s: float, content: Any, make: Any) -> None:
-        """One message of one of Foxglove's types."""
-        ...
-
-    def typed(self, kind: str) -> Any:
-        """Something that makes channels of a type."""
-        ...
-
-    def wall_ns(self, now_s: float) -> int:
-        """The wall clock's nanoseconds at a stamp."""
-        ...
-
-
 class Drawing:
     """Draws into a file what is seen, where everything is, and what was said."""
 
-    def __init__(self, file: Where) -> None:
+    def __init__(self, file: RecordingFile) -> None:
         self._file = file
         self._drawn: tuple[tuple[str, ...], tuple[str, ...], tuple[Shape, ...]] | None = None
         self._links: tuple[str, ...] = ()
@@ -41,17 +26,17 @@ class Drawing:
         """A line that a person was told."""
         level = messages.LogLevel.Warning if warning else messages.LogLevel.Info
         entry = messages.Log(timestamp=self._stamp(now_s), level=level, message=text, name=side)
-        self._file.log("/log", now_s, entry, self._file.typed("Log"))
+        self._file.draw("/log", now_s, entry)
 
     def image(self, frame: VideoFrame, now_s: float) -> None:
         """A picture of one of the cameras, as it came."""
         image = messages.CompressedImage(
             timestamp=self._stamp(now_s), frame_id=frame.view, data=frame.jpeg, format="jpeg"
         )
-        self._file.log(f"/camera/{frame.view}", now_s, image, self._file.typed("CompressedImage"))
+        self._file.draw(f"/camera/{frame.view}", now_s, image)
 
     def shapes(self, scene: SceneShapes, now_s: float) -> None:
-        """What there is, each time that it is something else."""
+        """Draw the shapes, each time that they have changed."""
         self._links, self._objects, self._version = scene.links, scene.objects, scene.version
         if self._drawn == (scene.links, scene.objects, scene.shapes):
             return
@@ -62,10 +47,10 @@ class Drawing:
         entities = [self._entity(name, shapes, now_s) for name, shapes in groups.items()]
         clear = messages.SceneEntityDeletion(timestamp=self._stamp(now_s), type=messages.SceneEntityDeletionType.All)
         update = messages.SceneUpdate(deletions=[clear], entities=entities)
-        self._file.log("/scene", now_s, update, self._file.typed("SceneUpdate"))
+        self._file.draw("/scene", now_s, update)
 
     def state(self, scene: SceneState, now_s: float) -> None:
-        """Where everything is."""
+        """Draw where everything is."""
         if scene.version != self._version:
             return
         stamp = self._stamp(now_s)
@@ -88,7 +73,7 @@ class Drawing:
             for name, pose in frames
         ]
         update = messages.FrameTransforms(transforms=transforms)
-        self._file.log("/tf", now_s, update, self._file.typed("FrameTransforms"))
+        self._file.draw("/tf", now_s, update)
 
     def _frame(self, index: int, *, of_robot: bool) -> str:
         names = self._links if of_robot else self._objects

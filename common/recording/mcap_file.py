@@ -1,8 +1,9 @@
 """The file itself, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
 
+import json
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,11 +11,11 @@ import foxglove
 from foxglove import channels
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
-from common.recording.topics import BINARY, ENCODING, PROFILE, SCHEMAS
+from common.recording.topics import BINARY, ENCODING, PROFILE, schema_of
 
 _NANOSECONDS: Final = 1e9
 
-# What cannot be written is kept in `error`, and told once by whoever records.
+# A failure to write is kept in `error`, and told once by the recorder.
 logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 
 
@@ -27,7 +28,7 @@ class RecordingFile:
         self.kept_bytes = 0
         """Up to the end of the last whole chunk"""
         self.kept_s = 0.0
-        """From the first message to the last one of that chunk"""
+        """The time from the first message to the last one of that chunk"""
         self._first_s: float | None = None
         self._last_s = 0.0
         self._offset_s = wall_offset_s
@@ -54,26 +55,26 @@ class RecordingFile:
 
     def write(self, topic: str, now_s: float, content: bytes) -> None:
         """One message of a topic of ours."""
-        self.log(topic, now_s, content, self._own_channel)
+        self._log(topic, now_s, content, lambda: self._own_channel(topic, content))
 
-    def log(self, topic: str, now_s: float, content: Any, make: Any) -> None:
-        """One message; `make(topic)` makes the topic's channel when it is the first."""
+    def draw(self, topic: str, now_s: float, content: Any) -> None:
+        """One message of one of Foxglove's own types."""
+        kind = getattr(channels, f"{type(content).__name__}Channel")
+        self._log(topic, now_s, content, lambda: kind(topic, context=self._context))
+
+    def _log(self, topic: str, now_s: float, content: Any, make: Callable[[], Any]) -> None:
+        """Write a message; `make` makes the topic's channel when it is the first."""
         if self.error is not None:
             return
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._channels[topic] = make(topic)
+        if topic not in self._channels:
+            self._channels[topic] = make()
         self._first_s = now_s if self._first_s is None else min(self._first_s, now_s)
         self._last_s = max(self._last_s, now_s)
-        self._attempt(lambda: channel.log(content, log_time=self.wall_ns(now_s)))
+        self._attempt(lambda: self._channels[topic].log(content, log_time=self.wall_ns(now_s)))
 
     def wall_ns(self, now_s: float) -> int:
         """The wall clock's nanoseconds at a stamp."""
         return max(0, round((now_s + self._offset_s) * _NANOSECONDS))
-
-    def typed(self, kind: str) -> Any:
-        """Something that makes channels of one of Foxglove's own types, for `log`."""
-        return lambda topic: getattr(channels, f"{kind}Channel")(topic, context=self._context)
 
     def flush(self) -> None:
         """End the chunk: what was written so far survives us."""
@@ -96,14 +97,14 @@ class RecordingFile:
         self._output.finish(None if self.error is None else self.kept_bytes)
 
     def figures(self) -> dict[str, Any]:
-        """What is known to be on the disk."""
+        """Tell what is known to be on the disk."""
         return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
 
-    def _own_channel(self, topic: str) -> foxglove.Channel:
+    def _own_channel(self, topic: str, first: bytes) -> foxglove.Channel:
         if topic in BINARY:
             schema = foxglove.Schema(name=BINARY[topic], encoding="", data=b"")
             return foxglove.Channel(topic, schema=schema, message_encoding=ENCODING, context=self._context)
-        return foxglove.Channel(topic, schema=SCHEMAS[topic], context=self._context)
+        return foxglove.Channel(topic, schema=schema_of(topic, json.loads(first)), context=self._context)
 
     def _attempt(self, write: Any) -> bool:
         try:
@@ -127,7 +128,7 @@ class _Output:
         self.end = 0
         self._given_up = False
         self._position = 0
-        """Where the library takes itself to be: it panics where it is not"""
+        """The library's own idea of its place: it panics where it is wrong"""
         self._file = path.open("xb", buffering=0)
 
     def write(self, data: bytes | bytearray) -> int:

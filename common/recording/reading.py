@@ -9,7 +9,6 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -20,7 +19,7 @@ from common.recording.topics import FORMAT, PROFILE
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _RECORD: Final = struct.Struct("<BQ")
 _SPAN: Final = struct.Struct("<QQ")
-"""At the beginning of a chunk: its first and last stamp"""
+"""The beginning of a chunk: its first and last stamp"""
 _METADATA: Final = 0x0C
 _CHUNK: Final = 0x06
 _DATA_END: Final = 0x0F
@@ -42,11 +41,13 @@ class Recording:
 
     path: Path
     headers: Mapping[str, Mapping[str, Any]]
-    """What each recorded side's core was made from, by side"""
+    """Settings and versions that each recorded side's core was made from, by side"""
     whole: bool
     """Whether it was finished; else it ends at the last complete second"""
-    readable: int | None = None
-    """How many chunks come before one that is not as it was written; None where all are"""
+    damaged: bool = False
+    """Whether a chunk is not as it was written; what follows it is left"""
+    end_ns: int = 0
+    """The last stamp of the chunks before that, nanoseconds on the wall clock"""
 
     def began_ns(self) -> int:
         """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
@@ -54,9 +55,7 @@ class Recording:
 
     def length_s(self) -> float:
         """From the first message to the last one in a chunk that is there, seconds."""
-        chunks = islice(_records(self.path, (_CHUNK,)), self.readable)
-        ends_ns = [_SPAN.unpack_from(content)[1] for _, content in chunks]
-        return 1e-9 * (max(ends_ns) - self.began_ns()) if ends_ns else 0.0
+        return 1e-9 * (self.end_ns - self.began_ns()) if self.end_ns else 0.0
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
         """Every message in the file's order, which is nearly that of time; of `topics` only, if any are named."""
@@ -64,7 +63,10 @@ class Recording:
         from mcap.records import Message as Logged  # noqa: PLC0415
 
         names: dict[int, str] = {}
-        for records in whole_chunks(self.path):
+        for _, chunk in _records(self.path, (_CHUNK,)):
+            records = _broken_up(chunk)
+            if records is None:
+                return
             for record in records:
                 if isinstance(record, Channel):
                     names[record.id] = record.topic
@@ -78,56 +80,48 @@ def open_recording(path: Path) -> Recording:
     """Look through the file at `path`; ConfigurationError, in one line, for what is no recording of ours."""
     require_packages("a recording", "foxglove", "mcap")
     headers: dict[str, Mapping[str, Any]] = {}
-    for name, values in described(path):
-        side = name.removeprefix(f"{PROFILE}.")
-        if side in _SIDES and side != name:
-            headers[side] = _header(path, values)
+    whole, damaged, end_ns = False, False, 0
+    for opcode, content in _records(path, (_METADATA, _CHUNK, _DATA_END)):
+        if opcode == _METADATA:
+            name, values = _described(path, content)
+            side = name.removeprefix(f"{PROFILE}.")
+            if side in _SIDES and side != name:
+                headers[side] = _header(path, values)
+        elif opcode == _CHUNK and not damaged:
+            damaged = _broken_up(content) is None
+            end_ns = end_ns if damaged else max(end_ns, _SPAN.unpack_from(content)[1])
+        whole |= opcode == _DATA_END
     if not headers:
         raise ConfigurationError(
             f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
         )
-    whole = any(opcode == _DATA_END for opcode, _ in _records(path, (_DATA_END,)))
-    return Recording(path, headers, whole, _readable(path))
+    return Recording(path, headers, whole, damaged, end_ns)
 
 
-def _readable(path: Path) -> int | None:
-    from mcap.records import Chunk  # noqa: PLC0415
-    from mcap.stream_reader import get_chunk_data_stream  # noqa: PLC0415
-
-    for number, (_, content) in enumerate(_records(path, (_CHUNK,))):
-        try:
-            get_chunk_data_stream(Chunk.read(_stream(content)), validate_crc=True)
-        except Exception:  # as in whole_chunks
-            return number
-    return None
-
-
-def described(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
-    """What holds for the whole file: names with texts."""
+def _described(path: Path, content: bytes) -> tuple[str, Mapping[str, str]]:
+    """Read a name with texts that hold for the whole file."""
     from mcap.records import Metadata  # noqa: PLC0415
 
-    for _, content in _records(path, (_METADATA,)):
-        try:
-            metadata = Metadata.read(_stream(content))
-        # As with chunks: the library says in many ways that bytes are not what they were.
-        except Exception as error:
-            raise ConfigurationError(
-                f"{path}: what it says of itself is damaged; valid: a file as --record made it"
-            ) from error
-        yield metadata.name, metadata.metadata
+    try:
+        metadata = Metadata.read(_stream(content))
+    # As with chunks: the library says in many ways that bytes are not what they were.
+    except Exception as error:
+        raise ConfigurationError(
+            f"{path}: what it says of itself is damaged; valid: a file as --record made it"
+        ) from error
+    return metadata.name, metadata.metadata
 
 
-def whole_chunks(path: Path) -> Iterator[list[Any]]:
-    """The records of each chunk that is whole and as it was written; what follows one that is not is left."""
+def _broken_up(chunk: bytes) -> list[Any] | None:
+    """The records of a chunk; None for one that is not as it was written."""
     from mcap.records import Chunk  # noqa: PLC0415
     from mcap.stream_reader import breakup_chunk  # noqa: PLC0415
 
-    for _, content in _records(path, (_CHUNK,)):
-        try:
-            yield breakup_chunk(Chunk.read(_stream(content)), validate_crc=True)
-        # What a flipped bit does is the decompressor's to say, in classes of its own.
-        except Exception:
-            return
+    try:
+        return breakup_chunk(Chunk.read(_stream(chunk)), validate_crc=True)
+    # What a flipped bit does is the decompressor's to say, in classes of its own.
+    except Exception:
+        return None
 
 
 def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:

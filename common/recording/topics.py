@@ -1,111 +1,36 @@
-"""The topics of a recording and what stands in each message, as JSON schemas that Foxglove plots by."""
+"""The topics of a recording, and the JSON schemas that Foxglove plots by."""
 
 from typing import Any, Final
 
 ENCODING: Final = "x-feelahead"
-"""Of what is ours and binary: blocks of entries (common/recording/entries.py), and view payloads."""
+"""The encoding of what is ours and binary: blocks of entries (common/recording/entries.py), and view payloads."""
 PROFILE: Final = "feelahead"
 FORMAT: Final = 1
 """Grows with a change that an older reader would misread."""
 BINARY: Final = {"/robot/inputs": "feelahead.Block", "/operator/inputs": "feelahead.Block", "/view": "feelahead.View"}
 """Topics of bytes, with the names of their schemas."""
-
-_NUMBER: Final = {"type": "number"}
-_MAYBE: Final = {"type": ["number", "null"]}
-_TEXT: Final = {"type": "string"}
-_STAMPS: Final = {"time_s": _NUMBER, "sequence": {"type": "integer"}, "sent_s": _NUMBER}
-_MESSAGE: Final = {**_STAMPS, "side": _TEXT, "age_ms": _MAYBE, "loop_age_ms": _MAYBE}
-_NUMBERS: Final = {"type": "array", "items": _NUMBER}
-
-
-def _object(title: str, properties: dict[str, Any]) -> dict[str, Any]:
-    return {"title": f"feelahead.{title}", "type": "object", "properties": properties}
-
-
-_FIELD: Final = {
-    "type": "object",
-    "properties": {
-        "fast_m": _NUMBERS,
-        "slow_m": _NUMBERS,
-        "full_speed_m_s": _NUMBER,
-        "acceleration_m_s2": _NUMBER,
-        "displacement_m": _NUMBER,
-        "stiffness": _NUMBER,
-    },
+_USUAL: Final[dict[str, dict[str, Any]]] = {
+    "/overlap": {"objects": [{"object": "post", "l2_mm3": 0.0, "r2_mm3": 0.0}]},
+    "/telemetry": {"target": "post"},
+    "/robot/status": {"stopped_because": "a gap", "nearest": "post", "target": "post"},
 }
-_TERM_NAMES: Final = (
-    "sigma_m",
-    "mean_m",
-    "kinematic_sd_m",
-    "camera_sd_m",
-    "prediction_sd_m",
-    "quantile",
-    "loop_age_s",
-    "displacement_m",
-)
-_TERMS: Final = {"type": "object", "properties": dict.fromkeys(_TERM_NAMES, _NUMBER)}
-SCHEMAS: Final[dict[str, dict[str, Any]]] = {
-    "/stiffness": _object(
-        "Stiffness",
-        _MESSAGE
-        | {
-            "l2": _FIELD,
-            "r2": _FIELD,
-            "speed_m_s": _NUMBER,
-            "horizon_m": _NUMBER,
-            "rumble": _NUMBER,
-            "state": _TEXT,
-            "told_m_s": _MAYBE,
-        },
-    ),
-    "/command": _object(
-        "Command",
-        _MESSAGE
-        | {
-            "l2": _NUMBER,
-            "r2": _NUMBER,
-            "lateral": _NUMBERS,
-            "turning": _NUMBERS,
-            "gripper": _NUMBER,
-            **{name: {"type": "boolean"} for name in ("run", "arm", "emergency_stop", "next_target", "hand_over")},
-            "token": {"type": "integer"},
-            "compensation": _TEXT,
-        },
-    ),
-    "/ages": _object(
-        "Ages", {"time_s": _NUMBER, "side": _TEXT, "command_ms": _MAYBE, "field_ms": _MAYBE, "frame_ms": _MAYBE}
-    ),
-    "/enlargement": _object("Enlargement", _STAMPS | {"l2": _TERMS, "r2": _TERMS}),
-    "/overlap": _object(
-        "Overlap",
-        _STAMPS
-        | {
-            "objects": {
-                "type": "array",
-                "items": {
-                    "type": "object",
-                    "properties": {"object": _TEXT, "l2_mm3": _NUMBER, "r2_mm3": _NUMBER},
-                },
-            }
-        },
-    ),
-    "/telemetry": _object(
-        "Telemetry",
-        _STAMPS
-        | {
-            "state": _TEXT,
-            "tool_position_m": _NUMBERS,
-            "tool_speed_m_s": _NUMBER,
-            "target": {"type": ["string", "null"]},
-            "gripper_opening_m": _NUMBER,
-            "holding": {"type": "boolean"},
-            "enlargement_m": _NUMBER,
-            "l2": _NUMBER,
-            "r2": _NUMBER,
-        },
-    ),
-    "/robot/status": _object("RobotStatus", {"time_s": _NUMBER}),
-    "/operator/status": _object("OperatorStatus", {"time_s": _NUMBER}),
-    "/operator/facts": _object("OperatorFacts", {"now_s": _NUMBER}),
-}
-"""What tools plot by; a message may hold more."""
+"""Values of fields that are empty in a first message."""
+
+
+def schema_of(topic: str, first: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a topic of JSON, by its first message; later ones may hold more."""
+    return {"title": f"feelahead.{topic.title().replace('/', '')}", **_type_of(first | _USUAL.get(topic, {}))}
+
+
+def _type_of(value: Any) -> dict[str, Any]:
+    """The type of a value as JSON Schema says it; what is null is mostly a number that is not known yet."""
+    match value:
+        case dict():
+            return {"type": "object", "properties": {name: _type_of(one) for name, one in value.items()}}
+        case list():
+            return {"type": "array", "items": _type_of(value[0] if value else None)}
+        case None:
+            return {"type": ["number", "null"]}
+        case bool():
+            return {"type": "boolean"}
+    return {"type": "string" if isinstance(value, str) else "number"}

@@ -8,7 +8,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
-from types import TracebackType
 from typing import Any, Self
 
 from common.command.stop_signal import StopSignal
@@ -48,9 +47,7 @@ class StartedSide:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
         self._reader.join(timeout=1.0)
         if self._process.stdout is not None:
@@ -68,7 +65,7 @@ class StartedSide:
         return self._process.poll() is None
 
     def events(self) -> list[dict[str, Any]]:
-        """What it has said since the last call."""
+        """Return what it has said since the last call."""
         said, self._passed_over = self._passed_over, []
         while not self._events.empty():
             said.append(self._events.get_nowait())
@@ -87,7 +84,7 @@ class StartedSide:
         stop: StopSignal | None,
         meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> dict[str, Any] | None:
-        """As `wait_for`, but None as soon as `stop` is set; other events go to `meanwhile`, or wait for `events`."""
+        """Wait like `wait_for`; None once `stop` is set. Other events go to `meanwhile`, or wait for `events`."""
         remaining_s = timeout_s
         while True:
             try:
@@ -131,7 +128,7 @@ class StartedSide:
             self._process.send_signal(signal.SIGINT)
 
     def wait(self, timeout_s: float) -> int:
-        """Its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
+        """Return its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
         return self._process.wait(timeout=timeout_s)
 
     def stop(self, timeout_s: float = 10.0) -> int:

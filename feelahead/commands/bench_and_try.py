@@ -29,7 +29,13 @@ class Menu:
                 " your own: feelahead/lab/README.md.\n"
             )
             return 0
-        name, *rest = arguments
+        try:
+            return self._answer(*arguments)
+        except KeyboardInterrupt:  # before its first cell, or after its last one
+            sys.stderr.write(f"feelahead {self.name} {arguments[0]}: interrupted\n")
+            return 130
+
+    def _answer(self, name: str, *rest: str) -> int:
         if name in self.questions:
             return self._ask(f"feelahead.lab.questions.{name}", name, rest)
         if not name.endswith(".py"):

@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
 from common.clock import Clock, MonotonicClock, VirtualClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
 from common.files.output_file import require_output_file
-from feelahead.commands.calibration_screen import calibration_lines, calibration_screen
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, write_calibration
 from operator_side.dualsense.hid.device import load_backend
@@ -26,6 +28,7 @@ from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.simulated_person.calibrating_hands import CalibratingHands
 
 _POLL_S = 0.002
@@ -162,3 +165,49 @@ class _Screen:
             sys.stdout.write(f"{procedure.complaint or procedure.step.value}\n")
             sys.stdout.flush()
         self._said = said
+
+
+_BAR = 40
+_STEPS = len(Step) - 1
+"""The steps that a person has to do."""
+
+
+def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) -> RenderableType:
+    """Draw the present step, and live bars of the controller's report."""
+    number = list(Step).index(procedure.step) + 1
+    table = Table.grid(padding=(0, 2))
+    for name, raw in (("L2", state.l2), ("R2", state.r2)):
+        table.add_row(name, ProgressBar(total=1.0, completed=raw, width=_BAR), f"{raw:.2f}")
+    for name, (x, y) in (("left stick", state.left_stick), ("right stick", state.right_stick)):
+        table.add_row(name, _dot(x), f"{x:+.2f} {y:+.2f}")
+    table.add_row("this step", ProgressBar(total=1.0, completed=procedure.progress, width=_BAR), "")
+    heading = Text(f"{min(number, _STEPS)}/{_STEPS}  {procedure.step.value}", style="bold")
+    complaint = Text(procedure.complaint or " ", style="yellow")
+    return Group(heading, complaint, table)
+
+
+def calibration_lines(calibration: TravelCalibration) -> list[str]:
+    """The result for people, a line each."""
+    return [
+        _trigger_line("L2", calibration.l2),
+        _trigger_line("R2", calibration.r2),
+        _stick_line("left stick", calibration.left_stick),
+        _stick_line("right stick", calibration.right_stick),
+    ]
+
+
+def _trigger_line(name: str, trigger: TriggerTravel) -> str:
+    return (
+        f"{name:<12} released to {trigger.dead_zone:.3f}, full from {trigger.saturation:.3f}; a full pull reaches"
+        f" {trigger.reachable_zones} of 10 zones"
+    )
+
+
+def _stick_line(name: str, stick: StickRest) -> str:
+    return f"{name:<12} rests at ({stick.x:+.3f}, {stick.y:+.3f}), dead zone {stick.dead_zone:.3f}"
+
+
+def _dot(x: float) -> Text:
+    """A stick's sideways deflection, -1 to 1, as a mark on a line."""
+    place = round(0.5 * (x + 1.0) * (_BAR - 1))
+    return Text("─" * place + "●" + "─" * (_BAR - 1 - place))

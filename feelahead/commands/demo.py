@@ -4,7 +4,7 @@ import contextlib
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -40,6 +40,8 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "telemetry"),
 )
 """The streams between the two sides."""
+_SHARED = ("link", "link_model", "asymmetry", "seed", "realtime")
+"""Flags of both sides."""
 _ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
 
 
@@ -170,44 +172,38 @@ def _too_slow(settings: DemoSettings) -> str | None:
 
 
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
-    arguments = [*_shared_arguments(settings, given, summary), "--bind=tcp://127.0.0.1:0"]
     # A file says itself whether it permits that.
-    arguments.append("--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}")
-    for name in ("scene", "model", "site", "probability", "assist", "law"):
-        if name in given:
-            arguments.append(f"--{name}={getattr(settings, name)}")
-    return arguments
+    config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
+    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
+    return [*_files(settings, summary), "--bind=tcp://127.0.0.1:0", config, *own]
 
 
 def _operator_arguments(
     settings: DemoSettings, given: Collection[str], summary: Path, listening: dict[str, Any]
 ) -> list[str]:
-    arguments = [*_shared_arguments(settings, given, summary), "--device=simulated"]
+    arguments = [*_files(settings, summary), "--device=simulated"]
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
     arguments += [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
-    arguments += ["--console" if settings.console else "--no-console", f"--console-port={settings.console_port}"]
     if settings.tui or settings.status == "facts":
         arguments.append("--status=facts")
-    if "compensation" in given:
-        arguments.append(f"--compensation={settings.compensation}")
-    if "haptics" in given:
-        arguments.append("--haptics" if settings.haptics else "--no-haptics")
-    return arguments
+    always = (*given, "console", "console_port")
+    return [*arguments, *_flags(settings, always, *_SHARED, "console", "console_port", "compensation", "haptics")]
 
 
-def _shared_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
+def _files(settings: DemoSettings, summary: Path) -> list[str]:
+    """The files that a side writes; one recorder listens to both."""
+    recorded = [] if settings.record is None else [f"--record={summary.with_name('recorder')}"]
+    return [*recorded, f"--summary={summary}"]
+
+
+def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Iterator[str]:
     """Pass on the flags that were given: elsewhere the sides' own files count."""
-    arguments = [
-        f"--{name.replace('_', '-')}={getattr(settings, name)}"
-        for name in ("link", "link_model", "asymmetry", "seed")
-        if name in given
-    ]
-    if "realtime" in given:
-        arguments.append("--realtime" if settings.realtime else "--no-realtime")
-    if settings.record is not None:
-        arguments.append(f"--record={summary.with_name('recorder')}")  # where one recorder listens to both
-    return [*arguments, f"--summary={summary}"]
+    for name in names:
+        if name in given:
+            flag, value = name.replace("_", "-"), getattr(settings, name)
+            switch = f"--{flag}" if value else f"--no-{flag}"
+            yield switch if isinstance(value, bool) else f"--{flag}={value}"
 
 
 def _watch(

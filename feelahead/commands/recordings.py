@@ -48,15 +48,15 @@ class ExportSettings:
     """Turn a recording into files that other programs read.
 
     csv, parquet: a folder with a file for each topic at its own rate, and one of everything joined at 100 Hz.
-    lerobot: a LeRobot dataset, v3.0, of one episode at 30 Hz. mcap: what is whole of a file that was cut off.
+    lerobot: a LeRobot dataset, v3.0, of one episode at 30 Hz.
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
-    format: Literal["csv", "parquet", "lerobot", "mcap"] = "csv"
+    format: Literal["csv", "parquet", "lerobot"] = "csv"
     """The format to write."""
     out: Path | None = None
-    """A new or empty folder, or for mcap a file; unless given, beside the recording, named after it."""
+    """A new or empty folder; unless given, beside the recording, named after it."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ def _open(path: Path | None) -> Recording:
     if path is None:
         raise ConfigurationError("no recording given; valid: the path of a file that --record made")
     recording = open_recording(path)
-    if recording.readable is not None or not recording.whole:
-        why = "is damaged" if recording.readable is not None else "was cut off"
+    if recording.damaged or not recording.whole:
+        why = "is damaged" if recording.damaged else "was cut off"
         sys.stderr.write(f"feelahead: {path}: {why}; what can be read of it: {recording.length_s():.1f} s\n")
     return recording
 
@@ -127,26 +127,19 @@ def export(arguments: Sequence[str]) -> int:
     """Write the files."""
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
     with _recording(settings.file) as recording:
-        if settings.format == "mcap":
-            from common.recording.mending import mend  # noqa: PLC0415
-
-            out = settings.out or recording.path.with_name(f"{recording.path.stem}-whole.mcap")
-            said = f"{out}: {mend(recording.path, out)} messages"
-        else:
-            if settings.format != "csv":
-                require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")
-            beside = recording.path.with_name(f"{recording.path.stem}-{settings.format}")
-            folder = _empty_folder(settings.out or beside)
-            said = f"{folder}: {_export(settings.format, recording, folder)}"
-    sys.stdout.write(f"{said}\n")
+        if settings.format != "csv":
+            require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")
+        beside = recording.path.with_name(f"{recording.path.stem}-{settings.format}")
+        folder = _empty_folder(settings.out or beside)
+        said = _export(settings.format, recording, folder)
+    sys.stdout.write(f"{folder}: {said}\n")
     return 0
 
 
 def _export(kind: str, recording: Recording, folder: Path) -> str:
     """Write a folder of tables, and say what was written."""
-    from feelahead.recordings.export_tables import export_csv, export_parquet  # noqa: PLC0415
     from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
-    from feelahead.recordings.tables import read_tables  # noqa: PLC0415
+    from feelahead.recordings.tables import export_csv, export_parquet, read_tables  # noqa: PLC0415
 
     tables = read_tables(recording)
     if kind == "lerobot":

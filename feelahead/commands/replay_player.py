@@ -14,8 +14,7 @@ from common.command.stop_signal import StopSignal
 from common.recording.reading import Recording
 from feelahead.both_sides.summary import both_statuses
 from feelahead.commands.open_browser import show_address
-from feelahead.recordings.playback import Playback
-from feelahead.recordings.showing import FACTS, ROBOT, VIEW, Seen
+from feelahead.recordings.playback import FACTS, ROBOT, VIEW, Playback, Seen
 from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
 from operator_side.terminal_view.status import TerminalStatus

@@ -65,14 +65,20 @@ def live(
 ) -> None:
     """One controller from plug to unplug; DeviceError when the kernel lets it go."""
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
-    controller = _Narrated(say, transport, Model.EDGE if settings.edge else Model.DUALSENSE)
+    controller = _Narrated(transport, Model.EDGE if settings.edge else Model.DUALSENSE, say)
     told = UhidIdentity(transport, controller.model, controller.address)
     offered = UhidController(controller, told)
     start_s = clock.now()
-    driver = _DriverWatch(offered, start_s, say)
+    driven, patient = False, True
 
     def going(now_s: float) -> bool:
-        driver.look(now_s)
+        nonlocal driven, patient
+        if offered.driven != driven:
+            driven, patient = offered.driven, False
+            say("a driver has taken it" if driven else "its driver has let it go")
+        if patient and now_s > start_s + DRIVER_PATIENCE_S:
+            patient = False
+            say("no driver has taken it so far: sudo modprobe hid-playstation")
         if settings.hands == "pulling":
             l2_n, r2_n, stick = pulling(now_s - start_s)
             controller.set_finger_force(l2_n, r2_n)
@@ -85,52 +91,31 @@ def live(
     say(f"unplugged: {counts.inputs} reports sent, {counts.outputs} taken, {counts.refused} refused")
 
 
-class _DriverWatch:
-    """Says whether a driver has the controller."""
-
-    def __init__(self, offered: UhidController, start_s: float, say: Say) -> None:
-        self._offered = offered
-        self._say = say
-        self._patient_until_s: float | None = start_s + DRIVER_PATIENCE_S
-        self._driven = False
-
-    def look(self, now_s: float) -> None:
-        """Say what has changed."""
-        if self._offered.driven != self._driven:
-            self._driven, self._patient_until_s = self._offered.driven, None
-            self._say("a driver has taken it" if self._driven else "its driver has let it go")
-        if self._patient_until_s is not None and now_s > self._patient_until_s:
-            self._patient_until_s = None
-            self._say("no driver has taken it so far: sudo modprobe hid-playstation")
-
-
 class _Narrated(SimulatedDualSense):
-    """The controller, which says what every output report from the kernel changes."""
+    """A controller that says what every output report changes."""
 
-    def __init__(self, say: Say, transport: Transport, model: Model) -> None:
+    def __init__(self, transport: Transport, model: Model, say: Say) -> None:
         super().__init__(transport, model)
         self._say = say
-        self._shown = self._doing()
+        self._last_words = self._state_in_words()
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Take the report, and say the changes."""
+        """Take it, and say the changes."""
         super().take_report(report, now_s)
-        told = self._doing()
+        told = self._state_in_words()
         for part, doing in told.items():
-            if doing != self._shown[part]:
+            if doing != self._last_words[part]:
                 self._say(f"{part}: {doing}")
-        self._shown = told
+        self._last_words = told
 
-    def _doing(self) -> dict[str, str]:
+    def _state_in_words(self) -> dict[str, str]:
         l2, r2 = self.effects
-        rumble, output = self.rumble, self.output
+        light = self.output.lightbar
         return {
             "L2": described(l2),
             "R2": described(r2),
-            "rumble": f"left {rumble.left:.0%}, right {rumble.right:.0%}",
-            "lightbar": "as it was"
-            if output.lightbar is None
-            else "red {}, green {}, blue {}".format(*output.lightbar),
+            "rumble": f"left {self.rumble.left:.0%}, right {self.rumble.right:.0%}",
+            "lightbar": "as it was" if light is None else "red {}, green {}, blue {}".format(*light),
         }
 
 

@@ -1,9 +1,8 @@
-"""Make every figure of the documents anew, by the commands beside them, and say which changed: `make figures`.
+"""Make every figure of the documents again, by the commands beside them: `make figures`.
 
 A command is an indented line of a page that names a place in docs/ or is `make pictures`; a backslash continues it.
 """
 
-import hashlib
 import os
 import re
 import subprocess
@@ -14,8 +13,6 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
@@ -23,7 +20,6 @@ from feelahead.lab.progress import progress
 
 _ROOT: Final = Path(__file__).parents[2]
 _COMMAND: Final = re.compile(r"^    ((?:feelahead |python -m |make )(?:.*\\\n)*.*)$", re.MULTILINE)
-_PICTURES: Final = (".png", ".svg", ".webp")
 
 
 @dataclass(frozen=True)
@@ -47,39 +43,26 @@ def commands(docs: Path) -> Iterator[str]:
     yield from found
 
 
-def pictures(docs: Path) -> dict[str, str]:
-    """Hash every picture of the documents, by its path."""
-    paths = sorted(path for path in docs.rglob("*") if path.suffix in _PICTURES)
-    return {path.relative_to(docs.parent).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
-
-
 def make_figures(arguments: Sequence[str]) -> int:
-    """Run the commands, and say what changed; 1 where a command failed."""
+    """Run the commands; 1 where one failed."""
     settings = parse_settings(DocsFigures, "make figures", arguments)
     docs = _ROOT / "docs"
     if not docs.is_dir():
         raise ConfigurationError("there are no documents here; valid: a clone of the repository")
     wanted = [line for line in commands(docs) if not settings.only or any(text in line for text in settings.only)]
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False, markup=False)
     if settings.list:
-        console.print("\n".join(wanted), soft_wrap=True)
+        sys.stdout.write("\n".join(wanted) + "\n")
         return 0
     # The same interpreter's console scripts come first.
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-    shown, failed = Table("figure", "is", "command"), False
-    with progress("figures", float(len(wanted) or 1)) as advance:
+    failed: list[str] = []
+    with progress("figures", float(len(wanted) or 1)) as shown:
         for command in wanted:
-            before = pictures(docs)
+            shown.begin(command)
             done = subprocess.run(command, shell=True, cwd=_ROOT, env=environment, check=False)  # noqa: S602  # ours
-            failed |= done.returncode != 0
-            after = pictures(docs)
-            named = [path for path in after if path in command or before.get(path) != after[path]]
-            for path in named or ["-"]:
-                same = "the same" if before.get(path) == after.get(path) else "changed"
-                change = "failed" if done.returncode else same
-                shown.add_row(path, change, command)
-            advance(1.0)
-    console.print(shown)
+            failed += [f"failed: {command}\n"] if done.returncode else []
+            shown.advance(1.0)
+    sys.stdout.write("".join(failed))
     return 1 if failed else 0
 
 

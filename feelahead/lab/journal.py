@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from common.errors import ConfigurationError, FeelaheadError
@@ -43,16 +42,14 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._file is not None:
             self._file.close()
 
     def keep(self, key: str, rows: list[Row]) -> None:
-        """Write one finished piece; FeelaheadError when the disk does not take it."""
-        self._write(json.dumps({"key": key, "rows": rows}).encode())
+        """Write one finished piece, which is done even when the disk does not take it: FeelaheadError then."""
         self.done[key] = rows
+        self._write(json.dumps({"key": key, "rows": rows}).encode())
 
     def _load(self, path: Path, file: FileIO, first: bytes) -> None:
         file.seek(0)

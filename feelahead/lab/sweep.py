@@ -5,20 +5,15 @@ order, progress, workers or a cluster, a journal that survives kill -9, CSV and 
 is the same to the byte for any number of workers and after any interruption: rows stand in the order of the grid.
 """
 
-import contextlib
 import functools
 import hashlib
-import importlib
-import json
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, as_completed
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
 
-import msgspec
 import numpy as np
 import tyro
 from msgspec import Meta
@@ -29,20 +24,19 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.files.output_file import require_output_file, write_json
 from common.limits import check_limits
 from common.recording.provenance import provenance
-from feelahead.lab.executors import LostWorkersError, cluster, processes
 from feelahead.lab.figures import PICTURES
 from feelahead.lab.goals import Goal, show_goals
 from feelahead.lab.journal import Journal
+from feelahead.lab.pieces import Piece, results
 from feelahead.lab.progress import progress
 from feelahead.lab.table import Row, Table
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
-_RESTARTS = 3
-"""How often a pool is started again after one of its processes was killed."""
-_WORKERS = 2
 _MOST_RUNS = 10_000_000
 _SCHEDULER = re.compile(r"[a-z]+://[^/:]+:\d{1,5}")
+_INTERRUPTED = 130
+"""The exit code that shells give a command that Ctrl-C has ended."""
 _WIDTH = 200
 """Columns of output that no terminal shows."""
 
@@ -66,7 +60,7 @@ class Sweep:
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """Write the table there, and settings, versions and hashes to FILE.csv.json beside it."""
     parquet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.parquet")] = None
-    """The same as Parquet."""
+    """Write the same as Parquet."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write all figures there, lists included: those of the one run, or of several as `runs`."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
@@ -133,54 +127,59 @@ class Question(Generic[S, C]):
     """Do once what each worker would do otherwise, such as compiling kernels."""
 
 
-@dataclass(frozen=True)
-class _Piece:
-    """One cell with one seed."""
-
-    cell: Any
-    seed: int
-
-    @functools.cached_property
-    def key(self) -> str:
-        """Name it in the journal; equal for equal cells, whatever else the grid holds."""
-        return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
-
-    @property
-    def columns(self) -> Row:
-        """Return the scalars of the cell, and the seed."""
-        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
-        return scalars | {"seed": self.seed}
-
-    def __str__(self) -> str:
-        return ", ".join(f"{name} {value}" for name, value in self.columns.items())
-
-
 def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
-    """Answer a question from the command line; return 0 when every cell gave its rows."""
+    """Answer a question from the command line; return 0 when every cell gave its rows, 130 after Ctrl-C."""
     settings = parse_settings(question.settings, f"feelahead {question.name}", arguments)
     if settings.picture is not None and question.draw is None:
         raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
-    table, failures, left = sweep(question, settings)
-    _write(question, settings, table)  # before anything is printed: a reader may leave early, as `head` does
+    done = sweep(question, settings)
+    try:
+        _write(question, settings, done.table)  # before anything is printed: a reader may leave early, as `head` does
+    finally:
+        _show(question, settings, done)
+    if done.ended is not None:
+        goes_on = f"the same command with --resume {settings.resume} goes on"
+        if settings.resume is None:
+            goes_on = "with --resume FILE.jsonl from the start, the same command goes on"
+        sys.stderr.write(f"feelahead {question.name}: {done.ended}; {done.left} runs are left; {goes_on}\n")
+    if done.interrupted:
+        return _INTERRUPTED
+    failed = done.failures or done.ended or any(question.failed(row) for row in done.table)
+    return 1 if failed else 0
+
+
+def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
+    """Print what people read of the rows that there are."""
     console = Console(width=None if sys.stdout.isatty() else _WIDTH, highlight=False, markup=False)
-    if len(table):
-        for shown in question.show(settings, table):
+    if len(done.table):
+        for shown in question.show(settings, done.table):
             console.print(shown)
-        show_goals(console, question.goals(settings, table))
-    for line in failures:
+        show_goals(console, question.goals(settings, done.table))
+    for line in done.failures:
         console.print(f"failed: {line}", soft_wrap=True)
-    if left:
-        console.print(f"interrupted: {left} runs are left")
     if frozen := question.frozen(settings):
         console.print(f"frozen scenes and limits: {frozen}")
-    return 1 if failures or left or any(question.failed(row) for row in table) else 0
 
 
-def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]:
-    """Run all that the journal does not hold; return the table, a line for each failure, and how many runs are left.
+@dataclass(frozen=True)
+class Swept:
+    """Hold what came of a sweep."""
 
-    A cell that raises FeelaheadError fails by itself. Ctrl-C ends the sweep with what is done. ConfigurationError for
-    a grid that cannot be run, LostWorkersError when workers were killed again and again.
+    table: Table
+    failures: list[str]
+    """A line for each cell that failed."""
+    left: int
+    """Number of runs that are neither finished nor failed."""
+    ended: str | None = None
+    """Why it ended before its time."""
+    interrupted: bool = False
+
+
+def sweep(question: Question[S, C], settings: S) -> Swept:
+    """Run all that the journal does not hold.
+
+    A cell that raises FeelaheadError fails by itself. Ctrl-C, workers that are killed again and again and a journal
+    that cannot be written end the sweep with what is done. ConfigurationError for a grid that cannot be run.
     """
     if question.timed and (settings.scheduler or settings.workers not in (None, 1)):
         flag = f"--scheduler {settings.scheduler}" if settings.scheduler else f"--workers {settings.workers}"
@@ -190,33 +189,43 @@ def sweep(question: Question[S, C], settings: S) -> tuple[Table, list[str], int]
     if not 0 < len(cells) * len(seeds) <= _MOST_RUNS:
         valid = f"one value or more of each setting, and at most {_MOST_RUNS} runs"
         raise ConfigurationError(f"{len(cells)} cells with {len(seeds)} seeds each; valid: {valid}")
-    order = [_Piece(cell, seed) for cell in cells for seed in seeds]
+    order = [Piece(cell, seed) for cell in cells for seed in seeds]
     made_by = {"question": question.name, "code": code_hash(question), "frozen": question.frozen(settings)}
     failures: list[str] = []
+    ended, interrupted = None, False
     with Journal(settings.resume, made_by) as journal:
         # Seed by seed, so that an interrupted sweep has something of every cell.
         todo = sorted((piece for piece in order if piece.key not in journal.done), key=lambda piece: piece.seed)
-        with progress(question.name, float(len(todo) or 1)) as advance, contextlib.suppress(KeyboardInterrupt):
-            for piece, found in _results(question, settings, todo):
-                if isinstance(found, str):
-                    failures.append(f"{piece}: {found}")
-                else:
-                    journal.keep(piece.key, found)
-                advance(1.0)
+        try:
+            with progress(question.name, float(len(todo) or 1)) as shown:
+                for piece, found in results(question, settings, todo, shown):
+                    if isinstance(found, str):
+                        failures.append(f"{piece}: {found}")
+                    else:
+                        journal.keep(piece.key, found)
+                    shown.advance(1.0)
+        except KeyboardInterrupt:
+            interrupted = True
+        except ConfigurationError:
+            raise
+        except FeelaheadError as error:
+            ended = str(error)
         rows = [row for piece in order for row in journal.done.get(piece.key, ())]
         left = sum(piece.key not in journal.done for piece in order) - len(failures)
-    return Table(rows), failures, left
+        if interrupted:
+            ended = f"interrupted; {len(order) - left} of {len(order)} runs are finished"
+    return Swept(Table(rows), failures, left, ended, interrupted)
 
 
 def generator(cell: object, seed: int) -> np.random.Generator:
     """Make the random numbers of one cell and seed: the same in any order, and independent of other cells."""
-    digest = hashlib.sha256(_Piece(cell, seed).key.encode()).digest()
+    digest = hashlib.sha256(Piece(cell, seed).key.encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
 
 @functools.cache
 def _code_hash(own: Path) -> str:
-    """Hash the code that figures come from: the packages', and the question's own file wherever it lies."""
+    """Hash the code that figures come from: the packages', and the question's own file."""
     digest = hashlib.sha256(own.read_bytes())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*.py")):
@@ -227,52 +236,6 @@ def _code_hash(own: Path) -> str:
 def code_hash(question: Question[Any, Any]) -> str:
     """Hash the code that a question's figures come from."""
     return _code_hash(Path(question.run.__code__.co_filename))
-
-
-def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
-    """Run one cell of the question in `module`, here or in a worker; what failed is said as a line."""
-    question: Question[Any, Any] = importlib.import_module(module).QUESTION
-    columns = _Piece(cell, seed).columns
-    try:
-        rows = [columns | row for row in question.run(cell, seed)]
-    except ConfigurationError:
-        raise
-    except FeelaheadError as error:
-        return str(error)
-    # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
-    plain: list[Row] = json.loads(json.dumps(rows, default=_of_numpy))
-    return plain
-
-
-def _results(question: Question[S, C], settings: S, todo: Sequence[_Piece]) -> Iterator[tuple[_Piece, list[Row] | str]]:
-    """Yield the pieces with what came of them, as they end."""
-    module = question.run.__module__
-    if not todo:
-        return
-    if question.timed or (settings.scheduler is None and (settings.workers == 1 or len(todo) == 1)):
-        for piece in todo:
-            yield piece, run_piece(module, piece.cell, piece.seed)
-        return
-    if settings.scheduler is None:
-        question.prepare()
-    left, lost = list(todo), 0
-    while left:
-        before = len(left)
-        pool = cluster(settings.scheduler) if settings.scheduler else processes(settings.workers or _WORKERS)
-        try:
-            with pool as executor:
-                futures: dict[Future[list[Row] | str], _Piece] = {
-                    executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
-                }
-                for future in as_completed(futures):
-                    found = future.result()
-                    left.remove(futures[future])
-                    yield futures[future], found
-        except LostWorkersError as error:
-            lost += 1
-            if settings.scheduler or lost > _RESTARTS or len(left) == before:
-                kept = f"run again, --resume {settings.resume} goes on" if settings.resume else "valid: with --resume"
-                raise LostWorkersError(f"{error}; {len(left)} runs are left; {kept}") from error
 
 
 def _write(question: Question[S, C], settings: S, table: Table) -> None:
@@ -294,16 +257,3 @@ def _write(question: Question[S, C], settings: S, table: Table) -> None:
     if settings.picture is not None and question.draw is not None and len(table):
         question.draw(settings, table, settings.picture)
     question.also(settings, table)
-
-
-def _of_numpy(value: Any) -> Any:
-    """Turn numbers and arrays of NumPy into plain ones."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError(f"a row holds {value!r}; valid: numbers, texts, lists and None")
-
-
-def _plain(cell: object) -> dict[str, Any]:
-    """Turn a cell into what JSON has."""
-    plain: dict[str, Any] = msgspec.to_builtins(cell, enc_hook=str)
-    return plain

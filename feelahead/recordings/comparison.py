@@ -1,5 +1,6 @@
 """Compare a core's second output with the first: equal bit for bit, or the largest difference."""
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -55,7 +56,7 @@ class Comparison:
             return
         eighths, metres = math.inf, 0.0
         if first is not None and second is not None:
-            eighths, metres = _report_difference(first, second) if report else _message_difference(first, second)
+            eighths, metres = _difference(first, second, report=report)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
 
@@ -88,7 +89,7 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
             )
             return
         yield from block.unpacked()
-    if recording.readable is not None:
+    if recording.damaged:
         notes.append("the file is damaged: compared up to there")
     elif not recording.whole:
         notes.append("the file was cut off: compared up to its last complete second")
@@ -96,16 +97,15 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
     """Name the origins in which this run differs from the recorded one: then bits may differ."""
-    differing = [name for name in present if recorded.get(name) != present[name]]
-    return [
-        f"recorded with {_difference(recorded.get(name), present[name], name)}: bits may differ" for name in differing
-    ]
-
-
-def _difference(recorded: object, present: object, name: str) -> str:
-    if isinstance(recorded, Mapping) and isinstance(present, Mapping):
-        return f"other {name}: {', '.join(key for key in recorded if recorded[key] != present.get(key))[:100]}"
-    return f"{name} {str(recorded)[:60]}, here {str(present)[:60]}"
+    notes = []
+    for name, here in present.items():
+        there = recorded.get(name)
+        if isinstance(there, Mapping) and isinstance(here, Mapping):
+            others = [key for key in there if there[key] != here.get(key)]
+            notes += [f"recorded with other {name}: {', '.join(others)[:100]}: bits may differ"] if others else []
+        elif there != here:
+            notes.append(f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: bits may differ")
+    return notes
 
 
 def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
@@ -127,14 +127,18 @@ def _is_stiffness(payload: bytes | None) -> bool:
         return False
 
 
-def _message_difference(first: bytes, second: bytes) -> tuple[float, float]:
+def _difference(first: bytes, second: bytes, *, report: bool) -> tuple[float, float]:
     """Eighths of strength and metres; infinite eighths where more differs than these."""
-    try:
+    with contextlib.suppress(RemoteProtocolError):
+        if report:
+            return _report_difference(parse_output_report(first), parse_output_report(second))
         one, other = decode(first), decode(second)
-    except RemoteProtocolError:
-        return math.inf, 0.0
-    if not isinstance(one, StiffnessUpdate) or not isinstance(other, StiffnessUpdate):
-        return math.inf, 0.0
+        if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
+            return _message_difference(one, other)
+    return math.inf, 0.0
+
+
+def _message_difference(one: StiffnessUpdate, other: StiffnessUpdate) -> tuple[float, float]:
     if (one.header, one.state) != (other.header, other.state):
         return math.inf, 0.0
     eighths, metres = [8.0 * abs(one.rumble - other.rumble)], [abs(one.horizon_m - other.horizon_m)]
@@ -145,20 +149,11 @@ def _message_difference(first: bytes, second: bytes) -> tuple[float, float]:
     return max(eighths), max(metres)
 
 
-def _report_difference(first: bytes, second: bytes) -> tuple[float, float]:
-    """Eighths of strength between two reports to a controller."""
-    try:
-        one, other = parse_output_report(first), parse_output_report(second)
-    except RemoteProtocolError:
-        return math.inf, 0.0
-    if _without_strengths(one) != _without_strengths(other):
-        return math.inf, 0.0
-    apart = [0.0]
+def _report_difference(one: OutputReport, other: OutputReport) -> tuple[float, float]:
+    apart = [0.0 if (one.rumble, one.lightbar) == (other.rumble, other.lightbar) else math.inf]
     for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
         if a is not None and b is not None:
             apart += [abs(x - y) for x, y in zip(a.zone_strengths, b.zone_strengths, strict=True)]
+        elif a is not b:
+            apart.append(math.inf)
     return max(apart), 0.0
-
-
-def _without_strengths(report: OutputReport) -> tuple[object, ...]:
-    return report.rumble, report.lightbar, report.l2 is None, report.r2 is None

@@ -19,11 +19,12 @@ _BLUE, _ORANGE, _GREEN, _PURPLE, _GREY = "#0072B2", "#D55E00", "#009E73", "#CC79
 _STATES: Final = {"armed": "#DDEEDD", "stopped": "#F6D5CC", "disarmed": "#EEEEEE"}
 _FULL: Final = 8.0
 _HEIGHTS: Final = (1.3, 1.1, 1.1, 1.0, 1.0, 1.0, 1.0)
+_STYLE: Final[Any] = {
+    **{"font.size": 7.5, "axes.titlesize": 8, "axes.titlelocation": "left", "svg.fonttype": "none"},
+    **{"axes.spines.top": False, "axes.spines.right": False},
+    **{"legend.framealpha": 0.8, "legend.edgecolor": "none", "legend.fontsize": 6.5},
+}
 _SIDES: Final = (("r2", "R2 (advances)", _ORANGE), ("l2", "L2 (retreats)", _BLUE))
-
-
-def _when(recording: Recording) -> str:
-    return datetime.fromtimestamp(1e-9 * recording.began_ns(), UTC).isoformat(sep=" ", timespec="seconds")
 
 
 def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
@@ -32,63 +33,38 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
 
     mpl.use("Agg")
     from matplotlib import pyplot  # noqa: PLC0415
+    from matplotlib.patches import Patch  # noqa: PLC0415
 
     joined = tables.joined(PLOT_HZ)
     times_s = np.array(joined.times_s)
-    style: Any = {
-        "font.size": 7.5,
-        "axes.titlesize": 8,
-        "axes.titlelocation": "left",
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.framealpha": 0.8,
-        "legend.edgecolor": "none",
-        "legend.fontsize": 6.5,
-        "svg.fonttype": "none",
-    }
-    panels: list[Callable[[Any, Any, Table, FloatArray], None]] = [
-        _ways,
-        _felt("r2", "R2"),
-        _felt("l2", "L2"),
-        _speed,
-        _enlargement,
-        _distances,
-        _delays,
-    ]
-    with mpl.rc_context(style):
-        figure, axes = pyplot.subplots(
-            len(panels),
-            1,
-            sharex=True,
-            figsize=_INCHES,
-            height_ratios=_HEIGHTS,
-            layout="constrained",
-        )
+    panels: list[Callable[[Any, Any, Table, FloatArray], None]] = [_ways, _felt("r2", "R2"), _felt("l2", "L2")]
+    panels += [_speed, _enlargement, _distances, _delays]
+    with mpl.rc_context(_STYLE):
+        layout: Any = {"figsize": _INCHES, "height_ratios": _HEIGHTS, "layout": "constrained"}
+        figure, axes = pyplot.subplots(len(panels), 1, sharex=True, **layout)
         for axis, draw in zip(axes, panels, strict=True):
             _bands(axis, joined, times_s)
             draw(figure, axis, joined, times_s)
             axis.margins(x=0)
         axes[-1].set_xlabel("time since the recording began (s)")
-        _name_lines(axes[0], 2)
+        for axis, columns in ((axes[0], 2), (axes[3], 2), (axes[5], 2), (axes[6], 4)):
+            if axis.get_legend_handles_labels()[0]:  # a short run may have none
+                axis.legend(loc="upper right", ncols=columns)
+        bands = [Patch(color=color, label=state) for state, color in _STATES.items()]
         figure.align_ylabels()
         figure.suptitle(_title(recording, tables), fontsize=8.5, x=0.01, ha="left")
-        figure.legend(handles=_band_handles(), loc="upper right", title="state of the robot side", fontsize=7)
+        figure.legend(handles=bands, loc="upper right", title="state of the robot side", fontsize=7)
         figure.savefig(out, dpi=200)
         pyplot.close(figure)
-
-
-def _name_lines(axis: Any, columns: int) -> None:
-    """Say which line is which, where there are any: a short run may have none."""
-    if axis.get_legend_handles_labels()[0]:
-        axis.legend(loc="upper right", ncols=columns)
 
 
 def _title(recording: Recording, tables: Tables) -> str:
     header = next(iter(recording.headers.values()))
     settings = recording.headers.get("robot", header)["settings"]
     links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
+    when = datetime.fromtimestamp(1e-9 * recording.began_ns(), UTC).isoformat(sep=" ", timespec="seconds")
     told = [
-        f"{recording.path.name}: {tables.duration_s:.1f} s, {_when(recording)}",
+        f"{recording.path.name}: {tables.duration_s:.1f} s, {when}",
         f"emulated link: {'; '.join(sorted(links))}",
         f"scene {settings.get('scene') or settings.get('model') or 'table'}, law {settings.get('law', 'unknown')},"
         f" P {settings.get('probability', 'unknown')}, seed {settings.get('seed')},"
@@ -107,12 +83,6 @@ def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
             axis.axvspan(times_s[start], last_s, color=_STATES[str(states[start])], lw=0, zorder=0)
 
 
-def _band_handles() -> list[Any]:
-    from matplotlib.patches import Patch  # noqa: PLC0415
-
-    return [Patch(color=color, label=state) for state, color in _STATES.items()]
-
-
 def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     horizon_mm = 1e3 * joined.numbers("stiffness.horizon_m")
     for side, label, color in _SIDES:
@@ -123,8 +93,7 @@ def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         delta = 1e3 * joined.numbers(f"stiffness.{side}.displacement_m")
         axis.plot(times_s, delta, color=color, lw=0.7, ls=":", label=f"δ of {side.upper()}")
     axis.axhline(0.0, color=_GREY, lw=0.5)
-    axis.set_ylabel("way (mm)")
-    axis.set_title("Free ways until strengths are due; nothing drawn beyond the horizon")
+    axis.set(ylabel="way (mm)", title="Free ways until strengths are due; nothing drawn beyond the horizon")
 
 
 def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]:
@@ -146,45 +115,48 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
         # Seen on light and on dark.
         axis.plot(times_s, travel, color="white", lw=2.4)
         axis.plot(times_s, travel, color="black", lw=1.0)
-        axis.set_ylim(0.0, 1.0)
-        axis.set_ylabel("raw travel")
-        axis.set_title(f"{name}: the finger's travel, and the strength of its tenths as written to the controller")
+        title = f"{name}: the finger's travel, and the strength of its tenths as written to the controller"
+        axis.set(ylim=(0.0, 1.0), ylabel="raw travel", title=title)
         bar = figure.colorbar(shown, cax=axis.inset_axes((1.01, 0.0, 0.012, 1.0)), ticks=[0, 4, 8])
         bar.set_label("strength")
 
     return draw
 
 
+def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, float, str, str]) -> None:
+    """Draw columns, each with its factor, colour and label; one that a recording does not have is left out."""
+    for column, factor, color, label in curves:
+        values = factor * joined.numbers(column)
+        if np.isfinite(values).any():
+            axis.plot(times_s, values, color=color, lw=0.8, ls="--" if label == "told" else "-", label=label)
+
+
 def _speed(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
-    axis.plot(times_s, 1e3 * joined.numbers("stiffness.speed_m_s"), color=_ORANGE, lw=0.9, label="measured")
-    axis.plot(times_s, 1e3 * joined.numbers("stiffness.told_m_s"), color=_GREY, lw=0.7, ls="--", label="told")
+    measured = ("stiffness.speed_m_s", 1e3, _ORANGE, "measured")
+    _curves(axis, joined, times_s, measured, ("stiffness.told_m_s", 1e3, _GREY, "told"))
     axis.axhline(0.0, color=_GREY, lw=0.5)
-    axis.set_ylabel("speed (mm/s)")
-    axis.set_title("Speed along the approach")
-    _name_lines(axis, 2)
+    axis.set(ylabel="speed (mm/s)", title="Speed along the approach")
 
 
 def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
-    total_mm = 1e3 * joined.numbers("telemetry.enlargement_m")
-    axis.plot(times_s, total_mm, color="black", lw=0.9, label="enlargement (eq. 10)")
-    for name, color in (("sigma_m", _GREEN), ("mean_m", _GREY)):
-        terms = 1e3 * joined.numbers(f"enlargement.r2.{name}")
-        if np.isfinite(terms).any():
-            axis.plot(
-                times_s, terms, color=color, lw=0.7, label={"sigma_m": "D_σ of R2", "mean_m": "means of R2"}[name]
-            )
+    _curves(
+        axis,
+        joined,
+        times_s,
+        ("telemetry.enlargement_m", 1e3, "black", "enlargement (eq. 10)"),
+        ("enlargement.r2.sigma_m", 1e3, _GREEN, "D_σ of R2"),
+        ("enlargement.r2.mean_m", 1e3, _GREY, "means of R2"),
+    )
     of_objects = [column for column in joined.columns() if column.startswith("overlap.") and column.endswith("_mm3")]
     if of_objects:
         sums = np.nansum([joined.numbers(column) for column in of_objects], axis=0)
-        axis.plot(times_s, np.cbrt(sums), color=_PURPLE, lw=0.7, label="overlap, edge of a cube of it")
-    axis.set_ylabel("enlargement (mm)")
-    axis.set_title("Enlargement and its terms, overlap, and the strength s(δ) along each trigger")
+        axis.plot(times_s, np.cbrt(sums), color=_PURPLE, lw=0.8, label="overlap, edge of a cube of it")
+    title = "Enlargement and its terms, overlap, and the strength s(δ) along each trigger"
+    axis.set(ylabel="enlargement (mm)", title=title)
     other = axis.twinx()
-    for side, _label, color in _SIDES:
-        strength = joined.numbers(f"stiffness.{side}.stiffness")
-        other.plot(times_s, strength, color=color, lw=0.7, alpha=0.8, label=f"s(δ) of {side.upper()}")
-    other.set_ylim(0.0, 1.05)
-    other.set_ylabel("s(δ)")
+    strengths = [(f"stiffness.{side}.stiffness", 1.0, color, f"s(δ) of {side.upper()}") for side, _, color in _SIDES]
+    _curves(other, joined, times_s, *strengths)
+    other.set(ylim=(0.0, 1.05), ylabel="s(δ)")
     handles, labels = axis.get_legend_handles_labels()
     more, names = other.get_legend_handles_labels()
     # Of the upper one of the two, else its curves would run through the words; before it is armed there are none.
@@ -192,30 +164,26 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
 
 
 def _distances(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
-    axis.plot(times_s, joined.numbers("robot_status.nearest_mm"), color=_BLUE, lw=0.9, label="nearest obstacle")
-    axis.plot(times_s, joined.numbers("robot_status.target_mm"), color=_GREEN, lw=0.9, label="target")
-    axis.set_ylabel("distance (mm)")
-    axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
-    axis.set_title("Perceived distances of the unenlarged gripper")
-    _name_lines(axis, 2)
+    nearest = ("robot_status.nearest_mm", 1.0, _BLUE, "nearest obstacle")
+    _curves(axis, joined, times_s, nearest, ("robot_status.target_mm", 1.0, _GREEN, "target"))
+    title = "Perceived distances of the unenlarged gripper"
+    axis.set(ylabel="distance (mm)", ylim=(min(0.0, axis.get_ylim()[0]), None), title=title)
 
 
 def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
-    for column, color, label in (
-        ("ages.command_ms", _ORANGE, "command that moves the arm"),
-        ("ages.field_ms", _BLUE, "field that is felt"),
-        ("ages.frame_ms", _GREEN, "camera frame"),
-        ("robot_status.loop_age_ms", "black", "loop age that is reckoned with"),
-    ):
-        values = joined.numbers(column)
-        if np.isfinite(values).any():
-            axis.plot(times_s, values, color=color, lw=0.8, label=label)
+    _curves(
+        axis,
+        joined,
+        times_s,
+        ("ages.command_ms", 1.0, _ORANGE, "command that moves the arm"),
+        ("ages.field_ms", 1.0, _BLUE, "field that is felt"),
+        ("ages.frame_ms", 1.0, _GREEN, "camera frame"),
+        ("robot_status.loop_age_ms", 1.0, "black", "loop age that is reckoned with"),
+    )
     # From the worst case that is reckoned with at first one sees nothing.
     armed = np.array([row.get("stiffness.state") == "armed" for row in joined.rows], dtype=bool)
     settled = joined.numbers("robot_status.loop_age_ms")[armed]
     if np.isfinite(settled).any():
         axis.set_ylim(top=2.0 * float(np.nanmedian(settled)) + 10.0)
     axis.set_ylim(bottom=0.0)
-    axis.set_ylabel("age (ms)")
-    axis.set_title("How old what is used is")
-    _name_lines(axis, 4)
+    axis.set(ylabel="age (ms)", title="How old what is used is")

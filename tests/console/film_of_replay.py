@@ -10,8 +10,7 @@ import msgspec
 from PIL import Image
 
 from common.recording.reading import open_recording
-from feelahead.recordings.playback import Playback
-from feelahead.recordings.showing import FACTS, VIEW
+from feelahead.recordings.playback import FACTS, VIEW, Playback
 from operator_side.console.console import Console
 from operator_side.facts import OperatorFacts
 from tests.console.browser import Page, browser

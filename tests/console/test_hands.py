@@ -1,6 +1,6 @@
-"""The keyboard and a gamepad drive, and let go as soon as nobody means them."""
+"""The keyboard drives a real run, lets go, and stops it; test_hands_alone.py has all else."""
 
-from typing import Any, Final
+from typing import Any
 
 import pytest
 
@@ -9,12 +9,6 @@ from tests.console.run import Run
 
 LINK = ()
 pytestmark = [pytest.mark.console, pytest.mark.processes]
-
-
-_BUTTONS: Final = 17
-_RUN: Final = 4
-_PULL: Final = 7
-"""L1 and R2 among a standard gamepad's buttons."""
 
 
 def test_space_drives(browser: Browser, demo: Run) -> None:
@@ -28,35 +22,6 @@ def test_space_drives(browser: Browser, demo: Run) -> None:
                 page.picture("hands")
             demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
         demo.wait_until("disarmed or at rest", lambda run: not _runs(run), 5.0)
-
-
-def test_hidden_or_left_page_lets_go(browser: Browser, demo: Run) -> None:
-    """A window that loses the focus and a tab that is hidden hold nothing any more, keys down or not."""
-    for leave in (Page.blur, Page.hide):
-        with browser.page(demo.address) as page:
-            take_over(page, demo)
-            with page.held("Space"):
-                page.wait_for_text("#hands_state", "You drive", 15.0)
-                with page.held("KeyW"):
-                    demo.wait_until("pulled", lambda run: pull(run) > 0.1, 5.0)
-                    leave(page)
-                    demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
-
-
-def test_gamepad_drives(browser: Browser, demo: Run) -> None:
-    """A gamepad's trigger is a trigger."""
-    with browser.page(demo.address, gamepad=True) as page:
-        page.pretend_gamepad((0.0,) * 4, (0.0,) * _BUTTONS)
-        take_over(page, demo)
-        held = [0.0] * _BUTTONS
-        held[_RUN] = 1.0
-        page.pretend_gamepad((0.0,) * 4, tuple(held))
-        page.wait_for_text("#hands_state", "You drive", 15.0)
-        held[_PULL] = 0.6
-        page.pretend_gamepad((0.0,) * 4, tuple(held))
-        demo.wait_until("pulled", lambda run: pull(run) > 0.3, 5.0)
-        page.pretend_gamepad((0.0,) * 4, (0.0,) * _BUTTONS)
-        demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
 
 
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:

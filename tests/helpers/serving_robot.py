@@ -1,11 +1,6 @@
-"""A robot side without an arm: real sockets and the real session, in a thread or as a program.
+"""A robot side without an arm: real sockets and the real session, in a thread."""
 
-python serving_robot.py tcp://ADDRESS:PORT     until its standard input ends
-"""
-
-import sys
 import threading
-from types import TracebackType
 from typing import Self
 
 import msgpack
@@ -20,7 +15,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 
 LEASE_S = 59.0
-"""So that an owner who says nothing stays one."""
+"""Long enough for an owner who says nothing to stay one."""
 
 
 class ServingRobot:
@@ -31,7 +26,6 @@ class ServingRobot:
         bind: str = "tcp://127.0.0.1:0",
         keys: RobotKeys | None = None,
         *,
-        insecure: bool = False,
         answers: bool = True,
         publishes: bool = True,
         version: int = PROTOCOL_VERSION,
@@ -40,7 +34,7 @@ class ServingRobot:
         self.session = OperatorSession(
             lambda: LinkEnd("robot", 7, "a robot's"), Safety(safety or SafetySettings(lease_s=LEASE_S))
         )
-        self.sockets = RobotSockets(bind, keys=keys, insecure=insecure, heartbeat_timeout_s=30.0)
+        self.sockets = RobotSockets(bind, keys=keys, heartbeat_timeout_s=30.0)
         self.control, self.view = self.sockets.control_endpoint, self.sockets.view_endpoint
         self.payloads: list[bytes] = []
         self._answers, self._publishes, self._version = answers, publishes, version
@@ -52,9 +46,7 @@ class ServingRobot:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ends.set()
         self._thread.join()
         self.sockets.close()
@@ -95,9 +87,3 @@ class ServingRobot:
             r2=0.0,
         )
         return encode(message)
-
-
-if __name__ == "__main__":
-    with ServingRobot(sys.argv[1], insecure=True) as robot:
-        print(robot.control, flush=True)
-        sys.stdin.read()

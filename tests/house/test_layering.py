@@ -82,7 +82,6 @@ ARROWS = """
         operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands
         operator_side/simulated_person operator_side/terminal_view
 
-    feelahead/documents: common/* feelahead/documents
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -102,11 +103,11 @@ def _tell_of_link(link: LinkFacts, *, as_json: bool) -> int:
 def examine(seen: list[ControllerSeen] | None) -> list[Finding]:
     """Every check of this machine, in the order of the table."""
     platform, version = sys.platform, sys.version_info
-    rules, is_root = controllers.udev_rules(), controllers.is_root()
+    rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
     return [
         machine.check_python((version.major, version.minor, version.micro)),
         *(machine.check_extra(extra, failures) for extra, failures in machine.failed_imports().items()),
-        controllers.check_hidapi(platform, controllers.hid_facts()),
+        controllers.hidapi_finding(platform),
         controllers.check_permission(platform, is_root=is_root, rules=rules, controllers=seen or []),
         *controllers.check_controllers(seen),
         controllers.uhid_finding(platform),

@@ -21,18 +21,6 @@ _UHID: Final = "/dev/uhid"
 
 
 @dataclass(frozen=True)
-class HidFacts:
-    """The packages installed under hidapi's names."""
-
-    version: str | None
-    """The package hidapi's; None where it is not installed."""
-    packages_of_hid: tuple[str, ...]
-    """All that install a module called `hid`."""
-    trouble: str | None
-    """Why it cannot be used; None if it can."""
-
-
-@dataclass(frozen=True)
 class ControllerSeen:
     """A controller that the system has, and what it says of itself; None for what it does not say."""
 
@@ -46,21 +34,24 @@ class ControllerSeen:
     """Why it cannot be used, and what to do; None if it can."""
 
 
-def check_hidapi(platform: str, facts: HidFacts) -> Finding:
-    """Whether hidapi is there, and no other package in its place."""
+def check_hidapi(platform: str, version: str | None, packages: Sequence[str], trouble: str | None) -> Finding:
+    """Whether hidapi is there, and no other package in its place.
+
+    `version`: None where it is not installed; `packages`: all that install a module called `hid`; `trouble`: why it
+    cannot be used.
+    """
     name = "hidapi"
-    if facts.version is None:
+    if version is None:
         return Finding(name, Verdict.NOTE, "not installed (for a real controller)", "pip install 'feelahead[operator]'")
     again = "pip install --force-reinstall hidapi"
-    strangers = [package for package in facts.packages_of_hid if package.lower() != "hidapi"]
-    if strangers:
+    if strangers := [package for package in packages if package.lower() != "hidapi"]:
         # On Linux ours is the module hidraw, which nobody else brings.
-        verdict = Verdict.NOTE if platform == "linux" and facts.trouble is None else Verdict.MISSING
-        said = f"{facts.version}, but the package {' and '.join(strangers)} installs a module called hid, too"
+        verdict = Verdict.NOTE if platform == "linux" and trouble is None else Verdict.MISSING
+        said = f"{version}, but the package {' and '.join(strangers)} installs a module called hid, too"
         return Finding(name, verdict, said, f"pip uninstall {' '.join(strangers)} && {again}")
-    if facts.trouble is not None:
-        return Finding(name, Verdict.MISSING, facts.trouble, again)
-    return Finding(name, Verdict.OK, facts.version)
+    if trouble is not None:
+        return Finding(name, Verdict.MISSING, trouble, again)
+    return Finding(name, Verdict.OK, version)
 
 
 def check_permission(
@@ -76,32 +67,26 @@ def check_permission(
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
-        said = "not needed by root, who you are; what is below is for everybody else"
-        return Finding(name, Verdict.OK, said, remedy)
-    denied = any(seen.trouble is not None and "permission" in seen.trouble for seen in controllers)
+        return Finding(name, Verdict.OK, "not needed by root, who you are; what is below is for everybody else", remedy)
+    denied = any("permission" in (seen.trouble or "") for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
-    return Finding(
-        name, Verdict.MISSING if denied else Verdict.NOTE, f"none in {RULE_FILE} or elsewhere {opened}", remedy
-    )
+    verdict = Verdict.MISSING if denied else Verdict.NOTE
+    return Finding(name, verdict, f"none in {RULE_FILE} or elsewhere {opened}", remedy)
 
 
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
     """The models and transports that no rule in these files opens to the person at the machine."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
     granting = [line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line)]
-    patterns = {
-        f"a {model} on {transport}": pattern
-        for product, model in PRODUCT_IDS.items()
+    missing = []
+    for product, model in PRODUCT_IDS.items():
         for transport, pattern in (
             ("USB", rf'idProduct\}}\s*==\s*"{product:04x}"'),
             ("Bluetooth", rf'KERNELS\s*==\s*"[^"]*{SONY_VENDOR_ID:04X}:{product:04X}'),
-        )
-    }
-    return [
-        name
-        for name, pattern in patterns.items()
-        if not any(re.search(pattern, line, re.IGNORECASE) for line in granting)
-    ]
+        ):
+            if not any(re.search(pattern, line, re.IGNORECASE) for line in granting):
+                missing.append(f"a {model} on {transport}")
+    return missing
 
 
 def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Finding]:
@@ -140,19 +125,17 @@ def _described(seen: ControllerSeen) -> Finding:
 # Looking
 
 
-def hid_facts() -> HidFacts:
+def hidapi_finding(platform: str) -> Finding:
     """Look at what is installed under hidapi's names."""
-    try:
+    version = trouble = None
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         version = importlib.metadata.version("hidapi")
-    except importlib.metadata.PackageNotFoundError:
-        version = None
     try:
         load_backend()
-        trouble = None
     except NoDriverError as error:
         trouble = str(error)
     packages = importlib.metadata.packages_distributions().get("hid", [])
-    return HidFacts(version, tuple(sorted(set(packages))), trouble)
+    return check_hidapi(platform, version, sorted(set(packages)), trouble)
 
 
 def controllers_seen() -> list[ControllerSeen] | None:
@@ -175,23 +158,16 @@ def uhid_finding(platform: str) -> Finding:
     return check_uhid(platform, exists=Path(_UHID).exists(), writable=os.access(_UHID, os.R_OK | os.W_OK))
 
 
-def is_root() -> bool:
-    """Whether no permission is asked of us."""
-    return hasattr(os, "geteuid") and os.geteuid() == 0
-
-
 def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:
     name = os.fsdecode(path)
     try:
         device = HidDualSense(backend, path)
     except DeviceError as error:
         return ControllerSeen(model, name, trouble=str(error))
-    identity = device.identity
+    identity, firmware, battery = device.identity, None, None
     device.close()
-    firmware = battery = None
-    if identity.firmware is not None:
-        version, hardware = identity.firmware.firmware_version, identity.firmware.hardware_version
-        firmware = f"0x{version:08x} (hardware 0x{hardware:08x})"
+    if (told := identity.firmware) is not None:
+        firmware = f"0x{told.firmware_version:08x} (hardware 0x{told.hardware_version:08x})"
     with contextlib.suppress(RemoteProtocolError):
         state = parse_input_report(identity.first_report).battery
         battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"

@@ -11,7 +11,6 @@ from common.sockets.greeting import mechanism_of
 
 CONNECT_LIMIT_S: Final = 4.0
 """A second more than it takes Linux to find out that nobody on the network has an address."""
-_WITHOUT_KEYS, _WITH_KEYS = "NULL", "CURVE"
 _OTHERS: Final = {
     b"HTTP/": "an HTTP server",
     b"SSH-": "an SSH server",
@@ -106,13 +105,24 @@ def judge(facts: LinkFacts) -> Fault | None:
     if facts.unresolved is not None:
         said, _, valid = facts.unresolved.partition("; valid: ")
         return Fault(Wrong.NAME, said, f"say {valid}, in /etc/hosts for example")
-    return (
-        (facts.control_opening and _judge_port(facts, facts.control, facts.control_opening))
-        or (facts.talk and _judge_talk(facts, facts.talk))
-        or (facts.view_opening and _judge_view(facts, facts.view_opening))
-        or _judge_telemetry(facts)
-        or _judge_size(facts)
-    )
+    if facts.control_opening and (fault := _judge_port(facts, facts.control, facts.control_opening)):
+        return fault
+    if facts.talk and (fault := _judge_talk(facts, facts.talk)):
+        return fault
+    if facts.view_opening and (fault := _judge_port(facts, facts.view, facts.view_opening)):
+        remedy = f"{fault.remedy}; or {_VIEW_CONNECT}" if fault.wrong is Wrong.FIREWALL else _VIEW_CONNECT
+        return Fault(Wrong.VIEW, f"the control port works, but not the view port: {fault.said}", remedy)
+    if facts.telemetry is False:
+        no_port = f"{facts.view} is no view port of a robot side, or not of this one: it sends no telemetry"
+        return Fault(Wrong.VIEW, f"the control port works, but {no_port}", _VIEW_CONNECT)
+    if facts.large_arrive is False:
+        return Fault(
+            Wrong.LARGE,
+            f"small packets reach {facts.control}, large ones do not: the way swallows what is longer than it can "
+            "carry",
+            "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)",
+        )
+    return None
 
 
 def told(facts: LinkFacts) -> dict[str, object]:
@@ -148,80 +158,31 @@ def reached(facts: LinkFacts) -> str:
 
 
 def _judge_port(facts: LinkFacts, place: str, opening: Opening) -> Fault | None:
+    see_who = _see_who(place)
     if opening.error is not None:
         return _judge_error(facts, place, opening.error)
-    mechanism = mechanism_of(opening.said)
-    if mechanism is None:
-        return _judge_stranger(place, opening)
-    if facts.keys is None and mechanism == _WITH_KEYS:
-        return Fault(
-            Wrong.KEYS,
-            f"the robot side at {place} asks for keys, and none were given",
-            f"--keys FOLDER --robot-key KEY ({_STEPS})",
-        )
-    if facts.keys is not None and mechanism == _WITHOUT_KEYS:
-        return Fault(
-            Wrong.KEYS,
-            f"the robot side at {place} runs without keys, and --keys was given",
-            f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm",
-        )
-    if mechanism not in (_WITH_KEYS, _WITHOUT_KEYS):
-        return Fault(
-            Wrong.OTHER, f"{place} speaks ZeroMQ with {mechanism!r:.24}, as no robot side does", _see_who(place)
-        )
-    return None
-
-
-def _judge_error(facts: LinkFacts, place: str, error: int) -> Fault:
-    host, _, port = place.rpartition(":")
-    if error == errno.ECONNREFUSED:
-        start = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port} and --keys FOLDER"
-        return Fault(
-            Wrong.CLOSED,
-            f"{place} refuses connections: nothing listens there",
-            f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port}"
-            if facts.loopback
-            else f"{start}: without --bind it listens on its own loopback alone",
-        )
-    if error == errno.ETIMEDOUT:
-        ports = " and ".join(dict.fromkeys(one.rpartition(":")[2] for one in (facts.control, facts.view)))
-        return Fault(
-            Wrong.FIREWALL,
-            f"{place} gave no answer in {CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has "
-            "that address",
-            f"let TCP ports {ports} in on the robot's machine, such as: sudo ufw allow proto tcp from any to any port "
-            f"{ports.replace(' and ', ',')}; whether it is on: ping {host.strip('[]')}",
-        )
-    if error == errno.EHOSTUNREACH:
-        reason = "no machine on its network has that address, a router knows no way, or a firewall rejects it"
-    elif error == errno.ENETUNREACH:
-        reason = "this machine is in no network from which it can be reached"
-    else:
-        reason = "this machine does not send there"
-    return Fault(
-        Wrong.ROUTE,
-        f"no way to {place} ({os.strerror(error)}): {reason}",
-        f"see that the robot's machine is on, and both are in one network: ip route get {host.strip('[]')}",
-    )
-
-
-def _judge_stranger(place: str, opening: Opening) -> Fault:
+    match mechanism_of(opening.said), facts.keys:
+        case ("NULL", None) | ("CURVE", str()):
+            return None
+        case "CURVE", None:
+            said = f"the robot side at {place} asks for keys, and none were given"
+            return Fault(Wrong.KEYS, said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
+        case "NULL", _:
+            remedy = f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm"
+            return Fault(Wrong.KEYS, f"the robot side at {place} runs without keys, and --keys was given", remedy)
+        case str() as mechanism, _:
+            said = f"{place} speaks ZeroMQ with {mechanism!r:.24}, as no robot side does"
+            return Fault(Wrong.OTHER, said, see_who)
     if opening.said:
         known = (name for start, name in _OTHERS.items() if opening.said.startswith(start))
         who = next(known, f"something that begins with {opening.said[:16]!r}")
-        return Fault(Wrong.OTHER, f"at {place} is {who}, and no robot side", _see_who(place))
+        return Fault(Wrong.OTHER, f"at {place} is {who}, and no robot side", see_who)
     if opening.hung_up:
-        return Fault(
-            Wrong.OTHER,
-            f"{place} takes connections and hangs up at once: a forwarded port with nothing behind it, or a robot side "
-            "with too many connections",
-            "start the robot side behind it, or end the program that keeps connecting",
-        )
-    return Fault(
-        Wrong.OTHER,
-        f"{place} takes connections and says nothing: no robot side, or one that stands still",
-        f"{_see_who(place)}; a stopped process goes on after: kill -CONT PID",
-    )
+        said = "a forwarded port with nothing behind it, or a robot side with too many connections"
+        remedy = "start the robot side behind it, or end the program that keeps connecting"
+        return Fault(Wrong.OTHER, f"{place} takes connections and hangs up at once: {said}", remedy)
+    said = f"{place} takes connections and says nothing: no robot side, or one that stands still"
+    return Fault(Wrong.OTHER, said, f"{see_who}; a stopped process goes on after: kill -CONT PID")
 
 
 def _see_who(place: str) -> str:
@@ -229,67 +190,56 @@ def _see_who(place: str) -> str:
     return f"say the robot side's own port; who has this one is shown on that machine by: ss -ltnp 'sport = :{port}'"
 
 
-def _judge_talk(facts: LinkFacts, talk: Talk) -> Fault | None:
-    if talk.handshake is not None:
-        return _judge_handshake(facts, facts.control, talk.handshake)
-    if talk.other_version is not None:
+def _judge_error(facts: LinkFacts, place: str, error: int) -> Fault:
+    host, _, port = place.rpartition(":")
+    if error == errno.ECONNREFUSED:
+        remedy = f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port}"
+        if not facts.loopback:
+            start = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port} and --keys FOLDER"
+            remedy = f"{start}: without --bind it listens on its own loopback alone"
+        return Fault(Wrong.CLOSED, f"{place} refuses connections: nothing listens there", remedy)
+    if error == errno.ETIMEDOUT:
+        ports = list(dict.fromkeys(one.rpartition(":")[2] for one in (facts.control, facts.view)))
+        opened = f"sudo ufw allow proto tcp from any to any port {','.join(ports)}"
         return Fault(
-            Wrong.VERSION,
-            f"the robot side speaks {talk.other_version}, this machine {PROTOCOL_VERSION}",
-            "install the same release of feelahead on both",
+            Wrong.FIREWALL,
+            f"{place} gave no answer in {CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has "
+            "that address",
+            f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: {opened}; whether it is on: "
+            f"ping {host.strip('[]')}",
         )
+    reason = {
+        errno.EHOSTUNREACH: "no machine on its network has that address, a router knows no way, or a firewall "
+        "rejects it",
+        errno.ENETUNREACH: "this machine is in no network from which it can be reached",
+    }.get(error, "this machine does not send there")
+    return Fault(
+        Wrong.ROUTE,
+        f"no way to {place} ({os.strerror(error)}): {reason}",
+        f"see that the robot's machine is on, and both are in one network: ip route get {host.strip('[]')}",
+    )
+
+
+def _judge_talk(facts: LinkFacts, talk: Talk) -> Fault | None:
+    place = facts.control
+    if talk.handshake == "key refused":
+        said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
+        return Fault(Wrong.OUR_KEY, said, f"run there: feelahead keys allow NAME {facts.keys}")
+    if talk.handshake is not None and facts.keys is None:
+        said = f"{place} speaks ZeroMQ and is no control port, but perhaps a view port"
+        return Fault(Wrong.OTHER, said, _see_who(place))
+    if talk.handshake is not None:
+        said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
+        remedy = "--robot-key with what is shown on the robot's machine by: feelahead keys show robot"
+        return Fault(Wrong.ROBOT_KEY, said, remedy)
+    if talk.other_version is not None:
+        said = f"the robot side speaks {talk.other_version}, this machine {PROTOCOL_VERSION}"
+        return Fault(Wrong.VERSION, said, "install the same release of feelahead on both")
     if not talk.answered:
         return Fault(
             Wrong.SILENT,
-            f"{facts.control} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its "
-            "view port, or another program",
+            f"{place} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its view "
+            "port, or another program",
             "wait until it says that it listens (its first start compiles for a minute), and say its control port",
         )
     return None
-
-
-def _judge_handshake(facts: LinkFacts, place: str, handshake: str) -> Fault:
-    if handshake == "key refused":
-        return Fault(
-            Wrong.OUR_KEY,
-            f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked",
-            f"run there: feelahead keys allow NAME {facts.keys}",
-        )
-    if facts.keys is None:
-        return Fault(
-            Wrong.OTHER, f"{place} speaks ZeroMQ and is no control port, but perhaps a view port", _see_who(place)
-        )
-    return Fault(
-        Wrong.ROBOT_KEY,
-        f"the program at {place} has another key than --robot-key says, or is no such port of a robot side",
-        "--robot-key with what is shown on the robot's machine by: feelahead keys show robot",
-    )
-
-
-def _judge_view(facts: LinkFacts, opening: Opening) -> Fault | None:
-    fault = _judge_port(facts, facts.view, opening)
-    if fault is None:
-        return None
-    remedy = f"{fault.remedy}; or {_VIEW_CONNECT}" if fault.wrong is Wrong.FIREWALL else _VIEW_CONNECT
-    return Fault(Wrong.VIEW, f"the control port works, but not the view port: {fault.said}", remedy)
-
-
-def _judge_telemetry(facts: LinkFacts) -> Fault | None:
-    if facts.telemetry is not False:
-        return None
-    return Fault(
-        Wrong.VIEW,
-        f"the control port works, but {facts.view} is no view port of a robot side, or not of this one: it sends no "
-        "telemetry",
-        _VIEW_CONNECT,
-    )
-
-
-def _judge_size(facts: LinkFacts) -> Fault | None:
-    if facts.large_arrive is not False:
-        return None
-    return Fault(
-        Wrong.LARGE,
-        f"small packets reach {facts.control}, large ones do not: the way swallows what is longer than it can carry",
-        "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)",
-    )

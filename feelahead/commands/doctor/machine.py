@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -46,13 +45,10 @@ PORTS: Final = {
 _LIMIT_S: Final = 60.0
 _IMPORT: Final = """
 import json, sys
-failures = {}
-for name in sys.argv[1:]:
-    try:
-        __import__(name)
-    except Exception as error:
-        failures[name] = str(error).splitlines()[0] if str(error) else type(error).__name__
-print(json.dumps(failures))
+try:
+    print(json.dumps(__import__(sys.argv[1]) and None))
+except Exception as error:
+    print(json.dumps(str(error).splitlines()[0] if str(error) else type(error).__name__))
 """
 _RENDER: Final = """
 import json, sys
@@ -94,7 +90,7 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
     name, for_demo = f"extra {extra}", extra == "robot"
     if not failures:
         return Finding(name, Verdict.OK, f"{', '.join(EXTRAS[extra])}: {_PURPOSES[extra]}", for_demo=for_demo)
-    absent = [module for module, reason in failures.items() if re.search(r"No module named", reason)]
+    absent = [module for module, reason in failures.items() if "No module named" in reason]
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
     told = {"not installed": absent, "cannot be imported": broken}
     said = "; ".join(f"{how}: {', '.join(modules)}" for how, modules in told.items() if modules)
@@ -114,12 +110,12 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
         return []
     if not facts.missing:
         return [Finding("kernels", Verdict.OK, f"{facts.kernels} compiled for this processor, in {facts.folder}")]
-    said = f"{facts.missing} of {facts.kernels} are not compiled for this processor"
+    said, remedy = "the first start does, about half a minute", COMPILE
     if not facts.writable:
+        said = f"{facts.folder} keeps none: each start compiles, about a minute"
         remedy = f"let this user write to {facts.folder}, or set NUMBA_CACHE_DIR to another folder; then: {COMPILE}"
-        said = f"{said}, and {facts.folder} keeps none: each start compiles, about a minute"
-        return [Finding("kernels", Verdict.NOTE, said, remedy)]
-    return [Finding("kernels", Verdict.NOTE, f"{said}: the first start does, about half a minute", COMPILE)]
+    missing = f"{facts.missing} of {facts.kernels} are not compiled for this processor"
+    return [Finding("kernels", Verdict.NOTE, f"{missing}: {said}", remedy)]
 
 
 def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
@@ -136,11 +132,11 @@ def check_realtime(platform: str, notes: Sequence[str]) -> list[Finding]:
     """Whether `--realtime` would be granted; `notes` are its own, one for each thing that is not."""
     if platform != "linux":
         return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
-    parted = [note.removeprefix("--realtime: ").partition("; to permit it: ") for note in notes]
-    denied = [
-        Finding("--realtime", Verdict.NOTE, f"{said}; the sides run without", how or None) for said, _, how in parted
-    ]
-    return denied or [Finding("--realtime", Verdict.OK, "permitted")]
+    findings = []
+    for note in notes:
+        said, _, how = note.removeprefix("--realtime: ").partition("; to permit it: ")
+        findings.append(Finding("--realtime", Verdict.NOTE, f"{said}; the sides run without", how or None))
+    return findings or [Finding("--realtime", Verdict.OK, "permitted")]
 
 
 def check_ports(troubles: Mapping[int, str | None]) -> list[Finding]:
@@ -166,9 +162,14 @@ def modules_of(extra: str, platform: str) -> tuple[str, ...]:
 
 def failed_imports() -> dict[str, dict[str, str]]:
     """For each extra the modules that cannot be imported, and why; each in a process of its own, which may crash."""
+    pairs = [(extra, module) for extra in EXTRAS for module in modules_of(extra, sys.platform)]
     with ThreadPoolExecutor(max_workers=2) as pool:
-        outcomes = pool.map(lambda extra: _failures(modules_of(extra, sys.platform)), EXTRAS)
-        return dict(zip(EXTRAS, outcomes, strict=True))
+        said = list(pool.map(lambda pair: _output_of(_IMPORT, pair[1]), pairs))
+    failures: dict[str, dict[str, str]] = {extra: {} for extra in EXTRAS}
+    for (extra, module), outcome in zip(pairs, said, strict=True):
+        trouble = "importing it ends Python" if outcome is None else json.loads(outcome)
+        failures[extra] |= {} if trouble is None else {module: trouble}
+    return failures
 
 
 def kernel_facts() -> KernelFacts | None:
@@ -193,16 +194,6 @@ def realtime_notes() -> list[str]:
 def port_troubles() -> dict[int, str | None]:
     """Try each default port on loopback: the reason why it cannot be bound, or None."""
     return {port: _trouble_at(port) for port in PORTS}
-
-
-def _failures(modules: tuple[str, ...]) -> dict[str, str]:
-    said = _output_of(_IMPORT, *modules)
-    if said is None:  # which of them it was that took the process along is found one by one
-        if len(modules) == 1:
-            return {modules[0]: "importing it ends Python"}
-        return {name: reason for module in modules for name, reason in _failures((module,)).items()}
-    failures: dict[str, str] = json.loads(said)
-    return failures
 
 
 def _output_of(program: str, *arguments: str) -> str | None:

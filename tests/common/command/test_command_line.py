@@ -3,12 +3,15 @@ import subprocess
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+from msgspec import Meta
 
 from common.command.command_line import load_toml, parse_settings
 from common.command.run_options import RunOptions
 from common.errors import ConfigurationError
+from common.limits import check_limits
 from tests.helpers.repository import ROOT
 
 
@@ -23,10 +26,15 @@ class Inner:
 
 @dataclass(frozen=True)
 class Options(RunOptions):
-    """What a test runs."""
+    """The options that a test runs with."""
 
     probability: float = 0.99
     camera: Inner = field(default_factory=Inner)
+    size_m: Annotated[float, Meta(ge=0.0)] = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_limits(self)
 
 
 def parse(*arguments: str) -> Options:
@@ -48,7 +56,8 @@ def test_flags_win_over_the_file_which_wins_over_defaults(tmp_path: Path) -> Non
         (["--nonsense", "1"], "--nonsense"),
         (["--seed", "x"], "--seed"),
         (["--seed", "-1"], "-1"),
-        (["--camera.sd-m", "-2"], "sd_m = -2"),
+        (["--camera.sd-m", "-2"], "--camera.sd-m = -2.0; valid: 0 or more"),
+        (["--size-m", "-1"], "--size-m = -1.0; valid: at least 0"),
         (["--duration", "0"], "0.0"),
         (["--duration"], "--duration"),
         (["--link", "delay -5ms"], "-5ms"),

@@ -1,13 +1,16 @@
-"""The first moments of a command: signals, encodings, versions and what is not installed."""
+"""The first and last moments of a command: signals, encodings, versions and what is not installed."""
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from common.command.stop_signal import StopSignal
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")
@@ -25,50 +28,65 @@ def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
     )
 
 
-# Stops in the middle of the imports, so that the signal always finds them, however fast the machine is.
-SLOW_IMPORT = """
-import sys, time
-sys.argv = ["command"]
-from common.command.launch import launch
-def load():
-    print("importing", flush=True)
-    time.sleep(300)
-launch("command", load)
-"""
-SLOW_START = """
-import sys, time
-sys.argv = ["command"]
-from common.command.launch import launch
-def command(arguments):
-    print("building", flush=True)
-    time.sleep(300)
-launch("command", lambda: command)
-"""
-
-# Past the command's own care, as a signal between two statements would be.
-SLOW_END = """
+# Each stops there, so that the signal always finds it, however fast the machine is.
+STOPPED_AT = """
 import sys, time
 sys.argv = ["command"]
 import common.command.command_line
 from common.command.launch import launch
-def run_command(program, command):
-    print("ending", flush=True)
+def stop(*_):
+    print("here", flush=True)
     time.sleep(300)
-common.command.command_line.run_command = run_command
-launch("command", lambda: None)
+{}
 """
+IMPORT = STOPPED_AT.format('launch("command", stop)')
+START = STOPPED_AT.format('launch("command", lambda: stop)')
+# Past the command's own care, as a signal between two statements would be.
+END = STOPPED_AT.format('common.command.command_line.run_command = stop\nlaunch("command", lambda: None)')
+# An exception could be lost in a compiler's callback.
+CALLBACK = STOPPED_AT.format('launch("command", lambda: __import__("ctypes").CFUNCTYPE(None)(stop)())')
 
 
 @pytest.mark.processes
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("code", [SLOW_IMPORT, SLOW_START, SLOW_END])
+@pytest.mark.parametrize("code", [IMPORT, START, END, CALLBACK])
 def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Signals) -> None:
     with start("-c", code) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() in ("importing\n", "building\n", "ending\n")
+        assert process.stdout.readline() == "here\n"
         process.send_signal(number)
         _, complaint = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, complaint) == (0, "")
+
+
+BOTH = (signal.SIGINT, signal.SIGTERM)
+
+
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    """No signal reaches the runner, whatever a test finds out, and its own handlers come back."""
+    before = {number: signal.signal(number, lambda *_: None) for number in BOTH}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("handlers")
+@pytest.mark.parametrize("number", BOTH)
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_signal_sets_the_flag_and_the_old_handler_comes_back(number: signal.Signals, fails: bool) -> None:
+    caught: list[int] = []
+    signal.signal(number, lambda which, _: caught.append(which))
+    with contextlib.suppress(RuntimeError), StopSignal() as stop:
+        assert not stop.is_set
+        for _ in range(2):
+            signal.raise_signal(number)
+            assert stop.is_set
+        if fails:
+            raise RuntimeError("in the loop")
+    assert caught == []
+    signal.raise_signal(number)
+    assert caught == [number]
 
 
 @pytest.mark.processes

@@ -1,4 +1,4 @@
-"""The live line without a terminal: what it says, and that it never says half of something."""
+"""A run in words: the live line, which never says half of something, and the story, which tells each change once."""
 
 import math
 from dataclasses import replace
@@ -9,7 +9,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from common.command.live_line import _in_long_words, _in_short_words, live_line
+from common.command.live_line import _facts, live_line
+from common.command.live_story import SHORTEST_GAP_S, Resistance, Story, next_resistance
 from common.command.live_view import LiveView, TriggerView, live_view
 
 APPROACH: dict[str, Any] = {
@@ -46,6 +47,10 @@ def test_eighty_columns_tell_everything() -> None:
     assert live_line(live_view(APPROACH), 79) == (
         "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
     )
+    far = {"R2_pulled": 1.0, "R2": 1.0, "nearest_mm": 144.0, "target_mm": 193.0, "delay_ms": 205.0}
+    assert live_line(live_view(APPROACH | far), 79) == (
+        "advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms"
+    )
 
 
 def test_a_simulation_that_falls_behind_is_told() -> None:
@@ -65,7 +70,7 @@ def test_a_simulation_that_falls_behind_is_told() -> None:
         ({"link": "refused: 8 others observe already"}, "REFUSED  8 others observe already  "),
         ({"controller": "lost", "state": "disarmed"}, "CONTROLLER LOST  "),
         ({"release_first": True}, "RELEASE BOTH TRIGGERS  "),
-        ({"state": "disarmed", "person": None}, "disarmed  "),
+        ({"state": "disarmed", "person": None}, "disarmed  L2/R2 pull 0/62% resist 0/0%  "),
         ({"state": "disarmed", "person": None, "owner": "ready"}, "ready to arm  "),
         ({"state": "disarmed", "controller": "absent"}, "no controller  "),
         ({"link": "waiting for the robot side", "state": None}, "waiting for the robot side  "),
@@ -89,16 +94,10 @@ def test_what_is_not_known_is_no_zero() -> None:
     )
 
 
-def test_a_trigger_is_free_while_the_arm_is_not_armed() -> None:
-    view = live_view(APPROACH | {"state": "disarmed"})
-    assert (view.r2.resists, view.r2.pulled) == (0.0, 0.62)
-
-
 def test_without_haptics_nothing_resists() -> None:
-    for width in (79, 130):
-        line = live_line(live_view(APPROACH | {"haptics": False}), width)
-        assert "resist" not in line
-        assert "danger" in line
+    line = live_line(live_view(APPROACH | {"haptics": False}), 79)
+    assert "resist" not in line
+    assert "danger" in line
 
 
 @pytest.mark.parametrize(
@@ -126,30 +125,86 @@ def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
 def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     line = live_line(view, width)
     assert cell_len(line) <= width
-    for facts in (_in_long_words(view, named=True), _in_long_words(view, named=False), _in_short_words(view)):
-        left = line
-        # Each fact is there as a whole, in its place, or not at all.
-        for _, text in facts:
-            if left == text or left.startswith(f"{text}  "):
-                left = left[len(text) + 2 :]
-        if left == "":
-            return
-    # Where it is tight, all short facts stand a little closer.
-    phase, *rest = (text for _, text in _in_short_words(view))
-    if line == f"{phase}  {' '.join(rest)}":
-        return
-    raise AssertionError(f"{line!r} holds {left!r}")
+    # What is most important is there as soon as it fits by itself.
+    assert line.startswith(view.phase) or cell_len(view.phase) > width
+    left = line
+    # Each fact is there as a whole, in its place, or not at all.
+    for _, text in _facts(view):
+        if left == text or left.startswith(f"{text}  "):
+            left = left[len(text) + 2 :]
+    # Where it is tight, all facts stand a little closer.
+    phase, *rest = (text for _, text in _facts(view))
+    assert left == "" or line == f"{phase}  {' '.join(rest)}"
 
 
-@given(view=views, width=st.integers(0, 200))
-def test_more_room_never_shows_less(view: LiveView, width: int) -> None:
-    """What is most important is there as soon as it fits by itself."""
-    if cell_len(view.phase) <= width:
-        assert live_line(view, width).startswith(view.phase)
+RESTING = LiveView(
+    phase="resting",
+    linked=True,
+    l2=TriggerView(0.0, 0.0),
+    r2=TriggerView(0.0, 0.0),
+    nearest="tin",
+    nearest_mm=80.0,
+    has_target=True,
+    target_mm=120.0,
+)
+ADVANCING = replace(RESTING, phase="advancing", armed=True, r2=TriggerView(0.62, 0.0))
 
 
-def test_a_long_delay_has_room_at_80_columns() -> None:
-    far = {"R2_pulled": 1.0, "R2": 1.0, "nearest_mm": 144.0, "target_mm": 193.0, "delay_ms": 205.0}
-    assert live_line(live_view(APPROACH | far), 79) == (
-        "advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms"
+def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
+    story = Story()
+    lines = [story.tell(100.0 + step_s * number, view) for number, view in enumerate(views)]
+    return [line for line in lines if line is not None]
+
+
+def test_a_run_reads_as_a_story() -> None:
+    near = replace(ADVANCING, nearest="carton", nearest_mm=10.0, target_mm=10.0, r2=TriggerView(0.5, 0.3))
+    lines = told(
+        replace(RESTING, phase="waiting for the robot side", linked=False),
+        RESTING,
+        ADVANCING,
+        near,
+        replace(near, nearest_mm=-0.5, target_mm=-0.5, r2=TriggerView(0.5, 1.0)),
+        replace(near, r2=TriggerView(0.5, 0.5), phase="lifting", holding="carton"),
+        replace(ADVANCING, phase="LINK LOST", reason="nothing heard", alarm=True, linked=False, armed=False),
     )
+    assert lines == [
+        "   0.0 s  waiting for the robot side",
+        "   1.0 s  link up; resting",
+        "   2.0 s  armed; advancing  (R2 pulled 62 %, nearest 80 mm, target 120 mm)",
+        "   3.0 s  R2 stiffens to 30 %  (R2 pulled 50 %, nearest 10 mm, target 10 mm)",
+        "   4.0 s  R2 resists fully; touches carton, as perceived  (R2 pulled 50 %, nearest 0 mm, target 0 mm)",
+        "   5.0 s  lifting; R2 eases to 50 %; touches nothing; holds carton  (R2 pulled 50 %, nearest 10 mm)",
+        "   6.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("stiffnesses", "expected"),
+    [
+        ([0.04, 0.06, 0.04, 0.02, 0.06, 0.005], "0 1 1 1 1 0"),
+        ([0.9, 0.96, 0.9, 0.86, 0.84, 0.9], "1 2 2 2 1 1"),
+        ([1.0, 0.0, 1.0], "2 0 2"),
+    ],
+)
+def test_a_stiffness_that_hovers_is_one_word(stiffnesses: list[float], expected: str) -> None:
+    word, words = Resistance.NONE, []
+    for stiffness in stiffnesses:
+        word = next_resistance(word, stiffness)
+        words.append(str(int(word)))
+    assert " ".join(words) == expected
+
+
+def test_a_touch_that_rattles_is_told_once() -> None:
+    rattling = [replace(ADVANCING, nearest_mm=0.0 if step % 2 else 5.0) for step in range(40)]
+    assert len(told(*rattling)) == 2
+
+
+def test_what_goes_to_and_fro_is_bounded() -> None:
+    flapping = [replace(ADVANCING, phase=("advancing", "grasping")[step % 2]) for step in range(1000)]
+    assert len(told(*flapping, step_s=0.01)) <= 10.0 / SHORTEST_GAP_S + 1
+
+
+def test_an_alarm_does_not_wait_even_if_it_is_short() -> None:
+    stopped = replace(RESTING, phase="STOPPED", reason="emergency stop", alarm=True)
+    lines = told(ADVANCING, stopped, ADVANCING, ADVANCING, step_s=0.01)
+    assert [line.partition(" s  ")[2] for line in lines[1:]] == ["STOPPED: emergency stop"]

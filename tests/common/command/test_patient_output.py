@@ -31,18 +31,6 @@ class Reader(threading.Thread):
             self.said = stream.read().splitlines()
 
 
-def test_everything_comes_in_order_within_and_after() -> None:
-    with pipe() as (reads, stream):
-        output = PatientOutput(stream)
-        with output:
-            for number in range(20):
-                output.write(f"{number} µm\n")
-        output.write("after\n")
-        said = os.read(reads, 10_000).decode().splitlines()
-        os.close(reads)
-    assert said == [*(f"{number} µm" for number in range(20)), "after"]
-
-
 def test_a_reader_that_stalls_gets_whole_lines_and_holds_nobody_up() -> None:
     line = "x" * 9_999 + "\n"
     with pipe() as (reads, stream):
@@ -100,18 +88,3 @@ def test_a_reader_that_has_gone_is_told_once_by_a_later_write() -> None:
                 write_on()
             output.write("nobody\n")
         output.write("nobody\n")
-
-
-def test_a_reader_that_leaves_at_the_end_is_nobodys_concern() -> None:
-    with pipe() as (reads, stream):
-        os.close(reads)
-        output = PatientOutput(stream)
-        with output:
-            output.write("nobody\n")
-        output.write("nobody\n")
-
-
-def test_without_a_stream_all_is_dropped() -> None:
-    with PatientOutput(None) as output:
-        assert output.write("nobody\n") == 7
-        assert not output.isatty()

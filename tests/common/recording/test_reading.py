@@ -1,19 +1,25 @@
-"""A recording opens wherever it was cut, up to the last complete second; what is none is told in one line."""
+"""A recording's bytes: blocks of entries, Foxglove's messages, a file cut anywhere, and a disk that is full."""
 
+import json
 import os
+import resource
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
+from common.protocol.codec import encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import EnlargementTerms, SceneShapes, SceneState, Shape, ShapeKind
 from common.recording.content import Content
-from common.recording.entries import Kind, entry, pack_block, unpack_block
+from common.recording.entries import Entry, Kind, entry, pack_block, split_text, text, unpack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.mending import mend
-from common.recording.reading import Message, open_recording
-from common.recording.topics import FORMAT
-from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, as_json, stamped
+from common.recording.reading import open_recording
+from common.recording.topics import FORMAT, schema_of
+from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, VIEW, as_json, stamped
 
 SECONDS = 5
 BLOCKS_A_SECOND = 20
@@ -101,12 +107,6 @@ def test_what_is_no_recording_is_told_in_one_line(content: bytes, tmp_path: Path
     assert "\n" not in str(caught.value)
 
 
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
-        open_recording(tmp_path / "pipe.mcap")
-
-
 def test_a_damaged_description_is_told_in_one_line(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
     content = short[0]
     path = tmp_path / "damaged.mcap"
@@ -124,44 +124,147 @@ def test_a_damaged_description_is_told_in_one_line(short: tuple[bytes, list[int]
     assert not any("\n" in text for text in told)
 
 
-def test_another_format_is_told(tmp_path: Path) -> None:
+def test_another_format_another_program_and_a_pipe_are_told(tmp_path: Path) -> None:
     path = tmp_path / "newer.mcap"
     file = RecordingFile(path, 0.0)
     file.describe("feelahead.robot", {"format": str(FORMAT + 1)})
     file.close()
     with pytest.raises(ConfigurationError, match=f"format {FORMAT + 1}; valid: {FORMAT}"):
         open_recording(path)
-
-
-def test_an_mcap_file_of_somebody_else(tmp_path: Path) -> None:
-    path = tmp_path / "other.mcap"
-    file = RecordingFile(path, 0.0)
-    file.write("/robot/status", 1.0, b"{}")
-    file.close()
+    somebodys = RecordingFile(tmp_path / "other.mcap", 0.0)
+    somebodys.write("/robot/status", 1.0, b"{}")
+    somebodys.close()
     with pytest.raises(ConfigurationError, match="nothing that feelahead recorded"):
-        open_recording(path)
+        open_recording(tmp_path / "other.mcap")
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(ConfigurationError, match="cannot be read: it is a pipe"):
+        open_recording(tmp_path / "pipe.mcap")
 
 
-def test_a_cut_file_is_made_whole(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
-    content, ends = short
-    cut, whole = tmp_path / "cut.mcap", tmp_path / "whole.mcap"
-    cut.write_bytes(content[: ends[3] + 50])
-
-    def everything(path: Path) -> list[Message]:
-        return list(open_recording(path).messages())
-
-    assert mend(cut, whole) == len(everything(cut))
-    assert not open_recording(cut).whole
-    assert open_recording(whole).whole
-    assert everything(whole) == everything(cut)
-    assert open_recording(whole).headers == open_recording(cut).headers
-    with pytest.raises(ConfigurationError, match="is there already"):
-        mend(cut, whole)
+ENTRIES = st.lists(
+    st.builds(
+        Entry,
+        st.sampled_from(Kind),
+        st.floats(allow_nan=False),
+        st.binary(max_size=300),
+    ),
+    max_size=20,
+)
 
 
-def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
-    path = tmp_path / "there.mcap"
-    path.write_bytes(b"precious")
-    with pytest.raises(FileExistsError):
-        RecordingFile(path, 0.0)
-    assert path.read_bytes() == b"precious"
+@given(ENTRIES, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_what_is_packed_is_unpacked(entries: list[Entry], number: int, dropped: int) -> None:
+    packed = b"".join(entry(Kind(one.kind), one.now_s, one.content[:1], one.content[1:]) for one in entries)
+    block = unpack_block(pack_block(number, dropped, 1.0, 2.0, packed))
+    assert (block.number, block.dropped, block.first_s, block.last_s) == (number, dropped, 1.0, 2.0)
+    assert list(block.unpacked()) == entries
+
+
+@given(ENTRIES.filter(bool), st.data())
+def test_a_block_that_ends_within_an_entry_is_refused(entries: list[Entry], data: st.DataObject) -> None:
+    packed = b"".join(entry(Kind(one.kind), one.now_s, one.content) for one in entries)
+    last = len(entry(Kind(entries[-1].kind), entries[-1].now_s, entries[-1].content))
+    end = data.draw(st.integers(len(packed) - last + 1, len(packed) - 1))
+    with pytest.raises(ValueError, match="ends within one"):
+        list(unpack_block(pack_block(0, 0, 0.0, 0.0, packed[:end])).unpacked())
+
+
+@given(st.binary(max_size=255), st.binary(max_size=100))
+def test_text_before_bytes(short: bytes, rest: bytes) -> None:
+    assert split_text(text(short) + rest) == (short, rest)
+    with pytest.raises(ValueError, match="ends within"):
+        split_text((text(short) + rest)[: len(short)] if short else b"")
+
+
+def test_a_topics_schema_has_the_types_of_its_first_message_and_of_what_was_empty_in_it() -> None:
+    known = schema_of("/robot/status", {"time_s": 1, "armed": True, "ways": [0.5], "delay_ms": None, "target": None})
+    assert known["title"] == "feelahead.RobotStatus"
+    number, text = {"type": "number"}, {"type": "string"}
+    told = {name: known["properties"][name] for name in ("time_s", "armed", "ways", "delay_ms", "target")}
+    assert told == {
+        "time_s": number,
+        "armed": {"type": "boolean"},
+        "ways": {"type": "array", "items": number},
+        "delay_ms": {"type": ["number", "null"]},
+        "target": text,
+    }
+    objects = schema_of("/overlap", {"objects": []})["properties"]["objects"]["items"]["properties"]
+    assert objects == {"object": text, "l2_mm3": number, "r2_mm3": number}
+
+
+@pytest.mark.parametrize("room", [500_001, 511_117, 532_003, 563_333, 594_567, 600_001])
+def test_a_full_disk_is_kept_as_an_error_and_nothing_else_is_said(
+    room: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    generator = np.random.default_rng(room)
+    path = tmp_path / "run.mcap"
+    file = RecordingFile(path, 0.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        for number in range(100):
+            file.write("/robot/inputs", 0.01 * number, generator.bytes(20_000))
+            if number % 10 == 9:
+                file.flush()
+        file.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert file.error is not None
+    assert 0 < file.kept_bytes == path.stat().st_size <= room
+    assert "".join(capfd.readouterr()) == ""
+    # Outside of a test, who logs with nobody set up to hear it speaks on stderr.
+    assert caplog.records == []
+
+
+HERE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
+KINDS: tuple[ShapeKind, ...] = ("sphere", "box", "cylinder", "capsule", "ellipsoid", "plane", "mesh")
+TERMS = EnlargementTerms(0.01, 0.0, 0.001, 0.003, 0.002, 2.3, 0.1, 0.02)
+POSE = np.array(HERE, dtype="<f4").tobytes()
+
+
+def test_a_scene_is_drawn_once_and_moved(tmp_path: Path) -> None:
+    corners = np.eye(3, dtype="<f4").tobytes()
+    triangles = np.arange(3, dtype="<u4").tobytes()
+    shapes = tuple(
+        Shape(0, True, kind, (0.1, 0.2, 0.3), HERE, vertices_m=corners, triangles=triangles)
+        if kind == "mesh"
+        else Shape(0, False, kind, (0.1, 0.2, 0.3), HERE)
+        for kind in KINDS
+    )
+    path = tmp_path / "scene.mcap"
+    file = RecordingFile(path, 1.7e9)
+    content = Content(file)
+    content.take(0, HEADER + as_json({"side": "robot"}))
+    for number in range(3):
+        header = Header(1, 2 * number + 1, 1.0)
+        scene = SceneShapes(header, 1, ("hand",), ("post",), shapes)
+        state = SceneState(
+            Header(1, 2 * number + 2, 1.0),
+            version=1,
+            taken_s=1.0,
+            link_poses=POSE,
+            object_index=np.zeros(1, dtype="<u4").tobytes(),
+            object_poses=POSE,
+            roles=b"\0",
+            tool_pose=HERE,
+            spheres=b"",
+            overlaps=((0, 1e-9, 2e-9),),
+            l2=TERMS,
+            r2=TERMS,
+            tick_p50_us=50.0,
+            tick_p99_us=80.0,
+            overruns=0,
+        )
+        for message in (scene, state):
+            content.take(0, VIEW + stamped(1.0 + number) + encode(message))
+    file.close()
+    recording = open_recording(path)
+    assert len(list(recording.messages(["/scene"]))) == 1
+    moved = list(recording.messages(["/tf"]))
+    assert len(moved) == 3
+    assert all(name in moved[0].content for name in (b"link/hand", b"object/post", b"tool"))
+    (overlap, *_) = recording.messages(["/overlap"])
+    assert json.loads(overlap.content)["objects"] == [{"object": "post", "l2_mm3": 1.0, "r2_mm3": 2.0}]
+    (terms, *_) = recording.messages(["/enlargement"])
+    assert json.loads(terms.content)["r2"]["quantile"] == 2.3
+    assert len(list(recording.messages(["/view"]))) == 6

@@ -1,21 +1,29 @@
-"""The two real processes over loopback sockets: clean ends and crashes."""
+"""The two real processes: clean ends, crashes, and what fails around them, said in one line."""
 
+import contextlib
 import json
 import os
+import pty
+import random
 import signal
+import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
-from common.errors import ConfigurationError
+import operator_side.main
+import robot_side.main
+from common.protocol.session import OWNING
 from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
+from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
 from robot_side.main import KEYS_PERIOD_S
 from robot_side.operators.safety import SafetySettings
 
@@ -56,7 +64,7 @@ def operator(listening: dict[str, Any], *arguments: str) -> SideProcess:
     return SideProcess("operator_side.main", "operator", [*endpoints, "--device=simulated", *arguments])
 
 
-@pytest.mark.parametrize("more", [(), ("--compensation", "robot"), ("--law", "paper")], ids=["usual", "robot", "paper"])
+@pytest.mark.parametrize("more", [("--realtime",), ("--compensation", "robot"), ("--law", "paper")])
 def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: tuple[str, ...]) -> None:
     path = tmp_path / "out.json"
     with demo("--duration", "4", "--link", "delay 20ms", "--summary", str(path), *more) as process:
@@ -74,20 +82,14 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
         *("enlargement_mm", "overlap_mm3", "stiffness", "zones", "min_distance_mm", "contacts", "stops", "errors"),
     ):
         assert key in summary
-
-
-def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
-    path = tmp_path / "out.json"
-    with demo("--duration", "60", "--status", "json", "--summary", str(path)) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if json.loads(line).get("link") == "up":
-                break
-        process.send_signal(signal.SIGINT)
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 0, complaint
-    assert complaint == ""
-    assert json.loads(path.read_text())["errors"] == []
+    for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
+        assert paced["overruns"] >= 0
+        assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
+    # Before the robot side knows its operator, a late tick reads no more of what waits than of anybody's.
+    assert summary["strangers"].pop("unread") >= 0
+    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "crowded": 0, "malformed": 0}
+    # A deadline is met by a tick or counted as an overrun (test_pacing.py: each of them), and none is both.
+    assert 0 < summary["ticks"] <= summary["ticks"] + summary["overruns"] <= summary["duration_s"] * 1000 + 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -195,9 +197,144 @@ def test_anothers_interrupt_is_one() -> None:
             side.check()
 
 
-def test_a_side_that_fails_says_why() -> None:
+NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")
+ROBOT = ("--bind=tcp://127.0.0.1:0",)
+# Nothing that this process writes gets longer than that, as on a full disk.
+FULL = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    arguments = [*NOWHERE, "--duration=0.2", f"--summary={path}", "--status=none"]
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, sys.executable, "-P", "-m", "operator_side", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert line.startswith(f"feelahead-operator: --summary {path}: cannot be written: File too large; valid: ")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("side", "arguments"), [(operator_side.main, NOWHERE), (robot_side.main, ROBOT)], ids=["operator", "robot"]
+)
+def test_a_run_that_fails_in_whatever_way_has_its_summary(
+    side: ModuleType, arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("of no kind that was thought of")
+
+    command: Callable[[Sequence[str]], int] = side.command
+    monkeypatch.setattr(side._Loop, "run", fail)
+    path = tmp_path / "out.json"
+    with pytest.raises(RuntimeError, match="of no kind"):
+        command([*arguments, f"--summary={path}", "--status=none"])
+    assert json.loads(path.read_text())["errors"] == ["of no kind that was thought of"]
+
+
+@contextlib.contextmanager
+def stalled(kind: str) -> Iterator[int]:
+    """A standard output that is full, and that nobody reads."""
+    reads, writes = pty.openpty() if kind == "terminal" else os.pipe()
+    os.set_blocking(writes, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writes, b"x")
+    os.set_blocking(writes, True)
+    try:
+        yield writes
+    finally:
+        os.close(writes)
+        os.close(reads)
+
+
+@contextlib.contextmanager
+def start(module: str, output: int, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
+    command = [sys.executable, "-P", "-m", module, *arguments]
+    with subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()  # where a test has failed
+
+
+def free_port() -> int:
+    """Find one below those that Linux hands out by itself (32768 and up), lest another process gets it."""
+    for port in random.SystemRandom().sample(range(20_000, 30_000), 1000):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    return pytest.fail("no port is free")
+
+
+@pytest.mark.parametrize("side", ["robot", "operator"])
+@pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
+def test_a_signal_ends_a_side_whoever_stalls_its_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    control, view = (f"tcp://127.0.0.1:{free_port()}" for _ in range(2))
+    robot = [f"--bind={control}", f"--view-bind={view}"]
+    operator = [f"--connect={control}", f"--view-connect={view}", "--device=simulated", f"--summary={path}"]
+    stalls, other = (robot, operator) if side == "robot" else (operator, robot)
     with (
-        SideProcess("robot_side.main", "robot", ["--probability=2"]) as side,
-        pytest.raises(ConfigurationError, match="probability"),
+        stalled(kind) as output,
+        start(f"{side}_side", output, *stalls, f"--status={mode}") as process,
+        SideProcess("operator_side" if side == "robot" else "robot_side", "other", other) as watching,
     ):
-        side.wait_for("listening", LIMIT_S)
+        assert any(watching.wait_for("status", LIMIT_S).get("state") == "armed" for _ in range(5000))
+        process.send_signal(signal.SIGTERM)
+        _, complaint = process.communicate(timeout=LIMIT_S)
+        assert (process.returncode, complaint) == (0, "")
+    assert json.loads(path.read_text())["triggers_released"] is True
+
+
+# Fewer descriptors than strangers open connections.
+FEW = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+def test_strangers_who_only_connect_cost_nobody_the_session(tmp_path: Path) -> None:
+    folder, summary = KeyFolder(tmp_path / "keys"), tmp_path / "out.json"
+    (robot_key, robot_secret), (anna_key, anna_secret), (ben_key, _) = (make_key_pair() for _ in range(3))
+    folder.write_pair("robot", robot_key, robot_secret)
+    folder.write_pair("operator", anna_key, anna_secret)
+    folder.allow("anna", anna_key)
+    folder.allow("ben", ben_key)
+    keys = f"--keys={folder.path}"
+    with (
+        SideProcess(
+            "robot_side", "robot", [*ROBOT, keys, f"--summary={summary}"], before=[sys.executable, "-c", FEW]
+        ) as robot,
+        contextlib.ExitStack() as crowd,
+    ):
+        listening = robot.wait_for("listening", LIMIT_S)
+        ends = [f"--connect={listening['control']}", f"--view-connect={listening['view']}", "--device=simulated"]
+        with SideProcess("operator_side", "operator", [*ends, keys, f"--robot-key={robot_key}"]) as operator:
+            assert any(robot.wait_for("status", LIMIT_S)["state"] == "armed" for _ in range(5000))
+            for endpoint in (listening["control"], listening["view"]):
+                for _ in range(300):
+                    crowd.enter_context(contextlib.closing(RawConnection(port_of(endpoint))))
+            # The list of keys is looked at again, and the view is opened again, in the crowd.
+            folder.revoke("ben")
+            robot.events()
+            for _ in range(10):
+                robot.wait_for("status", LIMIT_S)
+            assert any(robot.wait_for("status", LIMIT_S)["owner"] in OWNING for _ in range(5000))
+            assert any(operator.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5000))
+            operator.check()
+        assert robot.stop(LIMIT_S) == 0
+    figures = json.loads(summary.read_text())
+    assert figures["errors"] == []
+    assert figures["strangers"]["crowded"] > 0
+    assert figures["strangers"]["revoked"] == 0

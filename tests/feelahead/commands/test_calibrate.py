@@ -99,18 +99,16 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
     assert f"stored: {out}" in capsys.readouterr().out
 
 
-def test_hands_that_do_not_pull_are_told_why_and_nothing_is_stored(handle: PlayedHandle, own_folder: Path) -> None:
-    handle.play(lambda _: ControllerState())
-    with pytest.raises(CalibrationError, match="Pull L2"):
+@pytest.mark.parametrize(
+    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "said nothing for 5 s")]
+)
+def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
+    handle: PlayedHandle, own_folder: Path, still_s: float, error: type[Exception], said: str
+) -> None:
+    handle.play(lambda now_s: ControllerState() if now_s < still_s else None)
+    with pytest.raises(error, match=said):
         command(["calibrate"])
     assert list(own_folder.iterdir()) == []
-    assert handle.closed == handle.times_opened > 0
-
-
-def test_a_controller_that_says_nothing(handle: PlayedHandle) -> None:
-    handle.play(lambda now_s: ControllerState() if now_s < 1.0 else None)
-    with pytest.raises(DeviceError, match="said nothing for 5 s"):
-        command(["calibrate"])
     assert handle.closed == handle.times_opened > 0
 
 
@@ -128,45 +126,29 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
 # The operator side
 
 
-@pytest.fixture
-def operator(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[TravelCalibration]]:
-    """Runs the operator side for a moment; what it read its controller through."""
+def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_controller(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
-    monkeypatch.setattr(operator_side.main, "load_backend", lambda: backend)
     # It would be this process's, and stay so.
     monkeypatch.setattr(operator_side.main, "raise_priority", lambda: False)
     taken: list[TravelCalibration] = []
     monkeypatch.setattr(OperatorSide, "calibrate", lambda _, calibration: taken.append(calibration))
 
-    def run(*arguments: str) -> list[TravelCalibration]:
+    def run(*arguments: str) -> str:
         options = ["--connect", "tcp://127.0.0.1:9", "--duration", "0.5", "--no-haptics", *arguments]
-        operator_side.main.command(options)
-        return taken
+        operator_side.main.command(options, backend)
+        return capsys.readouterr().out
 
-    return run
-
-
-def test_the_operator_side_uses_what_is_stored_for_its_controller(
-    operator: Callable[..., list[TravelCalibration]], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert operator() == [TravelCalibration()]
-    assert "feelahead calibrate" in capsys.readouterr().out
+    assert "feelahead calibrate" in run()
+    assert taken == [TravelCalibration()]
     write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
-    assert operator()[1:] == [MEASURED]
-    assert str(calibration_path(ADDRESS)) in capsys.readouterr().out
-
-
-def test_what_is_given_comes_before_what_is_stored(operator: Callable[..., list[TravelCalibration]]) -> None:
-    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
-    assert operator("--calibration.l2.saturation", "0.9") == []
-
-
-def test_a_broken_file_ends_the_operator_side_in_one_line(operator: Callable[..., list[TravelCalibration]]) -> None:
-    write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
+    assert str(calibration_path(ADDRESS)) in run()
+    run("--calibration.l2.saturation", "0.9")
+    assert taken[1:] == [MEASURED]
     calibration_path(ADDRESS).write_text("version = 7")
-    with pytest.raises(ConfigurationError, match="feelahead calibrate") as caught:
-        operator()
-    assert "\n" not in str(caught.value)
+    with pytest.raises(ConfigurationError, match="feelahead calibrate"):
+        run()
 
 
 def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(

@@ -1,12 +1,15 @@
-"""The demo's arguments to the two sides, and its words when something ends early."""
+"""The demo: its arguments to the two sides, its page and its words when something ends early."""
 
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
+import webbrowser
+from collections.abc import Callable
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -14,13 +17,15 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import ConfigurationError
-from feelahead.both_sides.summary import both_statuses
+from feelahead.both_sides.summary import both_statuses, merge_summaries
 from feelahead.commands import demo as module
+from feelahead.commands import open_browser
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from robot_side.simulation.built_in_scenes import SceneName
 from tests.helpers.repository import ROOT
+from tests.operator_side.terminal_view.on_terminal import OnTerminal
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
 
@@ -42,19 +47,18 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
-def test_what_was_said_is_passed_on_even_where_it_is_the_default() -> None:
+def test_what_was_said_is_passed_on_even_where_it_is_the_default_to_who_takes_it(tmp_path: Path) -> None:
     robot, operator = passed_on("--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime")
     assert {"--seed=0", "--link=delay 5ms", "--probability=0.99", "--realtime"} <= set(robot)
     assert {"--seed=0", "--link=delay 5ms", "--haptics", "--realtime"} <= set(operator)
-    assert "--no-haptics" in passed_on("--no-haptics")[1]
-
-
-def test_the_demos_own_file_counts_as_said(tmp_path: Path) -> None:
     config = tmp_path / "demo.toml"
     config.write_text('link = "delay 5ms"\nhaptics = false\nlaw = "paper"\ncompensation = "robot"\n')
     robot, operator = passed_on("--config", str(config))
     assert {"--link=delay 5ms", "--law=paper"} <= set(robot)
     assert {"--no-haptics", "--compensation=robot"} <= set(operator)
+    # Each side takes what it is told, and is not told what the other takes.
+    assert parse_settings(RobotSettings, "robot", robot).law == "paper"
+    assert parse_settings(OperatorSettings, "operator", operator).compensation == "robot"
 
 
 def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_alone(
@@ -68,18 +72,6 @@ def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_
         robot, operator = passed_on("--scene", scene)
         assert parse_settings(RobotSettings, "robot", robot).scene == scene
         assert not [flag for flag in operator if flag.startswith("--scene")]
-
-
-@pytest.mark.parametrize(("law", "compensation"), [("swept", "robot"), ("paper", "operator")])
-def test_the_robot_side_is_told_the_law_and_the_operator_side_who_reckons(law: str, compensation: str) -> None:
-    robot, operator = passed_on("--law", law, "--compensation", compensation)
-    assert [flag for flag in robot if flag.startswith(("--law", "--compensation"))] == [f"--law={law}"]
-    assert [flag for flag in operator if flag.startswith(("--law", "--compensation"))] == [
-        f"--compensation={compensation}"
-    ]
-    # Each side takes what it is told.
-    assert parse_settings(RobotSettings, "robot", robot).law == law
-    assert parse_settings(OperatorSettings, "operator", operator).compensation == compensation
 
 
 def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
@@ -161,17 +153,93 @@ def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) 
 
 
 @pytest.mark.processes
-def test_the_summary_has_each_loops_pace_and_what_strangers_did(tmp_path: Path) -> None:
-    path = tmp_path / "out.json"
-    with start("--duration", "2", "--status", "none", "--realtime", "--summary", str(path)) as process:
-        _, complaint = process.communicate(timeout=600)
-    assert (process.returncode, complaint) == (0, "")
-    summary = json.loads(path.read_text())
-    for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
-        assert paced["overruns"] >= 0
-        assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
-    # Before the robot side knows its operator, a late tick reads no more of what waits than of anybody's.
-    assert summary["strangers"].pop("unread") >= 0
-    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "crowded": 0, "malformed": 0}
-    # A deadline is met by a tick or counted as an overrun (test_pacing.py: each of them), and none is both.
-    assert 0 < summary["ticks"] <= summary["ticks"] + summary["overruns"] <= summary["duration_s"] * 1000 + 1
+def test_the_demo_is_drawn_from_the_facts_of_both_sides_and_gives_the_terminal_back() -> None:
+    demo = OnTerminal([sys.executable, "-P", "-m", "feelahead", "demo", "--tui", "--no-console", "--duration", "600"])
+    try:
+        # The delay and the zones are the operator side's, the nearest thing and the ticks the robot side's.
+        for said in (b"starting", b"link ", b" mean ", b"R2 advances", b"nearest ", b"tick p99", b"ARMED"):
+            demo.read_until(_shows(said))
+        assert demo.end(b"contacts with obstacles") == 0
+        assert demo.is_put_back()
+        # The report is what stays on the first screen.
+        assert b"feelahead demo: delay: " in demo.seen.rpartition(b"\x1b[?1049l")[2]
+    finally:
+        demo.close()
+
+
+def _shows(said: bytes) -> Callable[[bytes], bool]:
+    return lambda seen: said in seen
+
+
+ADDRESS = "http://127.0.0.1:1/token/"
+
+
+@pytest.mark.parametrize(
+    ("terminal", "display", "opens"), [(True, ":0", True), (True, "", False), (False, ":0", False)]
+)
+def test_it_opens_in_a_terminal_with_a_display_alone(
+    terminal: bool, display: str, opens: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, done = [], threading.Event()
+
+    def open_it(address: str) -> None:
+        opened.append(address)
+        done.set()
+
+    monkeypatch.setattr(webbrowser, "open", open_it)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    open_browser.show_address(ADDRESS, Status("none", "test"))
+    if opens:
+        done.wait(20.0)
+    assert opened == [ADDRESS] * opens
+
+
+ROBOT: dict[str, Any] = {
+    "ticks": 10_000,
+    "messages": {"stiffness_sent": 990, "motion_received": 240, "rejected": 3, "stale": 5},
+    "delay_ms": {"to_robot": {"mean": 50.0, "p99": 71.0}},
+    "applied_age_ms": {"to_robot": {"mean": 48.0}},
+    "stops": [{"time_s": 3.0, "reason": "no command for 100 ms"}],
+    "task": {"lifted_mm": 100.0},
+    "min_distance_mm": None,
+    "errors": ["robot: out of paper"],
+}
+OPERATOR: dict[str, Any] = {
+    "messages": {"stiffness_received": 980, "motion_sent": 250, "rejected": 1, "stale": 20},
+    "delay_ms": {"to_operator": {"mean": 20.0}, "round_trip": {"mean": 70.0}},
+    "applied_age_ms": {"to_operator": {"mean": 19.0}},
+    "errors": ["operator: asleep"],
+}
+
+
+def test_what_each_side_alone_knows_stands_beside_the_others() -> None:
+    merged = merge_summaries(ROBOT, OPERATOR, [])
+    assert merged["ticks"] == 10_000
+    assert merged["min_distance_mm"] is None
+    assert merged["stops"] == ROBOT["stops"]
+    assert merged["task"] == {"lifted_mm": 100.0}
+    assert merged["delay_ms"] == {
+        "to_robot": {"mean": 50.0, "p99": 71.0},
+        "to_operator": {"mean": 20.0},
+        "round_trip": {"mean": 70.0},
+    }
+    assert merged["applied_age_ms"] == {"to_robot": {"mean": 48.0}, "to_operator": {"mean": 19.0}}
+    # Counts that both have are added.
+    assert merged["messages"] == {
+        "stiffness_sent": 990,
+        "stiffness_received": 980,
+        "motion_sent": 250,
+        "motion_received": 240,
+        "rejected": 4,
+        "stale": 25,
+    }
+
+
+def test_a_side_that_left_no_summary_takes_nothing_from_the_other_and_every_error_is_kept() -> None:
+    alone = merge_summaries(ROBOT, {}, ["the operator side failed"])
+    assert alone == ROBOT | {"errors": ["robot: out of paper", "the operator side failed"]}
+    assert merge_summaries({}, OPERATOR, []) == OPERATOR
+    assert merge_summaries(ROBOT, OPERATOR, [])["errors"] == ["robot: out of paper", "operator: asleep"]

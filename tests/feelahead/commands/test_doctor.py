@@ -7,13 +7,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from feelahead.commands.doctor import command as doctor_command
 from feelahead.commands.doctor import controllers, machine
 from feelahead.commands.doctor.controllers import (
     ControllerSeen,
-    HidFacts,
     check_controllers,
     check_hidapi,
     check_permission,
@@ -68,12 +66,12 @@ def permission(*seen: ControllerSeen, platform: str = "linux", is_root: bool = F
         ([check_extra("robot", ABSENT)], MISSING, "not installed: some_module", re.escape("'feelahead[robot]'")),
         ([check_extra("record", ABSENT)], NOTE, "not installed: some_module", re.escape("'feelahead[record]'")),
         ([check_extra("robot", BROKEN)], MISSING, "numba; cannot be imported: mujoco (libGL", "numba mujoco-core$"),
-        ([check_hidapi("linux", HidFacts("0.15.0", ("hidapi",), None))], OK, "0.15.0", None),
-        ([check_hidapi("linux", HidFacts(None, (), "not importable"))], NOTE, "not installed", "operator"),
-        ([check_hidapi("linux", HidFacts("0.15.0", BOTH, None))], NOTE, "called hid, too", "pip uninstall hid && "),
-        ([check_hidapi("linux", HidFacts("0.15.0", BOTH, "no"))], MISSING, "called hid, too", "pip uninstall hid && "),
-        ([check_hidapi("darwin", HidFacts("0.15.0", BOTH, None))], MISSING, "called hid, too", "pip uninstall hid && "),
-        ([check_hidapi("win32", HidFacts("0.15.0", ("hidapi",), "broken"))], MISSING, "broken", "--force-reinstall"),
+        ([check_hidapi("linux", "0.15.0", ("hidapi",), None)], OK, "0.15.0", None),
+        ([check_hidapi("linux", None, (), "not importable")], NOTE, "not installed", "operator"),
+        ([check_hidapi("linux", "0.15.0", BOTH, None)], NOTE, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("linux", "0.15.0", BOTH, "no")], MISSING, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("darwin", "0.15.0", BOTH, None)], MISSING, "called hid, too", "pip uninstall hid && "),
+        ([check_hidapi("win32", "0.15.0", ("hidapi",), "broken")], MISSING, "broken", "--force-reinstall"),
         ([permission()], NOTE, RULE_FILE, "udevadm control --reload && sudo udevadm trigger$"),
         ([permission(DENIED)], MISSING, RULE_FILE, "udevadm"),
         ([permission(SEEN)], OK, "can be opened", None),
@@ -120,13 +118,6 @@ def test_what_is_checked_is_what_the_package_and_the_robot_side_say() -> None:
     assert (RENDERING, RENDERING_PACKAGES) == (BACKENDS, REMEDY)
 
 
-def test_the_rule_with_its_place_and_what_loads_it() -> None:
-    lines = (permission().remedy or "").splitlines()
-    assert {*RULES, f"sudo tee {RULE_FILE} << 'END'", "END"} <= set(lines)
-    # Before the file that gives devices to people.
-    assert Path(RULE_FILE).name < "73-seat-late.rules"
-
-
 def test_rules_that_others_wrote_count() -> None:
     steam = (
         'KERNEL=="hidraw*", ATTRS{idVendor}=="054c", ATTRS{idProduct}=="0ce6", MODE="0660", TAG+="uaccess"\n'
@@ -142,15 +133,12 @@ def test_rules_that_others_wrote_count() -> None:
 # On this machine
 
 
-def test_a_port_that_is_taken_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.processes
+def test_what_cannot_be_bound_imported_or_rendered_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         monkeypatch.setattr(machine, "PORTS", {port: "a test"})
         assert machine.port_troubles() == {port: "Address already in use"}
-
-
-@pytest.mark.processes
-def test_what_cannot_be_imported_or_rendered_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "EXTRAS", {"robot": ("json", "no_such_module")})
     assert machine.failed_imports() == {"robot": {"no_such_module": "No module named 'no_such_module'"}}
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
@@ -171,33 +159,26 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     assert (working.closed, working.written) == (working.times_opened, [])
 
 
-def fake_findings(verdict: Verdict) -> list[Finding]:
-    return [
-        Finding("extra robot", verdict, "numba [gone]", "pip install 'feelahead[robot]'", for_demo=True),
-        Finding("udev rule", NOTE, "none", installing_command()),
-    ]
-
-
 @pytest.mark.parametrize(("verdict", "code"), [(OK, 0), (MISSING, 1)])
 def test_the_exit_code_says_whether_the_demo_can_run(
     verdict: Verdict, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    findings = [
+        Finding("extra robot", verdict, "numba [gone]", "pip install 'feelahead[robot]'", for_demo=True),
+        Finding("udev rule", NOTE, "none", installing_command()),
+    ]
     monkeypatch.setattr(controllers, "controllers_seen", lambda: [SEEN])
-    monkeypatch.setattr(doctor_command, "examine", lambda _: fake_findings(verdict))
+    monkeypatch.setattr(doctor_command, "examine", lambda _: findings)
+    assert command(["doctor"]) == code
+    lines = capsys.readouterr().out.splitlines()
+    # What is to be copied is not wrapped, and brackets are no markup.
+    assert set(installing_command().splitlines()) <= set(lines)
+    assert any("numba [gone]" in line for line in lines)
     assert command(["doctor", "--json"]) == code
     told = json.loads(capsys.readouterr().out)
     assert told["demo"] is (code == 0)
     assert (told["findings"][0]["name"], told["findings"][0]["verdict"]) == ("extra robot", verdict.value)
     assert told["controllers"][0]["address"] == ADDRESS
-
-
-def test_what_is_to_be_copied_is_not_wrapped() -> None:
-    console = Console(width=60)
-    with console.capture() as captured:
-        doctor_command.show(fake_findings(MISSING), console)
-    lines = captured.get().splitlines()
-    assert set(installing_command().splitlines()) <= set(lines)
-    assert any("numba [gone]" in line for line in lines)
 
 
 @pytest.mark.processes

@@ -6,11 +6,12 @@ import json
 import re
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,7 +23,7 @@ from common.sockets.authentication import RobotKeys, make_key_pair
 from common.sockets.greeting import KNOCK
 from common.sockets.keys import KeyFolder
 from feelahead.commands.doctor import link_facts
-from feelahead.commands.doctor.link_judgement import LinkFacts, Opening, Talk, Wrong, judge, reached
+from feelahead.commands.doctor.link_judgement import LinkFacts, Opening, Talk, Wrong, judge
 from feelahead.main import command
 from tests.helpers.serving_robot import ServingRobot
 
@@ -134,14 +135,6 @@ def test_what_comes_first_is_said_first() -> None:
         assert judge(fine) is None
 
 
-def test_who_has_the_arm() -> None:
-    begin = f"reached: protocol {PROTOCOL_VERSION}, round trip 1.3 ms (best of 3), "
-    assert reached(FINE) == begin + "the arm is free (you would own it)"
-    taken = Talk(answered=True, round_trips_s=(1.26e-3, 2.0, 3.0), place=2, waiting=1)
-    line = "somebody has the arm (you would observe, as number 2 of those who wait)"
-    assert reached(replace(FINE, talk=taken)) == begin + line
-
-
 # By sockets on loopback
 
 
@@ -158,12 +151,6 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(link_facts, name, LONG_S)
     monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, LONG_S), (LINE_END, LONG_S)))
     monkeypatch.setattr(link_facts, "_ROUND_TRIPS", 3)
-
-
-@pytest.fixture
-def no_answers(monkeypatch: pytest.MonkeyPatch, patience: None) -> None:  # noqa: ARG001  # after it
-    for name in ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S"):
-        monkeypatch.setattr(link_facts, name, SHORT_S)
 
 
 class Doctor:
@@ -287,77 +274,47 @@ def test_one_object_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
         assert told["remedy"].startswith("say --view-connect")
 
 
-@pytest.mark.usefixtures("no_answers")
-def test_a_robot_side_that_does_not_answer(doctor: Doctor) -> None:
-    with ServingRobot(answers=False, publishes=False) as robot:
-        assert doctor.of(robot).startswith("no answer: ")
+@pytest.mark.parametrize(
+    ("robot", "never", "said"),
+    [
+        ({"answers": False, "publishes": False}, ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S"), "no answer: "),
+        (
+            {"version": PROTOCOL_VERSION + 1},
+            (),
+            f"version: the robot side speaks protocol version {PROTOCOL_VERSION + 1}, this machine",
+        ),
+        ({"publishes": False}, ("_TELEMETRY_LIMIT_S",), "view port: the control port works, but"),
+    ],
+)
+def test_a_robot_side_that_is_silent_or_another(
+    doctor: Doctor, monkeypatch: pytest.MonkeyPatch, robot: dict[str, Any], never: Sequence[str], said: str
+) -> None:
+    for name in never:
+        monkeypatch.setattr(link_facts, name, SHORT_S)
+    with ServingRobot(**robot) as serving:
+        assert doctor.of(serving).startswith(said)
 
 
-def test_a_robot_side_of_another_version(doctor: Doctor) -> None:
-    with ServingRobot(version=PROTOCOL_VERSION + 1) as robot:
-        line = doctor.of(robot)
-    assert line.startswith(f"version: the robot side speaks protocol version {PROTOCOL_VERSION + 1}, this machine")
-
-
-@pytest.mark.usefixtures("no_answers")
-def test_the_view_port_in_place_of_the_control_port(doctor: Doctor) -> None:
-    with ServingRobot() as robot:
-        line = doctor.line("--connect", robot.view, "--view-connect", robot.control)
-    assert "its view port" in line or "perhaps a view port" in line
-
-
-def test_a_view_port_that_sends_nothing(doctor: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
-    with ServingRobot(publishes=False) as robot:
-        monkeypatch.setattr(link_facts, "_TELEMETRY_LIMIT_S", SHORT_S)
-        assert "sends no telemetry" in doctor.of(robot)
-
-
-class Keyed:
-    """A robot side with keys, and an operator whom it lets in."""
-
-    def __init__(self, folder: Path) -> None:
-        self.robot = KeyFolder(folder / "robot")
-        self.robot_key, secret = make_key_pair()
-        self.operator_key, ours = make_key_pair()
-        KeyFolder(folder / "operator").write_pair("operator", self.operator_key, ours)
-        self.robot.allow("anna", self.operator_key)
-        self.allowed = AllowList(self.robot)
-        self.allowed.refresh()
-        self.keys = RobotKeys(secret, self.allowed)
-        self.flags = ("--keys", str(folder / "operator"), "--robot-key")
-
-
-@pytest.fixture
-def keyed(tmp_path: Path) -> Keyed:
-    return Keyed(tmp_path)
-
-
-def test_all_is_well_with_keys(doctor: Doctor, keyed: Keyed) -> None:
-    with ServingRobot(keys=keyed.keys) as robot:
-        assert doctor.of(robot, *keyed.flags, keyed.robot_key, code=0).startswith("reached: ")
-    assert robot.sockets.refused == 0
-
-
-def test_keys_on_one_side_alone(doctor: Doctor, keyed: Keyed) -> None:
-    with ServingRobot(keys=keyed.keys) as robot:
+def test_keys_on_both_sides_on_one_and_wrong_ones(doctor: Doctor, tmp_path: Path) -> None:
+    folder = KeyFolder(tmp_path / "robot")
+    (robot_key, secret), (operator_key, ours) = make_key_pair(), make_key_pair()
+    KeyFolder(tmp_path / "operator").write_pair("operator", operator_key, ours)
+    folder.allow("anna", operator_key)
+    allowed = AllowList(folder)
+    allowed.refresh()
+    flags = ("--keys", str(tmp_path / "operator"), "--robot-key")
+    with ServingRobot(keys=RobotKeys(secret, allowed)) as robot:
+        assert doctor.of(robot, *flags, robot_key, code=0).startswith("reached: ")
         assert "asks for keys, and none were given" in doctor.of(robot)
-    assert robot.sockets.refused == 0
+        assert robot.sockets.refused == 0
+        assert doctor.of(robot, *flags, make_key_pair()[0]).startswith("robot key: ")
+        folder.revoke("anna")
+        allowed.refresh()
+        line = doctor.of(robot, *flags, robot_key)
+        assert line.startswith("our key: ")
+        assert line.endswith(f"feelahead keys allow NAME {operator_key}")
     with ServingRobot() as robot:
-        assert "runs without keys, and --keys was given" in doctor.of(robot, *keyed.flags, keyed.robot_key)
-
-
-def test_a_wrong_robot_key(doctor: Doctor, keyed: Keyed) -> None:
-    with ServingRobot(keys=keyed.keys) as robot:
-        assert doctor.of(robot, *keyed.flags, make_key_pair()[0]).startswith("robot key: ")
-
-
-def test_a_key_that_is_not_let_in(doctor: Doctor, keyed: Keyed) -> None:
-    keyed.robot.revoke("anna")
-    keyed.allowed.refresh()
-    with ServingRobot(keys=keyed.keys) as robot:
-        line = doctor.of(robot, *keyed.flags, keyed.robot_key)
-    assert line.startswith("our key: ")
-    assert line.endswith(f"feelahead keys allow NAME {keyed.operator_key}")
+        assert "runs without keys, and --keys was given" in doctor.of(robot, *flags, robot_key)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """The commands on recordings: bad input in one line, and a real demo that is computed again to the same bits."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -67,16 +65,6 @@ def test_without_the_extra_the_command_that_mends_it(tmp_path: Path, monkeypatch
     for command, arguments in ((demo, ["--record", str(tmp_path / "run.mcap")]), (replay, ["run.mcap"])):
         with pytest.raises(ConfigurationError, match=r"pip install 'feelahead\[record\]'"):
             command(arguments)
-
-
-@pytest.mark.processes
-def test_no_side_imports_what_it_does_not_need() -> None:
-    code = (
-        "import sys, robot_side.main, operator_side.main, feelahead.main;"
-        "print(sorted({'foxglove', 'mcap', 'pyarrow', 'matplotlib'} & sys.modules.keys()))"
-    )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ended.stdout.strip() == "[]"
 
 
 @pytest.mark.processes

@@ -16,16 +16,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow import parquet
-from scipy.stats import binom
 
-from common.errors import ConfigurationError, FeelaheadError
+from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import try_out
-from feelahead.lab.executors import LostWorkersError
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, student_interval, welch_interval
 from feelahead.lab.journal import Journal
 from feelahead.lab.progress import progress
 from feelahead.lab.sweep import ask, generator, sweep
-from feelahead.lab.table import Table
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting
 from tests.helpers.repository import ROOT
 
@@ -71,12 +68,12 @@ def test_a_journal_cut_anywhere_gives_the_same_table(
     folder = tmp_path_factory.mktemp("cut")
     path = folder / "journal.jsonl"
     grid = Counting(numbers=(1, 2), seeds=2, workers=1, resume=path)
-    whole, _, _ = sweep(QUESTION, grid)
+    whole = sweep(QUESTION, grid).table
     content = path.read_bytes()
     path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
-    again, failures, left = sweep(QUESTION, grid)
-    assert list(again) == list(whole)
-    assert (failures, left) == ([], 0)
+    again = sweep(QUESTION, grid)
+    assert list(again.table) == list(whole)
+    assert (again.failures, again.left, again.ended) == ([], 0, None)
     # All pieces are there once more, none twice.
     assert sorted(path.read_bytes().splitlines()) == sorted(content.splitlines())
 
@@ -135,16 +132,28 @@ def test_bad_input_ends_the_sweep_at_once(tmp_path: Path) -> None:
     [
         (["--workers", "2"], "--workers 2: try counting measures time"),
         (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1: try counting measures time"),
+        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
+        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
         (["--picture", "/a.png"], "--picture /a.png: try counting has no figure"),
         (["--picture", "/a.bmp"], "ends in .png, .svg, .pdf"),
-        (["--workers", "0"], "workers = 0; valid: at least 1"),
-        (["--seeds", "0"], "seeds = 0; valid: at least 1"),
+        (["--workers", "0"], "--workers = 0; valid: at least 1"),
+        (["--seeds", "0"], "--seeds = 0; valid: at least 1"),
+        (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
+        (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
         (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or its folder is not there"),
+        (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
+        (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
+        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_line(arguments: list[str], said: str) -> None:
+def test_what_cannot_be_would_lose_work_or_never_end_is_refused_in_a_line(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
     with pytest.raises(ConfigurationError, match=re.escape(said)):
         ask(TIMED, arguments)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 def test_all_files_hold_the_same_rows_and_the_settings_stand_beside_them(tmp_path: Path, expected: bytes) -> None:
@@ -162,24 +171,9 @@ def test_all_files_hold_the_same_rows_and_the_settings_stand_beside_them(tmp_pat
     assert {"versions", "code", "frozen", "question"} <= beside.keys()
 
 
-def test_tables_select_and_group() -> None:
-    table = Table([{"a": 1, "b": None}, {"a": 2, "c": [1]}, {"a": 1, "b": 3.0}])
-    assert table.columns == ["a", "b"]
-    assert table.values("b") == [3.0]
-    assert len(table.where(a=1)) == 2
-    assert [(key, len(rows)) for key, rows in table.groups("a")] == [((1,), 2), ((2,), 1)]
-
-
-@given(of=st.integers(1, 200), share=st.floats(0.0, 1.0))
-def test_the_exact_interval_leaves_as_much_on_either_side(of: int, share: float) -> None:
-    count = round(share * of)
-    low, high = share_interval(count, of)
-    assert low <= count / of <= high
-    assert count == 0 or binom.sf(count - 1, of, low) == pytest.approx(0.025, abs=1e-6)
-    assert count == of or binom.cdf(count, of, high) == pytest.approx(0.025, abs=1e-6)
-
-
 def test_intervals_of_few_and_of_equal_values_are_told_apart() -> None:
+    # Clopper and Pearson: 1 - 0.025^(1/10) for none of ten.
+    assert share_interval(0, 10) == pytest.approx((0.0, 1.0 - 0.025**0.1))
     # Six lose it and none gains it: 2 / 2^6.
     assert mcnemar_p([True] * 6 + [False] * 4, [False] * 10) == pytest.approx(2.0 / 2**6)
     assert mcnemar_p([True, False], [True, False]) == 1.0
@@ -205,16 +199,34 @@ def test_the_example_of_the_readme_runs_and_is_short(tmp_path: Path, capsys: pyt
     assert [row["overtaken"] == "0" for row in rows] == [True, True] + [False] * 6
 
 
-def test_in_a_log_a_line_now_and_then_says_how_far_it_is(
+def test_in_a_log_a_line_a_minute_says_how_far_it_is_and_what_is_at_work(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 0.0)
-    with progress("baking", 4.0) as advance:
-        advance(1.0)
-        advance(3.0)
-    first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith("baking: 25 %, about ")
-    assert second == "baking: 100 %, about 0 min left"
+    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 1e-3)
+    said: list[str] = []
+    with progress("baking", 4.0) as shown:
+        for piece, share in (("rye", 1.0), ("oats", 3.0)):
+            shown.begin(piece)
+            while not said or f", {piece} for 0 min" not in said[-1]:
+                said += capsys.readouterr().err.splitlines()
+            shown.advance(share)
+    assert said[0] == "baking: 0 %, time left unknown, rye for 0 min"
+    assert said[-1] == "baking: 25 %, about 0 min left, oats for 0 min"
+
+
+def test_on_a_terminal_the_cell_at_work_has_a_spinner_and_its_own_time(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with progress("baking", 4.0) as shown:
+        shown.begin("rye")
+        said = ""
+        while said.count("rye") < 3:
+            said += capsys.readouterr().err
+    drawn = {found[1] for found in re.finditer(r"(\S)\x1b\[0m [^\n]*rye[^\n]*0:00:0", said)}
+    assert len(drawn) > 1, said
 
 
 # With processes that are killed
@@ -266,13 +278,46 @@ def test_a_killed_worker_process_costs_no_row(tmp_path: Path, expected: bytes) -
 
 
 @pytest.mark.processes
-def test_a_worker_that_is_killed_again_and_again_ends_the_sweep(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_worker_that_is_killed_again_and_again_leaves_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("feelahead.lab.sweep._RESTARTS", 0)
-    (tmp_path / "1-0").write_text("kill")
-    with pytest.raises(LostWorkersError, match=r"a worker process was ended from outside; \d+ runs are left"):
-        ask(QUESTION, ["--folder", str(tmp_path), "--workers", "2"])
+    monkeypatch.setattr("feelahead.lab.pieces._RESTARTS", 0)
+    (tmp_path / "3-2").write_text("kill")
+    rows = tmp_path / "rows.csv"
+    folder = ["--folder", str(tmp_path), "--wait-s", "0.05"]
+    assert ask(QUESTION, [*_GRID, *folder, "--workers", "2", "--csv", str(rows)]) == 1
+    said = capsys.readouterr()
+    finished = len(rows.read_text().splitlines()) - 1
+    assert 0 < finished < 24
+    assert f"{finished} rows" in said.out
+    [line] = said.err.splitlines()
+    assert re.fullmatch(
+        r"feelahead try counting: a worker process was ended from outside; \d+ runs are left; with --resume FILE.*",
+        line,
+    )
+
+
+@pytest.mark.parametrize("journal", [True, False])
+@pytest.mark.processes
+def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: bytes, journal: bool) -> None:
+    rows, kept = tmp_path / "rows.csv", tmp_path / "journal"
+    resume = ["--resume", str(kept)] if journal else []
+    grid = [*_GRID, "--folder", str(tmp_path), "--wait-s", "0.2", *resume, "--csv", str(rows)]
+    with _drive([*grid, "--workers", "2"]) as driver:
+        while not (tmp_path / "2-0").exists():
+            assert driver.poll() is None
+        driver.send_signal(signal.SIGINT)
+        _, complaint = driver.communicate(timeout=60.0)
+    assert driver.returncode == 130
+    [line] = complaint.splitlines()
+    goes_on = f"the same command with --resume {kept} goes on" if journal else "with --resume FILE.jsonl"
+    assert re.search(r": interrupted; \d+ of 12 runs are finished; \d+ runs are left; ", line)
+    assert goes_on in line
+    assert rows.exists()
+    if journal:
+        assert _without_folder(_asked(tmp_path, *grid[len(_GRID) : -2])) == [
+            [*row[:1], "0.2" if row[1] == "0.0" else row[1], *row[2:]] for row in _without_folder(expected)
+        ]
 
 
 @pytest.mark.processes
@@ -286,7 +331,7 @@ def test_a_killed_cluster_or_driver_costs_no_row(tmp_path: Path, expected: bytes
             assert driver.poll() is None
         {"driver": driver, "worker": worker, "scheduler": scheduler}[victim].send_signal(signal.SIGKILL)
         _, complaint = driver.communicate(timeout=60.0)
-        assert driver.returncode == {"driver": -signal.SIGKILL, "worker": 0, "scheduler": 1}[victim]
+        assert driver.returncode == {"driver": -signal.SIGKILL, "worker": 0, "scheduler": 1}[victim], complaint
         assert victim != "scheduler" or "the scheduler or its workers are gone; " in complaint
     with _dask(2) as (address, _):
         resumed = _asked(tmp_path, *slow, "--resume", str(journal), "--scheduler", address)
@@ -298,28 +343,6 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "1s")
     with pytest.raises(ConfigurationError, match=r"--scheduler tcp://127\.0\.0\.1:1: no dask scheduler answers there"):
         ask(QUESTION, ["--scheduler", "tcp://127.0.0.1:1"])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
-        (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
-        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
-        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
-        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
-        (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
-        (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
-    ],
-)
-def test_what_would_lose_work_or_never_end_is_refused(
-    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    with pytest.raises(ConfigurationError, match=re.escape(said)):
-        ask(QUESTION, arguments)
-    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 @pytest.mark.parametrize(
@@ -337,20 +360,40 @@ def test_a_file_that_holds_no_question_is_refused(tmp_path: Path, name: str, cod
         try_out([str(tmp_path / name)])
 
 
-def test_a_disk_that_takes_no_more_is_named_and_the_journal_stays_readable(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_disk_that_takes_no_more_is_named_and_what_is_finished_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "journal"
-    with Journal(path, {}) as journal:
-        journal.keep("first", [{"a": 1}])
+    path, rows = tmp_path / "journal", tmp_path / "rows.csv"
+    synced = iter(range(2))
 
-        def full(_: int) -> None:
+    def full(_: int) -> None:
+        if next(synced, None) is None:
             raise OSError(28, "No space left on device")
 
-        with monkeypatch.context() as patch:
-            patch.setattr(os, "fsync", full)
-            with pytest.raises(FeelaheadError, match=r"--resume .*journal: cannot be written: No space left on device"):
-                journal.keep("second", [{"a": 2}])
-        assert list(journal.done) == ["first"]
-    with Journal(path, {}) as journal:
-        assert journal.done["first"] == [{"a": 1}]
+    grid = ["--workers", "1", "--resume", str(path), "--csv", str(rows)]
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        assert ask(QUESTION, grid) == 1
+    said = capsys.readouterr()
+    assert "4 rows" in said.out
+    assert len(rows.read_text().splitlines()) == 5
+    [line] = said.err.splitlines()
+    assert f"--resume {path}: cannot be written: No space left on device; 1 runs are left; the same command" in line
+    assert ask(QUESTION, grid) == 0
+
+
+def test_ctrl_c_before_the_first_cell_is_one_line_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("feelahead.commands.bench_and_try.import_module", interrupted)
+    assert try_out(["soak"]) == 130
+    assert capsys.readouterr().err == "feelahead try soak: interrupted\n"
+
+
+def test_a_table_that_cannot_be_written_is_still_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ConfigurationError, match=r"--csv /dev/full: cannot be written: No space left"):
+        ask(QUESTION, ["--workers", "1", "--csv", "/dev/full"])
+    assert "6 rows" in capsys.readouterr().out

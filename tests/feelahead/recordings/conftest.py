@@ -1,7 +1,10 @@
 """One recorded run of both sides in virtual time, for everything that is done with recordings."""
 
+import functools
 import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -10,10 +13,67 @@ from common.protocol.codec import encode
 from common.protocol.messages import Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
+from common.recording.entries import pack_block
 from common.recording.mcap_file import RecordingFile
+from common.recording.provenance import provenance
 from common.recording.reading import Recording, open_recording
-from common.recording.wire import FACTS, HEADER, VIEW, as_json, stamped
-from tests.helpers.recorded_runs import record_loopback
+from common.recording.wire import BLOCK, FACTS, HEADER, STATUS, VIEW, as_json, stamped
+from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, LoopbackSettings
+from operator_side import recorded as operator_recorded
+from operator_side.settings import OperatorSettings
+from robot_side import recorded as robot_recorded
+from robot_side.compiled.warm_up import kernel_digests
+from robot_side.settings import RobotSettings
+
+_BLOCK_S = 0.05
+_FLUSH_BLOCKS = 15
+WALL_OFFSET_S = 1.7e9
+
+
+def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
+    """Record the scripted person's run; `settings` are both sides'."""
+    robot, operator = RobotSettings(**settings), OperatorSettings(**settings)
+    notes: dict[str, list[Any]] = {"robot": [], "operator": []}
+    run = Loopback(
+        LoopbackSettings(robot, operator),
+        robot_side=functools.partial(robot_recorded.RecordedRobotSide, notes["robot"].append),
+        operator_side=functools.partial(operator_recorded.RecordedOperatorSide, notes["operator"].append),
+    )
+    file = RecordingFile(path, WALL_OFFSET_S)
+    content = Content(file)
+    headers = {
+        "robot": provenance(robot, 1, VIRTUAL_CLOCK) | {"kernels": kernel_digests()},
+        "operator": provenance(operator, 2, VIRTUAL_CLOCK),
+    }
+    encoders: dict[str, Any] = {
+        "robot": robot_recorded.RobotEncoder(),
+        "operator": operator_recorded.OperatorEncoder(),
+    }
+    status: dict[str, Callable[[float], dict[str, Any]]] = {
+        "robot": lambda now_s: robot_recorded.recorded_status(run.robot, now_s),
+        "operator": lambda now_s: operator_recorded.recorded_status(run.operator, now_s),
+    }
+    for source, side in enumerate(notes):
+        content.take(source, HEADER + as_json({"side": side, **headers[side]}))
+    for number in range(round(duration_s / _BLOCK_S)):
+        now_s = (number + 1) * _BLOCK_S
+        run.run_until(now_s)
+        for source, side in enumerate(notes):
+            views: list[bytes] = []
+            entries = b"".join(
+                encoders[side].encode(noted, lambda when_s, payload, to=views: to.append(stamped(when_s) + payload))[1]
+                for noted in notes[side]
+            )
+            notes[side].clear()
+            content.take(source, BLOCK + pack_block(number, 0, now_s - _BLOCK_S, now_s, entries))
+            for view in views:
+                content.take(source, VIEW + view)
+            content.take(source, STATUS + stamped(now_s) + as_json(status[side](now_s)))
+        if number % _FLUSH_BLOCKS == _FLUSH_BLOCKS - 1:
+            file.flush()
+    file.close()
+    assert file.error is None
+
 
 DURATION_S = 6.0
 

@@ -14,7 +14,7 @@ from common.protocol.codec import decode_view
 from common.recording.reading import Recording
 from feelahead.commands.recordings import export, plot
 from feelahead.recordings.lerobot import pictures
-from feelahead.recordings.showing import Seen, seen
+from feelahead.recordings.playback import Seen, seen
 from feelahead.recordings.tables import read_tables
 
 pyarrow = pytest.importorskip("pyarrow")

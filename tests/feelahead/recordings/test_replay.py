@@ -1,14 +1,12 @@
-"""The cores once more: from the recorded inputs come the same bits, and a difference is found and told."""
+"""A recording once more: the cores give the same bits, and each moment looks the same however one came to it."""
 
 import dataclasses
-import shutil
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 
-from common.errors import ConfigurationError
 from common.protocol.codec import decode, encode
 from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Kind, split_text
@@ -16,6 +14,7 @@ from common.recording.reading import Recording, open_recording
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
+from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
 from robot_side.assembly import build_robot_side
 
@@ -37,16 +36,13 @@ def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     assert len(written) > 10  # the person felt something, or nothing was compared
 
 
-def test_the_command_says_so(run: Recording, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_says_so_and_another_setting_makes_other_stiffness(
+    run: Recording, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert replay([str(run.path), "--check"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[-1] == "the same, within what is promised"
     assert "equal bit for bit" in said[0]
-
-
-def test_another_setting_makes_other_stiffness(
-    run: Recording, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     build = build_robot_side
 
     def other(settings: Any, *others: Any, **named: Any) -> Any:
@@ -60,16 +56,6 @@ def test_another_setting_makes_other_stiffness(
 def test_other_kernels_are_named(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replaying, "kernel_digests", dict)
     assert [note for note in replay_robot(run).notes if "kernels" in note and "bits may differ" in note]
-
-
-def test_a_cut_file_is_compared_up_to_its_last_complete_second(run: Recording, tmp_path: Path) -> None:
-    cut = tmp_path / "cut.mcap"
-    shutil.copy(run.path, cut)
-    with cut.open("r+b") as file:
-        file.truncate(run.path.stat().st_size // 2)
-    compared = replay_robot(open_recording(cut))
-    assert compared.made == compared.equal > 1000
-    assert compared.notes == ["the file was cut off: compared up to its last complete second"]
 
 
 def test_damage_is_said_and_what_comes_before_is_compared(
@@ -86,11 +72,16 @@ def test_damage_is_said_and_what_comes_before_is_compared(
     assert 0.0 < open_recording(damaged).length_s() < run.length_s()
 
 
-def test_nothing_to_compare_is_not_the_same(run: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    short = tmp_path / "short.mcap"
-    content = run.path.read_bytes()
-    short.write_bytes(content[: content.index(b"feelahead.robot") + 5000])
-    assert replay([str(short), "--check"]) == 1
+def test_a_cut_file_is_compared_up_to_its_last_complete_second_where_there_is_one(
+    run: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut, content = tmp_path / "cut.mcap", run.path.read_bytes()
+    cut.write_bytes(content[: len(content) // 2])
+    compared = replay_robot(open_recording(cut))
+    assert compared.made == compared.equal > 1000
+    assert compared.notes == ["the file was cut off: compared up to its last complete second"]
+    cut.write_bytes(content[: content.index(b"feelahead.robot") + 5000])
+    assert replay([str(cut), "--check"]) == 1
     assert "nothing was compared" in capsys.readouterr().out
 
 
@@ -118,7 +109,61 @@ def test_differences_are_measured(run: Recording) -> None:
     assert not compared.within
 
 
-def test_a_side_that_was_not_recorded(run: Recording) -> None:
-    alone = dataclasses.replace(run, headers={"robot": run.headers["robot"]})
-    with pytest.raises(ConfigurationError, match="the operator side was not recorded; valid: robot"):
-        replay_operator(alone)
+@pytest.fixture
+def recording(with_pictures: tuple[Recording, list[bytes]]) -> Recording:
+    return with_pictures[0]
+
+
+def newest(shown: list[Seen]) -> dict[str, Seen]:
+    return {one.name: one for one in shown}
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0, 40.0])
+def test_it_takes_as_long_as_the_speed_says_and_leaves_nothing_out(recording: Recording, speed: float) -> None:
+    playback = Playback(recording, speed)
+    assert playback.advance(1.0) == []
+    playback.paused = False
+    shown, passed_s = [], 0.0
+    while not playback.over:
+        shown += playback.advance(0.01)
+        passed_s += 0.01
+    assert shown == list(seen(recording))
+    assert passed_s == pytest.approx(playback.length_s / speed, abs=0.011)
+    assert playback.length_s == pytest.approx(shown[-1].time_s, abs=0.01)
+    assert playback.paused
+    playback.wish({"paused": False, "speed": 1.0})  # from its end it begins anew
+    assert playback.state() == {"at_s": 0.0, "length_s": playback.length_s, "speed": 1.0, "paused": False}
+
+
+@pytest.mark.parametrize("moments_s", [(3.0,), (5.0, 3.0), (1.0, 2.0, 3.0), (0.0, 3.0, 3.0)])
+def test_a_moment_looks_the_same_however_one_came_to_it(recording: Recording, moments_s: tuple[float, ...]) -> None:
+    playback = Playback(recording)
+    shown: list[Seen] = []
+    for moment_s in moments_s:
+        playback.wish({"at_s": moment_s})
+        shown += playback.advance(0.02)
+    assert newest(shown) == newest([one for one in seen(recording) if one.time_s <= 3.0])
+    playback.wish({"paused": False})
+    following = playback.advance(0.5)
+    assert following == [one for one in seen(recording) if 3.0 < one.time_s <= 3.5]
+
+
+@pytest.mark.parametrize("words", [None, {"at_s": -1}, {"at_s": float("nan")}, {"speed": 0}, {"paused": 1}, {"x": 1}])
+def test_what_is_no_wish_changes_nothing(recording: Recording, words: Any) -> None:
+    playback = Playback(recording)
+    before = playback.state()
+    playback.wish(words)
+    assert playback.state() == before
+
+
+def test_who_comes_to_look_later_sees_the_moment_at_which_it_rests(recording: Recording) -> None:
+    playback = Playback(recording)
+    playback.wish({"at_s": 3.0})
+    shown = newest(playback.advance(0.02))
+    assert playback.advance(0.02) == []
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == shown
+    assert playback.advance(0.02) == []
+    playback.wish({"at_s": 1.0})
+    playback.show_again()
+    assert newest(playback.advance(0.02)) == newest([one for one in seen(recording) if one.time_s <= 1.0])

@@ -12,8 +12,7 @@ from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import UhidIdentity
 from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
-from tests.kernel.inside.evdev import ABS_RZ, ABS_X, InputDevice
-from tests.kernel.inside.kernel_view import seen_device
+from tests.kernel.inside.kernel_view import ABS_RZ, ABS_X, InputDevice, seen_device
 
 _START_S = 60.0
 # Not all of `feelahead`, whose other commands an emulated processor would load for long.
@@ -37,7 +36,7 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
             view = wait_until("the kernel shows it", lambda: seen_device(told))
             wait_until("three input devices", lambda: len(view.inputs()) == 3)
             with InputDevice(view.inputs()[told.name]) as device:
-                wait_until("R2 is pulled", lambda: device.axis(ABS_RZ).value > 200)
+                wait_until("R2 is pulled", lambda: device.axes(ABS_RZ)[0] > 200)
                 wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
             hidraw = view.hidraw()
             assert hidraw is not None
@@ -53,4 +52,4 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
 
 
 def _left(device: InputDevice) -> bool:
-    return device.axis(ABS_X).value < 100
+    return device.axes(ABS_X)[0] < 100

@@ -2,15 +2,11 @@
 
 import contextlib
 from collections.abc import Iterator
-from pathlib import Path
 
-from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
-from tests.kernel.inside.evdev import (
+from tests.kernel.inside.kernel_view import (
     ABS_HAT0X,
     ABS_HAT0Y,
     ABS_RX,
@@ -22,8 +18,9 @@ from tests.kernel.inside.evdev import (
     BTN_SOUTH,
     BTN_TL,
     InputDevice,
+    KernelView,
+    seen_device,
 )
-from tests.kernel.inside.kernel_view import KernelView, seen_device
 from tests.kernel.inside.plugged import Plugged
 
 
@@ -36,9 +33,9 @@ def bound(plugged: Plugged) -> KernelView:
 
 
 @contextlib.contextmanager
-def opened(plugged: Plugged, suffix: str = "") -> Iterator[InputDevice]:
-    """One of the controller's input devices."""
-    with InputDevice(bound(plugged).inputs()[plugged.identity.name + suffix]) as device:
+def opened(plugged: Plugged) -> Iterator[InputDevice]:
+    """The controller's input device of sticks, triggers and buttons."""
+    with InputDevice(bound(plugged).inputs()[plugged.identity.name]) as device:
         yield device
 
 
@@ -73,32 +70,3 @@ def test_the_kernel_sees_the_hands(plugged: Plugged) -> None:
         plugged.hands_off()
         wait_until("the axes rest", lambda: device.axes(ABS_X, ABS_Y, ABS_Z, ABS_RZ) == (128, 128, 0, 0))
         wait_until("cross is up", lambda: not device.is_down(BTN_SOUTH))
-
-
-def test_the_kernels_motion_sensors_say_that_it_lies_flat(plugged: Plugged) -> None:
-    with opened(plugged, " Motion Sensors") as device:
-        per_g = device.axis(ABS_X).resolution
-        wait_until("one gravity along y", lambda: device.axes(ABS_X, ABS_Y, ABS_Z) == (0, per_g, 0))
-        assert device.axes(ABS_RX, ABS_RY, ABS_RZ) == (0, 0, 0)
-
-
-def test_the_kernels_rumble_spares_the_triggers(plugged: Plugged) -> None:
-    effects = (feedback(position=2, strength=5), feedback(position=4, strength=8))
-    write_raw(bound(plugged).hidraw(), plugged, OutputReport(l2=effects[0], r2=effects[1]))
-    wait_until("the effects arrive", lambda: plugged.ask(lambda controller: controller.effects) == effects)
-    with opened(plugged) as device:
-        device.rumble(1.0, 0.5, 5000)
-        wait_until(
-            "both motors turn", lambda: plugged.ask(lambda c: c.rumble.left > 0.9 and 0.4 < c.rumble.right < 0.6)
-        )
-        assert plugged.ask(lambda controller: controller.effects) == effects, "the rumble changed the triggers"
-    wait_until("the motors rest", lambda: plugged.ask(lambda controller: controller.rumble) == Rumble())
-    assert plugged.ask(lambda controller: controller.effects) == effects, "the rumble's end changed the triggers"
-    write_raw(bound(plugged).hidraw(), plugged, OutputReport(l2=Off(), r2=Off()))
-    wait_until("the triggers are free", lambda: plugged.ask(lambda controller: controller.released))
-
-
-def write_raw(hidraw: Path | None, plugged: Plugged, output: OutputReport) -> None:
-    """Write an output report to the raw device file, as another program would."""
-    assert hidraw is not None
-    hidraw.write_bytes(build_output_report(output, plugged.variant.transport))

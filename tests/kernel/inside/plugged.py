@@ -4,7 +4,6 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Final, TypeVar
 
 from common.clock import MonotonicClock
@@ -53,9 +52,7 @@ class Plugged:
     def __enter__(self) -> "Plugged":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.unplug()
 
     def plug_in(self) -> None:

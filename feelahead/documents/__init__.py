@@ -1,1 +1,0 @@
-"""Documents of which a command writes a part."""

@@ -1,0 +1,107 @@
+"""One cell of a grid with one seed, and how all of them are run: here, in processes, or on a cluster."""
+
+import functools
+import importlib
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from common.errors import ConfigurationError, FeelaheadError
+from feelahead.lab.executors import LostWorkersError, cluster, processes
+from feelahead.lab.progress import Shown
+from feelahead.lab.table import Row
+
+_RESTARTS = 3
+"""Restarts of a pool after one of its processes was killed."""
+_WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One cell with one seed."""
+
+    cell: Any
+    seed: int
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Name it in the journal; equal for equal cells, whatever else the grid holds."""
+        return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
+
+    @property
+    def columns(self) -> Row:
+        """Return the scalars of the cell, and the seed."""
+        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
+        return scalars | {"seed": self.seed}
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value}" for name, value in self.columns.items())
+
+
+def results(
+    question: Any, settings: Any, todo: Sequence[Piece], shown: Shown
+) -> Iterator[tuple[Piece, list[Row] | str]]:
+    """Yield the pieces with what came of them, as they end."""
+    module = question.run.__module__
+    if not todo:
+        return
+    if question.timed or (settings.scheduler is None and (settings.workers == 1 or len(todo) == 1)):
+        for piece in todo:
+            shown.begin(str(piece))
+            yield piece, run_piece(module, piece.cell, piece.seed)
+        return
+    if settings.scheduler is None:
+        question.prepare()
+    left, lost = list(todo), 0
+    while left:
+        before = len(left)
+        pool = cluster(settings.scheduler) if settings.scheduler else processes(settings.workers or _WORKERS)
+        try:
+            with pool as executor:
+                futures: dict[Future[list[Row] | str], Piece] = {
+                    executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
+                }
+                shown.begin(str(left[0]))
+                for future in as_completed(futures):
+                    found = future.result()
+                    left.remove(futures[future])
+                    if left:
+                        shown.begin(str(left[0]))  # the one that has waited longest
+                    yield futures[future], found
+        except LostWorkersError:
+            lost += 1
+            if settings.scheduler or lost > _RESTARTS or len(left) == before:
+                raise
+
+
+def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
+    """Run one cell of the question in `module`, here or in a worker; what failed is said as a line."""
+    question: Any = importlib.import_module(module).QUESTION
+    columns = Piece(cell, seed).columns
+    try:
+        rows = [columns | row for row in question.run(cell, seed)]
+    except ConfigurationError:
+        raise
+    except FeelaheadError as error:
+        return str(error)
+    # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
+    plain: list[Row] = json.loads(json.dumps(rows, default=_of_numpy))
+    return plain
+
+
+def _of_numpy(value: Any) -> Any:
+    """Turn numbers and arrays of NumPy into plain ones."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a row holds {value!r}; valid: numbers, texts, lists and None")
+
+
+def _plain(cell: object) -> dict[str, Any]:
+    """Turn a cell into what JSON has."""
+    plain: dict[str, Any] = msgspec.to_builtins(cell, enc_hook=str)
+    return plain
