@@ -181,10 +181,11 @@ def _notes(scene: Scene) -> tuple[str, ...]:
         f"{name!r} names more than one thing, such as a body and a geom of the world: they count as one object"
         for name in scene.shared_names[:_NAMED_OBJECTS]
     ]
-    if scene.volume_errors:
-        largest_first = sorted(scene.stands_out_m.items(), key=lambda item: -item[1])
+    shapes = scene.primitives
+    if shapes.volume_errors:
+        largest_first = sorted(shapes.stands_out_m.items(), key=lambda item: -item[1])
         shown = [
-            f"{name} by {1e3 * reach_m:.2f} mm ({100.0 * scene.volume_errors[name]:.1f} % of its volume)"
+            f"{name} by {1e3 * reach_m:.2f} mm ({100.0 * shapes.volume_errors[name]:.1f} % of its volume)"
             if math.isfinite(reach_m)
             else f"{name} as its convex hull or bounding box"
             for name, reach_m in largest_first[:_NAMED_OBJECTS]

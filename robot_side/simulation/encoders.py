@@ -17,10 +17,7 @@ class Encoder:
     """
 
     def __init__(self, sigma_rad: float = 2e-4, resolution_rad: float = 2.0 * math.pi / 2**15, seed: int = 0) -> None:
-        """Seed the noise. ValueError for a negative or non-finite deviation or step; a step of 0 is none."""
-        for name, value in (("sigma_rad", sigma_rad), ("resolution_rad", resolution_rad)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} = {value}; valid: finite and 0 or more")
+        """Seed the noise; a step of 0 is none."""
         self._sigma_rad = sigma_rad
         self._resolution_rad = resolution_rad
         self._noise = np.random.default_rng(seed)

@@ -89,11 +89,6 @@ class ObjectPrimitives:
         self._mesh_index = np.array([meshes[int(geom)][0] for geom in self._mesh_geoms], dtype=np.int64)
         self._plane_geoms, self._plane_object = _columns(of_kind["plane"])
 
-    @property
-    def approximated(self) -> tuple[str, ...]:
-        """Names of the objects that are seen larger than they are."""
-        return tuple(self.volume_errors)
-
     def only(self, things: IntArray) -> "ObjectPrimitives":
         """Those of some of the objects, things (m,), rising: by their places among these."""
         part = copy(self)

@@ -1,17 +1,12 @@
 """What rests in a built-in scene sleeps, and wakes as soon as anything happens to it."""
 
-from pathlib import Path
-
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
-import pytest
 
 from common.arrays import FloatArray
-from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.ground_truth import GroundTruth
-from robot_side.simulation.scene import Scene, load_scene
+from robot_side.simulation.scene import Scene
 from robot_side.simulation.true_contact import TrueContact
-from tests.helpers.arm_models import planar_arm
 from tests.helpers.tool_driver import ToolDriver
 
 FREE = ("target", "carton", "tin", "block", "book", "ball", "orange", "tetrahedron")
@@ -39,16 +34,6 @@ def test_what_rests_sleeps_where_it_would_stand_awake() -> None:
     assert asleep(waking.scene) == set()
     for name in FREE:
         np.testing.assert_allclose(position_m(sleeping.scene, name), position_m(waking.scene, name), atol=1e-4)
-
-
-@pytest.mark.parametrize("name", ["table", "wall", "slot", "shelf"])
-def test_nothing_but_the_built_in_arm_says_who_sleeps(name: SceneName, tmp_path: Path) -> None:
-    assert load_scene(name=name).model.opt.enableflags & SLEEP
-    # A bare arm of somebody else's stands before the same things, and its model's options hold.
-    path = planar_arm(tmp_path)
-    assert not load_scene(path, "tcp", name=name).model.opt.enableflags & SLEEP
-    path.write_text(path.read_text().replace('integrator="implicitfast"/>', '><flag sleep="enable"/></option>'))
-    assert load_scene(path, "tcp", name=name).model.opt.enableflags & SLEEP
 
 
 def test_what_the_gripper_pushes_wakes_and_the_rest_sleeps_on() -> None:
