@@ -86,20 +86,6 @@ class Assembled:
         return [kernel for kernel in imported_kernels() if kernel.name.rpartition(".")[2] not in unneeded]
 
 
-def build_robot_side(
-    settings: RobotSettings,
-    epoch: int,
-    clock_domain: str,
-    watch: Callable[[Arm], Arm] | None = None,
-    scene: Scene | None = None,
-    other_law: Callable[[Law], Law] | None = None,
-    announce: Callable[[str], None] | None = None,
-    side: Callable[..., RobotSide] = RobotSide,
-) -> RobotSide:
-    """As `assemble`: the core alone."""
-    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce, side).core
-
-
 def assemble(
     settings: RobotSettings,
     epoch: int,

@@ -92,6 +92,7 @@ class RobotSide:
         self._start_s: float | None = None
         self._held: HeldObject | None = None
         self._held_s = -np.inf
+        self._measured: ArmState | None = None
         self._frame: PerceivedObjects | None = None
         self._target: int | None = None
         self._target_m: FloatArray | None = None
@@ -128,7 +129,8 @@ class RobotSide:
         delay_s = self._loop_age.value(now_s)
         if age_s is not None:
             self._loop_age_s.add(delay_s)
-        state = self._joints.update(self._arm.state(now_s))
+        self._measured = self._arm.state(now_s)
+        state = self._joints.update(self._measured)
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
         self._follow_target(objects, pose)

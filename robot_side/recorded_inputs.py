@@ -1,19 +1,11 @@
-"""What the robot side's core gets beside payloads, as bytes and back: arm states and frames of perceived objects.
+"""What the robot side's core gets beside payloads, as MessagePack and back: arm states and frames of perceived objects.
 
-    state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8
-    frame   time f64, whole u8, then for each array of ARRAYS: tag u8, rows u32, and by the tag
-              0   nothing: as in the frame before        1   rows x width values
-              2   count u32, count row numbers u32, count x width values: these rows, the others as before
-              3   nothing: there is no such array
-            names: length u32 and MessagePack, in whole frames only; roles: one u8 an object
-
-Values are float64 or int64, bit for bit as the core got them.
+Arrays are the bytes of float64 or int64 values, bit for bit as the core got them.
 """
 
 import math
-import struct
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import msgspec
 import numpy as np
@@ -41,44 +33,43 @@ ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     "velocities_m_s": (np.float64, (3,)),
 }
 """The arrays of a frame in their order, with the kind of their values and the shape of a row."""
-_SAME, _WHOLE, _ROWS, _NONE = range(4)
-_FRAME: Final = struct.Struct("<dB")
-_ARRAY: Final = struct.Struct("<BI")
 _ROLES: Final = tuple(Role)
+_T = TypeVar("_T")
+
+
+class _State(msgspec.Struct, array_like=True, frozen=True):
+    time_s: float
+    joint_positions_rad: bytes
+    joint_velocities_rad_s: bytes
+    finger_positions: bytes
+    gripper_opening_m: float
+    gripper_holding: bool
+
+
+class _Frame(msgspec.Struct, array_like=True, frozen=True):
+    time_s: float
+    names: tuple[str, ...] | None
+    """None for the names of the frame before; of its arrays only what differs is told"""
+    roles: bytes
+    arrays: dict[str, bytes | tuple[bytes, bytes] | None]
+    """Each of ARRAYS whole, or the numbers (u32) of the rows that differ and these rows; None for no such array"""
 
 
 def pack_state(state: ArmState) -> bytes:
     """One state."""
-    joints, fingers = state.joint_positions_rad, state.finger_positions
-    return b"".join(
-        (
-            struct.pack("<dH", state.time_s, len(joints)),
-            joints.tobytes(),
-            state.joint_velocities_rad_s.tobytes(),
-            struct.pack("<H", len(fingers)),
-            fingers.tobytes(),
-            struct.pack("<dB", state.gripper_opening_m, state.gripper_holding),
-        )
-    )
+    joints, velocities, fingers = state.joint_positions_rad, state.joint_velocities_rad_s, state.finger_positions
+    arrays = joints.tobytes(), velocities.tobytes(), fingers.tobytes()
+    return msgspec.msgpack.encode(_State(state.time_s, *arrays, state.gripper_opening_m, state.gripper_holding))
 
 
 def unpack_state(content: bytes) -> ArmState:
-    """One state; ValueError or struct.error for what is none."""
-    time_s, joints = struct.unpack_from("<dH", content)
-    position = 10
-
-    def values(count: int) -> Any:
-        nonlocal position
-        read = np.frombuffer(content, "<f8", count, position).copy()
-        position += 8 * count
-        return read
-
-    positions, velocities = values(joints), values(joints)
-    (fingers,) = struct.unpack_from("<H", content, position)
-    position += 2
-    finger_positions = values(fingers)
-    opening_m, holding = struct.unpack_from("<dB", content, position)
-    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding))
+    """One state; ValueError for what is none."""
+    told = _decoded(content, _State)
+    joints, velocities, fingers = (
+        np.frombuffer(values, "<f8").copy()
+        for values in (told.joint_positions_rad, told.joint_velocities_rad_s, told.finger_positions)
+    )
+    return ArmState(told.time_s, joints, velocities, fingers, told.gripper_opening_m, told.gripper_holding)
 
 
 class FramePacker:
@@ -94,32 +85,24 @@ class FramePacker:
     def pack(self, frame: PerceivedObjects) -> bytes:
         """One frame."""
         last, self._last = self._last, frame
-        parts = [_FRAME.pack(frame.time_s, last is None)]
-        for name in ARRAYS:
-            parts += _packed(getattr(frame, name), None if last is None else getattr(last, name))
-        if last is None:
-            names = msgspec.msgpack.encode(frame.names)
-            parts += [struct.pack("<I", len(names)), names]
-        parts.append(bytes(_ROLES.index(role) for role in frame.roles))
-        return b"".join(parts)
-
-
-def _packed(values: Any, last: Any) -> list[bytes]:
-    if values is None:
-        return [_ARRAY.pack(_NONE, 0)]
-    rows = len(values)
-    if last is None or last.shape != values.shape:
-        return [_ARRAY.pack(_WHOLE, rows), values.tobytes()]
-    if rows == 0:
-        return [_ARRAY.pack(_SAME, 0)]
-    # By their bits: NaN is no reason to differ, and the sign of a zero is one.
-    bits, before = (np.ascontiguousarray(array).view(np.int64).reshape(rows, -1) for array in (values, last))
-    changed = np.flatnonzero((bits != before).any(axis=1)).astype("<u4")
-    if len(changed) == 0:
-        return [_ARRAY.pack(_SAME, rows)]
-    if 2 * len(changed) > rows:
-        return [_ARRAY.pack(_WHOLE, rows), values.tobytes()]
-    return [_ARRAY.pack(_ROWS, rows), struct.pack("<I", len(changed)), changed.tobytes(), values[changed].tobytes()]
+        told: dict[str, bytes | tuple[bytes, bytes] | None] = {}
+        for name, (_, shape) in ARRAYS.items():
+            values, before = getattr(frame, name), None if last is None else getattr(last, name)
+            if values is None or before is None or values.shape != before.shape:
+                told[name] = None if values is None else values.tobytes()
+                continue
+            # By their bits: NaN is no reason to differ, and the sign of a zero is one.
+            bits, bits_before = (
+                np.ascontiguousarray(array).view(np.int64).reshape(len(array), math.prod(shape))
+                for array in (values, before)
+            )
+            changed = np.flatnonzero((bits != bits_before).any(axis=1)).astype("<u4")
+            if 2 * len(changed) > len(values):
+                told[name] = values.tobytes()
+            elif len(changed):
+                told[name] = changed.tobytes(), values[changed].tobytes()
+        roles = bytes(_ROLES.index(role) for role in frame.roles)
+        return msgspec.msgpack.encode(_Frame(frame.time_s, frame.names if last is None else None, roles, told))
 
 
 class FrameUnpacker:
@@ -131,49 +114,33 @@ class FrameUnpacker:
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
-        """One frame; ValueError or struct.error for what is none, or for one that follows a gap."""
-        time_s, whole = _FRAME.unpack_from(content)
-        if not whole and self._last is None:
+        """One frame; ValueError for what is none, or for one that follows a gap."""
+        told, last = _decoded(content, _Frame), self._last
+        if told.names is None and last is None:
             raise ValueError("a frame that tells only what is new, without one before it")
-        last, position = None if whole else self._last, _FRAME.size
+        names = self._scene.names
+        if told.names not in (names, None) or len(told.roles) != len(names):
+            raise ValueError("a frame of other objects than the scene's")
         arrays: dict[str, Any] = {}
         for name, (kind, shape) in ARRAYS.items():
-            arrays[name], position = _unpacked(
-                content, position, kind, shape, None if last is None else getattr(last, name)
-            )
-        if last is None:
-            (length,) = struct.unpack_from("<I", content, position)
-            position += 4 + length
-            names = msgspec.msgpack.decode(content[position - length : position], type=tuple[str, ...])
-        else:
-            names = last.names
-        if names != self._scene.names:
-            raise ValueError("a frame of other objects than the scene's")
-        roles = tuple(_ROLES[role] for role in content[position:])
-        if len(roles) != len(names):
-            raise ValueError(f"a frame with {len(roles)} roles of {len(names)} objects")
+            part = told.arrays.get(name, ())
+            if isinstance(part, bytes):
+                arrays[name] = np.frombuffer(part, kind).reshape(-1, *shape).copy()
+            elif part:
+                rows, values = part
+                arrays[name] = getattr(last, name).copy()
+                arrays[name][np.frombuffer(rows, "<u4")] = np.frombuffer(values, kind).reshape(-1, *shape)
+            else:
+                arrays[name] = None if part is None else getattr(last, name)
+        roles = tuple(_ROLES[role] for role in told.roles)
         self._last = PerceivedObjects(
-            time_s=time_s, names=names, roles=roles, mesh_library=self._scene.mesh_library, **arrays
+            time_s=told.time_s, names=names, roles=roles, mesh_library=self._scene.mesh_library, **arrays
         )
         return self._last
 
 
-def _unpacked(content: bytes, position: int, kind: type, shape: tuple[int, ...], last: Any) -> tuple[Any, int]:
-    tag, rows = _ARRAY.unpack_from(content, position)
-    position += _ARRAY.size
-    if tag == _NONE:
-        return None, position
-    width = math.prod(shape)
-    if tag == _WHOLE:
-        values = np.frombuffer(content, kind, rows * width, position).reshape(rows, *shape).copy()
-        return values, position + values.nbytes
-    if last is None or len(last) != rows:
-        raise ValueError("a frame that does not follow the one before it")
-    if tag == _SAME:
-        return last, position
-    (count,) = struct.unpack_from("<I", content, position)
-    changed = np.frombuffer(content, "<u4", count, position + 4)
-    position += 4 + 4 * count
-    values = last.copy()
-    values[changed] = np.frombuffer(content, kind, count * width, position).reshape(count, *shape)
-    return values, position + 8 * count * width
+def _decoded(content: bytes, kind: type[_T]) -> _T:
+    try:
+        return msgspec.msgpack.decode(content, type=kind)
+    except msgspec.DecodeError as error:
+        raise ValueError(str(error)) from None

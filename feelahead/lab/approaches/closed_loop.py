@@ -99,7 +99,7 @@ def _check_one(name: str, pull: PullKind, link: str, kind: str, seed: int) -> It
 
 
 def perceived_by(posed: PosedScene, replay: Replay, shift_m: FloatArray, seed: int) -> PerceivedObjects:
-    """Perceive the objects, moved by shift_m (3,), as the robot side of that seed does (see `build_robot_side`)."""
+    """Perceive the objects, moved by shift_m (3,), as the robot side of that seed does (see `assemble`)."""
     _, camera_seed = np.random.SeedSequence(seed).generate_state(2)
     names = tuple(thing.name for thing in posed.scene.objects)
     posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], shift_m)

@@ -12,7 +12,7 @@ from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, 
 from common.protocol.session import SessionState
 from feelahead.lab.faults.watched_arm import WatchedArm
 from robot_side.arm.port import Arm
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 from robot_side.core import RobotSide
 from robot_side.operators.safety import SafetySettings
 from robot_side.settings import RobotSettings
@@ -67,7 +67,7 @@ class Bench:
     """The robot side, its messages to each operator, and the motion of its arm."""
 
     def __init__(self, settings: RobotSettings = QUICK) -> None:
-        self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)
+        self.robot: RobotSide = assemble(settings, 1, "clock", self._watch).core
         self.ticks = 0
         self.operators: dict[bytes, Operator] = {}
         self.views: list[Telemetry] = []

@@ -17,7 +17,7 @@ from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.replay import replay_operator, replay_robot
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
@@ -47,12 +47,12 @@ def test_the_command_says_so(run: Recording, capsys: pytest.CaptureFixture[str])
 def test_another_setting_makes_other_stiffness(
     run: Recording, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    build = build_robot_side
+    build = assemble
 
     def other(settings: Any, *others: Any, **named: Any) -> Any:
         return build(dataclasses.replace(settings, probability=0.9), *others, **named)
 
-    monkeypatch.setattr(replaying, "build_robot_side", other)
+    monkeypatch.setattr(replaying, "assemble", other)
     assert replay([str(run.path), "--check"]) == 1
     assert capsys.readouterr().out.splitlines()[-1] == "NOT the same"
 
