@@ -6,7 +6,6 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
-from robot_side.enlargement.kinematic_error import encoder_sigma
 
 
 class Encoder:
@@ -30,7 +29,7 @@ class Encoder:
 
     def standard_deviation_rad(self) -> float:
         """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
-        return float(encoder_sigma(np.array(self._sigma_rad), np.array(self._resolution_rad)))
+        return float(np.hypot(self._sigma_rad, self._resolution_rad / math.sqrt(12.0)))
 
 
 @compiled(output_array(1), input_array(1), NUMBER, NUMBER)

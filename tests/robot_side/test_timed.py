@@ -7,7 +7,7 @@ from common.clock import VirtualClock
 from common.realtime.stages import Stages
 from robot_side.assembly import assemble
 from robot_side.settings import RobotSettings
-from robot_side.timed import STAGES, TimedArm, TimedLaw
+from robot_side.timed import HELPS, STAGES, TimedArm, TimedLaw
 
 
 def test_a_timed_core_sends_what_a_plain_one_does_and_counts_physics_and_sensing() -> None:
@@ -33,6 +33,10 @@ def test_a_timed_core_sends_what_a_plain_one_does_and_counts_physics_and_sensing
     assert summary["messages"]["cpu_us"]["max"] == 0.0
 
 
+def test_each_stage_has_its_help() -> None:
+    assert set(HELPS) == {*STAGES, ""}
+
+
 class Ticking:
     """A processor's clock that has gone on by a microsecond whenever it is read."""
 
@@ -42,7 +46,3 @@ class Ticking:
     def now(self) -> float:
         self._reads += 1
         return 1e-6 * self._reads
-
-
-def test_each_stage_has_its_help() -> None:
-    assert set(HELPS) == {*STAGES, ""}

@@ -47,25 +47,11 @@ def test_values_that_are_not_finite_are_refused(bad: float) -> None:
         joint_velocities(np.where(np.eye(6) > 0.0, bad, 0.0), twist, FREE)
     with pytest.raises(ValueError, match="twist"):
         joint_velocities(jacobian, np.full(6, bad), FREE)
-
-
-def test_what_cannot_be_multiplied_is_refused() -> None:
-    with pytest.raises(ValueError, match="too large"):
-        joint_velocities(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), np.ones(6), FREE)
-
-
-def test_wrong_arguments_are_named() -> None:
-    with pytest.raises(ValueError, match=r"jacobian has the shape \(3, 6\)"):
-        joint_velocities(np.ones((3, 6)), np.zeros(6), FREE)
-    with pytest.raises(ValueError, match="twist has the shape"):
-        joint_velocities(np.eye(6), np.zeros(3), FREE)
-    with pytest.raises(ValueError, match="velocity_limits_rad_s has the shape"):
-        joint_velocities(np.eye(6), np.zeros(6), np.ones(7))
     for limit in (0.0, -1.0, math.nan):
         with pytest.raises(ValueError, match="velocity_limits_rad_s"):
-            joint_velocities(np.eye(6), np.zeros(6), np.full(6, limit))
-    with pytest.raises(ValueError, match="largest_damping"):
-        joint_velocities(np.eye(6), np.zeros(6), FREE, largest_damping=0.0)
+            joint_velocities(jacobian, twist, np.full(6, limit))
+    with pytest.raises(ValueError, match="too large"):
+        joint_velocities(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), np.ones(6), FREE)
 
 
 @pytest.mark.parametrize("joints", [5, 6, 7])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
-from robot_side.arm.tool_motion import ToolMotionSettings, deflected, tool_motion, tool_speed_m_s
+from robot_side.arm.tool_motion import ToolMotionSettings, deflected, tool_motion
 from tests.helpers.perceived_scenes import random_rotation
 
 SETTINGS = ToolMotionSettings(trigger_speed_m_s=0.25, stick_speed_m_s=0.1, turn_speed_rad_s=0.5)
@@ -60,12 +60,6 @@ def test_the_right_stick_turns_the_view_the_way_it_is_pushed(
     np.testing.assert_allclose(tip, expected, atol=1e-15)
     assert angular @ FORWARD == 0.0
     assert np.linalg.norm(angular) == pytest.approx(0.5 * math.hypot(*turning))
-
-
-def test_the_speed_is_that_of_the_tools_point() -> None:
-    random = np.random.default_rng(3)
-    jacobian, rates = random.normal(size=(6, 7)), random.normal(size=7)
-    assert tool_speed_m_s(jacobian, rates) == pytest.approx(np.linalg.norm((jacobian @ rates)[:3]), rel=1e-14)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.enlargement.delay_displacement import delay_displacement
 from robot_side.enlargement.distance import Uncertainty, enlargement_distance, plain_enlargements_m
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.enlargement.prediction_errors import PredictionErrors
 
 probabilities = st.floats(1e-6, 1.0 - 1e-6)
 lengths = st.floats(0.0, 1.0)
@@ -23,6 +21,7 @@ lengths = st.floats(0.0, 1.0)
 def test_distance_is_the_quantile_of_the_standard_library(p: float, mean: float, sd: float, delay: float) -> None:
     expected = delay + max(0.0, NormalDist(mean, sd).inv_cdf(p))
     assert enlargement_distance(p, mean, sd**2, delay) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -67,16 +66,6 @@ def test_negative_and_non_finite_arguments_are_named(name: str, bad: float) -> N
         enlargement_distance(0.9, **{**arguments, name: np.array([0.0, bad])})
 
 
-def test_delay_displacement_is_speed_times_age() -> None:
-    velocities = np.array([[0.3, 0.0, 0.4], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(delay_displacement(velocities, 0.2), [0.1, 0.0])
-    for age in (-0.1, math.nan, math.inf):
-        with pytest.raises(ValueError, match="loop_age_s"):
-            delay_displacement(velocities, age)
-    with pytest.raises(ValueError, match="velocities_m_s"):
-        delay_displacement(np.array([[math.nan, 0.0, 0.0]]), 0.1)
-
-
 # What is known to err
 
 
@@ -101,25 +90,9 @@ def test_the_mean_along_a_direction_is_how_much_nearer_things_are_than_they_seem
     assert Uncertainty().mean_along_m(direction) == 0.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(p=probabilities)
-def test_the_quantile_is_that_of_the_standard_library(p: float) -> None:
-    assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
-
-
-def test_what_the_prediction_misses_is_that_of_its_table() -> None:
-    table = PredictionErrors({"operator": ((0.1, 0.001, 0.002),), "robot": ((0.1, 0.01, 0.02),)})
-    uncertainty = Uncertainty(prediction=table)
-    assert uncertainty.predicted_m("operator", 0.1, 0.25) == (0.001, 0.002)
-    assert uncertainty.predicted_m("robot", 0.1, 0.25) == (0.01, 0.02)
-
-
 @pytest.mark.parametrize(
     "bad",
     [
-        {"probability": 0.0},
-        {"probability": 1.0},
-        {"probability": math.nan},
         {"camera_sd_m": -1.0},
         {"camera_sd_m": math.nan},
         {"camera_mean_m": (math.nan, 0.0, 0.0)},
@@ -170,10 +143,10 @@ def test_along_any_one_direction_less_is_needed_than_plainly(seed: int, p: float
 def test_a_velocity_or_covariance_that_is_not_finite_is_no_distance() -> None:
     uncertainty, covariances, still = Uncertainty(), _covariances(3), np.zeros((4, 3))
     for bad in (math.nan, math.inf):
-        with pytest.raises(ValueError, match="velocities_m_s"):
+        with pytest.raises(ValueError, match="delay_displacement_m"):
             plain_enlargements_m(uncertainty, covariances, np.full((4, 3), bad), 0.1)
         with pytest.raises(ValueError, match="variance_m2"):
             plain_enlargements_m(uncertainty, np.full((4, 3, 3), bad), still, 0.1)
     for age in (-0.1, math.nan, math.inf):
-        with pytest.raises(ValueError, match="loop_age_s"):
-            plain_enlargements_m(uncertainty, covariances, still, age)
+        with pytest.raises(ValueError, match="delay_displacement_m"):
+            plain_enlargements_m(uncertainty, covariances, np.ones((4, 3)), age)

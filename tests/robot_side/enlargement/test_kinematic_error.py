@@ -1,14 +1,10 @@
-import math
-
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from robot_side.enlargement.kinematic_error import (
     directional_variance,
-    encoder_sigma,
     position_covariance,
 )
 
@@ -48,20 +44,6 @@ def test_covariance_is_what_noisy_encoders_do_to_a_planar_arm() -> None:
     np.testing.assert_allclose(sampled, covariance, atol=0.015 * covariance.max())
 
 
-def test_trace_is_the_papers_root_sum_of_squares() -> None:
-    jacobian = np.random.default_rng(2).normal(size=(1, 3, 4))
-    sigma = np.array([1e-3, 2e-3, 0.0, 5e-4])
-    by_hand = sum((np.linalg.norm(jacobian[0, :, i]) * sigma[i]) ** 2 for i in range(4))
-    np.testing.assert_allclose(np.trace(position_covariance(jacobian, sigma)[0]), by_hand, rtol=1e-13)
-
-
-def test_the_variance_of_one_joint_is_the_square_of_its_arc_and_none_across_it() -> None:
-    jacobian = np.array([[[0.0], [0.5], [0.0]]])
-    covariance = position_covariance(jacobian, np.array([2e-3]))
-    assert directional_variance(covariance, np.array([[0.0, 1.0, 0.0]]))[0] == pytest.approx(1e-6, rel=1e-12)
-    assert directional_variance(covariance, np.array([[1.0, 0.0, 0.0]]))[0] == 0.0
-
-
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds, points=st.integers(1, 5), joints=st.integers(1, 8))
 def test_the_variance_along_a_direction_is_that_of_the_joints_errors(seed: int, points: int, joints: int) -> None:
@@ -81,39 +63,3 @@ def test_the_variance_along_a_direction_is_that_of_the_joints_errors(seed: int, 
     assert (along <= np.linalg.norm(covariance, 2, axis=(1, 2))[:, None] * (1.0 + 1e-9) + 1e-18).all()
     for k in range(7):
         np.testing.assert_allclose(directional_variance(covariance, directions[:, k]), along[:, k])
-
-
-def test_quantisation_adds_the_variance_of_a_uniform_error() -> None:
-    step = 2.0 * math.pi / 4096
-    assert encoder_sigma(np.array([0.0]), np.array([step]))[0] == pytest.approx(step / math.sqrt(12.0))
-    both = encoder_sigma(np.array([1e-3]), np.array([step]))[0]
-    assert both**2 == pytest.approx(1e-6 + step**2 / 12.0)
-    # An encoder that rounds: the error's measured deviation is the one predicted.
-    angles = np.random.default_rng(3).uniform(-3.0, 3.0, 200_000)
-    error = np.round(angles / step) * step - angles
-    assert error.std() == pytest.approx(step / math.sqrt(12.0), rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("jacobians", "sigma", "named"),
-    [
-        (np.zeros((2, 3, 4)), np.zeros(3), "encoder_sigma_rad"),
-        (np.zeros((3, 4)), np.zeros(4), "jacobians"),
-        (np.zeros((1, 2, 4)), np.zeros(4), "jacobians"),
-        (np.full((1, 3, 2), np.nan), np.zeros(2), "jacobians"),
-        (np.zeros((1, 3, 2)), np.array([0.0, np.inf]), "encoder_sigma_rad"),
-        (np.zeros((1, 3, 2)), np.array([0.0, -1e-3]), "encoder_sigma_rad"),
-    ],
-)
-def test_bad_arguments_are_named(jacobians: FloatArray, sigma: FloatArray, named: str) -> None:
-    with pytest.raises(ValueError, match=named):
-        position_covariance(jacobians, sigma)
-
-
-def test_bad_directions_and_steps_are_named() -> None:
-    covariance = np.eye(3)[None]
-    for directions in (np.zeros((1, 3)), np.full((1, 3), np.nan), np.ones((2, 3)), np.ones((1, 2))):
-        with pytest.raises(ValueError, match="directions"):
-            directional_variance(covariance, directions)
-    with pytest.raises(ValueError, match="quantisation_step_rad"):
-        encoder_sigma(np.array([1e-3]), np.array([-1e-3]))
