@@ -1,4 +1,4 @@
-"""What the robot side's core gets beside payloads, as MessagePack and back: arm states and frames of perceived objects.
+"""Arm states and frames of perceived objects as MessagePack and back: the inputs of the robot side's core.
 
 Arrays are the bytes of float64 or int64 values, bit for bit as the core got them.
 """
@@ -49,7 +49,7 @@ class _State(msgspec.Struct, array_like=True, frozen=True):
 class _Frame(msgspec.Struct, array_like=True, frozen=True):
     time_s: float
     names: tuple[str, ...] | None
-    """None for the names of the frame before; of its arrays only what differs is told"""
+    """None: the same as before, and of the arrays only those that differ follow"""
     roles: bytes
     arrays: dict[str, bytes | tuple[bytes, bytes] | None]
     """Each of ARRAYS whole, or the numbers (u32) of the rows that differ and these rows; None for no such array"""
@@ -109,7 +109,7 @@ class FrameUnpacker:
     """Frames from what is new in them."""
 
     def __init__(self, scene: PerceivedObjects) -> None:
-        """scene: any frame of the same scene: the shapes of its meshes do not change and are not recorded."""
+        """scene: any frame of the same scene, for the shapes of meshes: they do not change and are not recorded."""
         self._scene = scene
         self._last: PerceivedObjects | None = None
 

@@ -1,4 +1,4 @@
-"""How far a simulated gripper opens, found by driving it, and what its spheres leave of that."""
+"""Measure how far a simulated gripper opens, by driving it, and the gap that the spheres leave of that."""
 
 import copy
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _FARTHEST_GAP_M = 0.5
 _ALIKE_M = 1e-4
-# Without a force limit of its own, a servo leads a blocked drive by this share of the stroke at most.
+# A servo without a force limit leads a blocked drive by this share of the stroke at most.
 _DEFAULT_FORCE_LEAD = 0.3
 # Surfaces that come within this of the nearest pair when the gripper is closed take part in the grasp.
 _GRASP_BAND_M = 2e-3
@@ -26,7 +26,7 @@ _SMALLEST_STROKE_M = 1e-3
 
 @dataclass(frozen=True)
 class GripperSweep:
-    """Where a gripper came to rest at k evenly spaced inputs, from one end to the other."""
+    """A gripper's places of rest at k evenly spaced inputs, from one end to the other."""
 
     controls: FloatArray
     """(k, g) the actuators' inputs"""
@@ -39,7 +39,7 @@ class GripperSweep:
 
     @property
     def stroke_m(self) -> float:
-        """By how much the gap that changes most changes."""
+        """The change of the gap that changes most."""
         return float(np.ptp(self.gaps_m, axis=0).max(initial=0.0))
 
 
@@ -66,7 +66,7 @@ class GripperTravel:
 
 
 def measure_gripper(scene: Scene) -> GripperTravel | None:
-    """How the gripper of `scene` opens and closes, found by driving a copy of it to both ends in empty space.
+    """Drive a copy of the gripper of `scene` to both ends in empty space: how it opens and closes.
 
     None without a gripper, or with one whose fingers' geoms do not come nearer to each other.
     ConfigurationError for a gripper actuator whose range of inputs is not known.

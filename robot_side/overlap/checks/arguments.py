@@ -53,7 +53,7 @@ class Argument:
 
 
 Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
-"""What is asked of an argument, given its name, its value and its last dimensions; ValueError where it is not so."""
+"""A check of an argument, given its name, value and last dimensions; ValueError where it fails."""
 
 _FLOAT64 = np.dtype(np.float64)
 

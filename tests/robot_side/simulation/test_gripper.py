@@ -1,4 +1,4 @@
-"""How far a gripper opens, found by driving it, and what its spheres leave of that."""
+"""The measured travel of a gripper, and the gap that the spheres leave of it."""
 
 from pathlib import Path
 

@@ -8,7 +8,7 @@ import pytest
 from common.errors import ConfigurationError
 from robot_side.assembly import assemble
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.objects.perceived import Role
 from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from robot_side.simulation.camera import MujocoCamera
@@ -26,10 +26,6 @@ def built_in() -> Scene:
 @pytest.fixture
 def shapes(tmp_path: Path) -> Scene:
     return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
-
-
-def index_of(seen: PerceivedObjects, name: str) -> int:
-    return seen.names.index(name)
 
 
 def test_the_numbers_of_the_kinds_are_mujocos() -> None:
@@ -110,7 +106,7 @@ def test_roles_can_be_overridden_and_ignored_objects_have_no_primitives(tmp_path
     scene = load_scene(path, "tcp", {"wall": Role.IGNORED, "post": Role.TARGET})
     seen = MujocoCamera(scene).perceive(0.0)
     assert scene.roles["post"] is Role.TARGET
-    assert seen.roles[index_of(seen, "wall")] is Role.IGNORED
+    assert seen.roles[seen.names.index("wall")] is Role.IGNORED
     assert len(seen.half_space_object) == 0
     with pytest.raises(ConfigurationError, match="no object 'vase'; valid: wall, table_slab"):
         load_scene(path, "tcp", {"vase": Role.TARGET})

@@ -116,21 +116,6 @@ def test_of_several_contacts_the_fastest_counts() -> None:
     assert onset.closing_speed_m_s == pytest.approx(1.0 + 4.0 * 0.0545, rel=1e-2)
 
 
-def test_a_support_counts_only_where_it_is_asked_for() -> None:
-    scene = load_scene(DATA / "wall.xml", "tool", {"wall": Role.SUPPORT})
-    found = []
-    for supports in (True, False):
-        script = Script(scene)
-        mujoco.mj_resetDataKeyframe(scene.model, scene.data, scene.model.key("home").id)
-        mujoco.mj_forward(scene.model, scene.data)
-        script.truth = TrueContact(scene, supports=supports)
-        found.append(script.go(0.319).until_contact(0.1 * AHEAD, steps=50))
-    assert [None if one is None else one.thing for one in found] == ["wall", None]
-
-
-# Once
-
-
 def test_a_contact_that_goes_on_is_reported_at_its_onset_alone() -> None:
     script = Script.load("wall").go(0.319)
     assert script.until_contact(0.1 * AHEAD) is not None
@@ -140,9 +125,6 @@ def test_a_contact_that_goes_on_is_reported_at_its_onset_alone() -> None:
     again = script.until_contact(0.03 * AHEAD)
     assert again is not None
     assert again.closing_speed_m_s == pytest.approx(0.03, rel=1e-2)
-
-
-# What is held
 
 
 def test_a_held_object_counts_as_gripper() -> None:
@@ -156,18 +138,12 @@ def test_a_held_object_counts_as_gripper() -> None:
     assert onset.closing_speed_m_s == pytest.approx(0.1, rel=1e-3)
 
 
-# Gap and way
-
-
 @pytest.mark.parametrize("gone_m", [0.0, 0.2, 0.31])
 def test_the_way_to_a_hill_of_a_height_field_is_not_passed_over(gone_m: float) -> None:
     truth = Script.load("terrain_ahead").go(gone_m).truth
     # Lower ground is nearer than the hill.
     assert truth.gap_m(None) < WAY_M - gone_m
     assert truth.way_left_m(AHEAD, None) == pytest.approx(WAY_M - gone_m, abs=1e-4)
-
-
-# The tool's own motion
 
 
 def test_the_approach_is_the_tools_axis_and_the_speed_along_it() -> None:
@@ -191,3 +167,15 @@ def test_it_changes_nothing_in_the_physics() -> None:
         watched.truth.approach()
     np.testing.assert_array_equal(watched.scene.data.qpos, alone.data.qpos)
     np.testing.assert_array_equal(watched.scene.data.qvel, alone.data.qvel)
+
+
+def test_a_support_counts_only_where_it_is_asked_for() -> None:
+    scene = load_scene(DATA / "wall.xml", "tool", {"wall": Role.SUPPORT})
+    found = []
+    for supports in (True, False):
+        script = Script(scene)
+        mujoco.mj_resetDataKeyframe(scene.model, scene.data, scene.model.key("home").id)
+        mujoco.mj_forward(scene.model, scene.data)
+        script.truth = TrueContact(scene, supports=supports)
+        found.append(script.go(0.319).until_contact(0.1 * AHEAD, steps=50))
+    assert [None if one is None else one.thing for one in found] == ["wall", None]
