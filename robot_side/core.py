@@ -29,6 +29,7 @@ from robot_side.objects.target import next_target, object_center, object_centers
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
+from robot_side.placing import scaled
 
 TELEMETRY_PERIOD_S = 0.02
 OBSERVER_PERIOD_S = 0.02
@@ -278,9 +279,9 @@ class RobotSide:
                 "enlargement_mm": 1e3 * sensed.enlargement_m,
                 "holding": "nothing" if self._held is None else self._held.name[:SHOWN_NAME],
                 "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
-                "nearest_mm": _millimetres(apart.nearest_m),
+                "nearest_mm": scaled(apart.nearest_m, 1e3),
                 "target": None if target is None else objects.names[target][:SHOWN_NAME],
-                "target_mm": _millimetres(apart.target_m),
+                "target_mm": scaled(apart.target_m, 1e3),
             }
         return values
 
@@ -304,7 +305,3 @@ class RobotSide:
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
         }
-
-
-def _millimetres(value_m: float | None) -> float | None:
-    return None if value_m is None else 1e3 * value_m

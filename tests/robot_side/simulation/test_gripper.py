@@ -32,7 +32,7 @@ def test_the_wider_end_is_the_open_one(low_is_open: bool) -> None:
     openings = np.array([0.08, 0.05, 0.03, 0.0])
     found = travel_from_sweep(sweep(openings if low_is_open else openings[::-1], np.array([0.0, 0.3, 0.5, 0.8])), 0, 0)
     assert found is not None
-    assert (found.open_control, found.closed_control) == ((0.0, 3.0) if low_is_open else (3.0, 0.0))
+    assert (found.open_control.item(), found.closed_control.item()) == ((0.0, 3.0) if low_is_open else (3.0, 0.0))
     np.testing.assert_allclose(found.openings_m, openings)
 
 
@@ -50,7 +50,7 @@ def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> N
     # Of 100 N at 0.0156863 N for each of 255 steps, the default share of the stroke is less.
     assert travel.force_lead == 0.3
     assert travel.lag_s == pytest.approx(10.0 / 100.0)
-    assert (travel.open_control, travel.closed_control) == (255.0, 0.0)
+    assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)
     np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
 
 
