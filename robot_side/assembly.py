@@ -86,20 +86,6 @@ class Assembled:
         return [kernel for kernel in imported_kernels() if kernel.name.rpartition(".")[2] not in unneeded]
 
 
-def build_robot_side(
-    settings: RobotSettings,
-    epoch: int,
-    clock_domain: str,
-    watch: Callable[[Arm], Arm] | None = None,
-    scene: Scene | None = None,
-    other_law: Callable[[Law], Law] | None = None,
-    announce: Callable[[str], None] | None = None,
-    side: Callable[..., RobotSide] = RobotSide,
-) -> RobotSide:
-    """As `assemble`: the core alone."""
-    return assemble(settings, epoch, clock_domain, watch, scene, other_law, announce, side).core
-
-
 def assemble(
     settings: RobotSettings,
     epoch: int,
@@ -181,10 +167,11 @@ def _notes(scene: Scene) -> tuple[str, ...]:
         f"{name!r} names more than one thing, such as a body and a geom of the world: they count as one object"
         for name in scene.shared_names[:_NAMED_OBJECTS]
     ]
-    if scene.volume_errors:
-        largest_first = sorted(scene.stands_out_m.items(), key=lambda item: -item[1])
+    shapes = scene.primitives
+    if shapes.volume_errors:
+        largest_first = sorted(shapes.stands_out_m.items(), key=lambda item: -item[1])
         shown = [
-            f"{name} by {1e3 * reach_m:.2f} mm ({100.0 * scene.volume_errors[name]:.1f} % of its volume)"
+            f"{name} by {1e3 * reach_m:.2f} mm ({100.0 * shapes.volume_errors[name]:.1f} % of its volume)"
             if math.isfinite(reach_m)
             else f"{name} as its convex hull or bounding box"
             for name, reach_m in largest_first[:_NAMED_OBJECTS]

@@ -29,6 +29,7 @@ from robot_side.objects.target import next_target, object_center, object_centers
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
+from robot_side.placing import scaled
 
 TELEMETRY_PERIOD_S = 0.02
 OBSERVER_PERIOD_S = 0.02
@@ -92,6 +93,7 @@ class RobotSide:
         self._start_s: float | None = None
         self._held: HeldObject | None = None
         self._held_s = -np.inf
+        self._measured: ArmState | None = None
         self._frame: PerceivedObjects | None = None
         self._target: int | None = None
         self._target_m: FloatArray | None = None
@@ -128,7 +130,8 @@ class RobotSide:
         delay_s = self._loop_age.value(now_s)
         if age_s is not None:
             self._loop_age_s.add(delay_s)
-        state = self._joints.update(self._arm.state(now_s))
+        self._measured = self._arm.state(now_s)
+        state = self._joints.update(self._measured)
         pose = self._kinematics.pose(state)
         objects = self._perceive(now_s)
         self._follow_target(objects, pose)
@@ -276,9 +279,9 @@ class RobotSide:
                 "enlargement_mm": 1e3 * sensed.enlargement_m,
                 "holding": "nothing" if self._held is None else self._held.name[:SHOWN_NAME],
                 "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
-                "nearest_mm": _millimetres(apart.nearest_m),
+                "nearest_mm": scaled(apart.nearest_m, 1e3),
                 "target": None if target is None else objects.names[target][:SHOWN_NAME],
-                "target_mm": _millimetres(apart.target_m),
+                "target_mm": scaled(apart.target_m, 1e3),
             }
         return values
 
@@ -302,7 +305,3 @@ class RobotSide:
             "offset_ms": {"robot": self.session.link.offset_summary_ms()},
             "stops": stops,
         }
-
-
-def _millimetres(value_m: float | None) -> float | None:
-    return None if value_m is None else 1e3 * value_m

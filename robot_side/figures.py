@@ -11,7 +11,7 @@ from common.arrays import FloatArray
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.ahead.law import Sensed
 from robot_side.objects.perceived import Role
-from robot_side.placing import Placing
+from robot_side.placing import Placing, scaled
 
 if TYPE_CHECKING:
     from robot_side.simulation.ground_truth import Truth
@@ -127,17 +127,17 @@ class RunFigures:
         return {
             "ticks": self.ticks,
             "enlargement_mm": {
-                "min": _scaled(self._enlargement.minimum, 1e3),
-                "mean": _scaled(self._enlargement.mean, 1e3),
-                "max": _scaled(self._enlargement.maximum, 1e3),
-                "mean_moving": _scaled(self._enlargement_moving.mean, 1e3),
+                "min": scaled(self._enlargement.minimum, 1e3),
+                "mean": scaled(self._enlargement.mean, 1e3),
+                "max": scaled(self._enlargement.maximum, 1e3),
+                "mean_moving": scaled(self._enlargement_moving.mean, 1e3),
             },
-            "overlap_mm3": {"max": _scaled(self._overlap.maximum, 1e9), "mean": _scaled(self._overlap.mean, 1e9)},
+            "overlap_mm3": {"max": scaled(self._overlap.maximum, 1e9), "mean": scaled(self._overlap.mean, 1e9)},
             "stiffness": {
                 "l2": {"mean": self._l2.mean, "max": self._l2.maximum},
                 "r2": {"mean": self._r2.mean, "max": self._r2.maximum},
             },
-            "min_distance_mm": _scaled(self._min_distance_m, 1e3),
+            "min_distance_mm": scaled(self._min_distance_m, 1e3),
             "contacts": sum(self._contacts.values()),
             "first_contact": self._first_contact,
             "task": {
@@ -146,7 +146,7 @@ class RunFigures:
                 "placing": self._placing.summary(self._armed_s),
                 "obstacle_contacts": self._obstacle_contacts,
                 "contacts_by_object": dict(sorted(self._contacts.items())),
-                "min_obstacle_distance_mm": _scaled(self._min_obstacle_distance_m, 1e3),
+                "min_obstacle_distance_mm": scaled(self._min_obstacle_distance_m, 1e3),
             },
         }
 
@@ -155,7 +155,3 @@ def _smaller(one: float | None, other: float | None) -> float | None:
     if one is None or other is None:
         return one if other is None else other
     return min(one, other)
-
-
-def _scaled(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor

@@ -75,14 +75,15 @@ class Placing:
         return {
             "placed": self.placed,
             "time_s": known,
-            "contact_speed_mm_s": _scaled(self.contact_speed_m_s, 1e3),
+            "contact_speed_mm_s": scaled(self.contact_speed_m_s, 1e3),
             "felt_before_s": self.felt_s,
-            "felt_before_mm": _scaled(self.felt_m, 1e3),
+            "felt_before_mm": scaled(self.felt_m, 1e3),
             "off_support_mm": None if now is None else 1e3 * now.support_gap_m,
             "tilt_deg": None if now is None else math.degrees(now.tilt_rad),
-            "moved_mm": _scaled(moved_m, 1e3),
+            "moved_mm": scaled(moved_m, 1e3),
         }
 
 
-def _scaled(value: float | None, factor: float) -> float | None:
+def scaled(value: float | None, factor: float) -> float | None:
+    """`value` in another unit; None for None."""
     return None if value is None else value * factor

@@ -9,14 +9,13 @@ import struct
 from collections.abc import Callable
 from typing import Any, Final
 
-from common.arrays import FloatArray
 from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
-from robot_side.arm.port import Arm, ArmState
+from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.core import RobotSide
-from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.objects.perceived import PerceivedObjects
 from robot_side.outgoing_messages import Outgoing
 from robot_side.recorded_inputs import FramePacker, pack_state
 from robot_side.settings import RobotSettings
@@ -28,9 +27,8 @@ Note = Callable[[Any], None]
 class RecordedRobotSide(RobotSide):
     """As the one that it extends; `note` takes what happened."""
 
-    def __init__(self, note: Note, arm: Arm, kinematics: Any, camera: ObjectSource, *others: Any, **named: Any) -> None:
-        self._noted_arm, self._noted_camera = _NotedArm(arm), _NotedCamera(camera)
-        super().__init__(self._noted_arm, kinematics, self._noted_camera, *others, **named)
+    def __init__(self, note: Note, *parts: Any, **named: Any) -> None:
+        super().__init__(*parts, **named)
         self._note = note
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
@@ -46,7 +44,7 @@ class RecordedRobotSide(RobotSide):
         finally:
             command = self.session.safety.command
             sent_s = math.nan if command is None else command.header.sent_s
-            self._note((now_s, self._noted_arm.newest, self._noted_camera.newest, sent_s, outgoing))
+            self._note((now_s, self._measured, self._frame, sent_s, outgoing))
         return outgoing
 
 
@@ -98,40 +96,3 @@ def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict
 def recorded_status(core: RobotSide, now_s: float) -> dict[str, Any]:
     """What a person is shown, and the offset of the operator side's clock."""
     return core.status(now_s) | {"offset_s": core.session.link.clock_offset.offset_at(now_s)}
-
-
-class _NotedArm:
-    """An Arm in front of another one."""
-
-    def __init__(self, arm: Arm) -> None:
-        self.newest: ArmState | None = None
-        self._arm = arm
-
-    @property
-    def joint_count(self) -> int:
-        return self._arm.joint_count
-
-    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        self._arm.command(joint_velocity_rad_s, valid_until_s)
-
-    def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        self._arm.command_gripper(closing, valid_until_s)
-
-    def state(self, now_s: float) -> ArmState:
-        self.newest = self._arm.state(now_s)
-        return self.newest
-
-
-class _NotedCamera:
-    """An ObjectSource in front of another one."""
-
-    def __init__(self, camera: ObjectSource) -> None:
-        self.newest: PerceivedObjects | None = None
-        self._camera = camera
-
-    def perceive(self, now_s: float) -> PerceivedObjects:
-        self.newest = self._camera.perceive(now_s)
-        return self.newest
-
-    def set_role(self, name: str, role: Role) -> None:
-        self._camera.set_role(name, role)

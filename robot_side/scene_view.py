@@ -107,15 +107,6 @@ class SceneView:
         self._begun = None
         return self._state(header(), begun, ticks)
 
-    def state(
-        self, header: Header, sensed: Sensed, situation: Situation, taken_s: float, ticks: TickFigures
-    ) -> SceneState:
-        """A SceneState of the newest tick at once, where nobody waits."""
-        self.begin_state(sensed, situation, taken_s)
-        while (state := self.work_on_state(lambda: header, ticks)) is None:
-            pass
-        return state
-
     def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
         objects, pose = begun.situation.objects, begun.situation.pose
         l2, r2 = begun.explained["l2"], begun.explained["r2"]

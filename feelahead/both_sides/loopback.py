@@ -27,7 +27,7 @@ from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
 from robot_side.ahead.law import Law
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.main import TICK_PERIOD_S
@@ -85,9 +85,9 @@ class Loopback:
         after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
         """
         self.clock = VirtualClock()
-        self.robot: RobotSide = build_robot_side(
+        self.robot: RobotSide = assemble(
             settings.robot, 1, VIRTUAL_CLOCK, scene=scene, other_law=other_law, side=robot_side
-        )
+        ).core
         # After the scene, which decides what kernels there are.
         warm_up()
         self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_side)

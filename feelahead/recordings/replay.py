@@ -19,7 +19,7 @@ from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
@@ -73,7 +73,7 @@ def replay_robot(recording: Recording) -> Comparison:
     header = require_side(recording, "robot")
     given = _Given()
     settings = settings_from(header["settings"], RobotSettings)
-    core = build_robot_side(settings, header["epoch"], header["clock_domain"], side=functools.partial(_side, given))
+    core = assemble(settings, header["epoch"], header["clock_domain"], side=functools.partial(_side, given)).core
     warm_up()
     compared = Comparison("robot", "stiffness messages")
     # There may be more of them here, for other scenes and laws.

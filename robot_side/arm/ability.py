@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import LARGEST_DAMPING, SINGULAR_VALUE_THRESHOLD, refuse, resolve
+from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 
 _MET = 1e-6
@@ -80,7 +80,7 @@ def _ability_loop(
     twist, rates = np.zeros(6), np.empty(limits.size)
     for i in range(3):
         twist[i] = full_speed * direction[i]
-    if not resolve(jacobian, twist, limits, SINGULAR_VALUE_THRESHOLD, LARGEST_DAMPING, rates):
+    if not resolve(jacobian, twist, limits, rates):
         return False
     speed, off, changing = 0.0, 0.0, _LEAST_RATE_RAD_S
     for row in range(6):

@@ -8,7 +8,7 @@ from common.arrays import FloatArray, require_finite
 from common.protocol.messages import MotionCommand
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import LARGEST_DAMPING, SINGULAR_VALUE_THRESHOLD, refuse, resolve
+from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
 
@@ -73,7 +73,7 @@ def _command_loop(
         x, y, z = rotation[row, 0], rotation[row, 1], rotation[row, 2]
         twist[row] = x * right + y * down + z * ahead
         twist[3 + row] = x * about_right + y * about_down + z * about_ahead
-    if not resolve(jacobian, twist, limits, SINGULAR_VALUE_THRESHOLD, LARGEST_DAMPING, velocity):
+    if not resolve(jacobian, twist, limits, velocity):
         return math.nan
     told = 0.0
     for joint in range(velocity.size):

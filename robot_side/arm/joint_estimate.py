@@ -23,11 +23,7 @@ _LOST = 0.01
 class JointEstimate:
     """Filters what an arm measures of its joints and fingers; it holds from one state to the next."""
 
-    def __init__(self, time_constant_s: float = TIME_CONSTANT_S) -> None:
-        """ValueError unless the time constant is finite and above 0."""
-        if not (math.isfinite(time_constant_s) and time_constant_s > 0.0):
-            raise ValueError(f"time_constant_s = {time_constant_s}; valid: finite and above 0")
-        self._time_constant_s = time_constant_s
+    def __init__(self) -> None:
         self._last: ArmState | None = None
         self._finger_velocities: FloatArray = np.empty(0)
 
@@ -41,7 +37,7 @@ class JointEstimate:
             return last
         joints, fingers = np.empty(measured.joint_positions_rad.size), np.empty(measured.finger_positions.size)
         if not _estimate_loop(
-            *(since_s, 1.0 - math.exp(-since_s / self._time_constant_s)),
+            *(since_s, 1.0 - math.exp(-since_s / TIME_CONSTANT_S)),
             *(last.joint_positions_rad, last.joint_velocities_rad_s, last.finger_positions),
             *(measured.joint_positions_rad, measured.joint_velocities_rad_s, measured.finger_positions),
             *(joints, fingers, self._finger_velocities),

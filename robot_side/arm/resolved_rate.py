@@ -9,10 +9,11 @@ from typing import Final, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, require_finite
-from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, output_array
+from robot_side.compiled.kernel import TRUTH, building_block, compiled, input_array, output_array
 
-SINGULAR_VALUE_THRESHOLD: Final = 0.06
-LARGEST_DAMPING: Final = 0.06
+_THRESHOLD_2: Final = 0.06 * 0.06
+"""Of the singular values, squared"""
+_LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
 """After so many the smallest eigenvalue is known to the last digit."""
 
@@ -21,38 +22,20 @@ def joint_velocities(
     jacobian: FloatArray,
     twist: FloatArray,
     velocity_limits_rad_s: FloatArray,
-    singular_value_threshold: float = SINGULAR_VALUE_THRESHOLD,
-    largest_damping: float = LARGEST_DAMPING,
 ) -> FloatArray:
     """Joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
 
     jacobian (6, n) and twist (6,), linear rows first, are in one frame. While the smallest of the Jacobian's
-    min(6, n) singular values stays above the threshold there is no damping and the twist is met exactly, or in
+    min(6, n) singular values stays above a threshold of 0.06 there is no damping and the twist is met exactly, or in
     the least-squares sense by an arm with fewer than six joints. Below it λ² = λ_max² (1 - (σ_min/σ_0)²), so that
     no joint runs away at a singularity. A joint over its limit slows all of them alike, which keeps the direction.
     Metres and radians are mixed in the singular values: the defaults suit an arm of about one metre's reach.
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
-    if jacobian.ndim != 2 or jacobian.shape[0] != 6 or jacobian.shape[1] == 0:
-        raise ValueError(f"jacobian has the shape {jacobian.shape}; valid: (6, n) with n of 1 or more")
-    if twist.shape != (6,):
-        raise ValueError(f"twist has the shape {twist.shape}; valid: (6,)")
-    if velocity_limits_rad_s.shape != jacobian.shape[1:]:
-        raise ValueError(
-            f"velocity_limits_rad_s has the shape {velocity_limits_rad_s.shape}; valid: {jacobian.shape[1:]}"
-        )
-    for name, value in (
-        ("singular_value_threshold", singular_value_threshold),
-        ("largest_damping", largest_damping),
-    ):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} = {value}; valid: finite and above 0")
-
+    if (jacobian.shape, twist.shape) != ((6, velocity_limits_rad_s.size), (6,)):
+        raise ValueError(f"jacobian has the shape {jacobian.shape}; valid: (6, n), with n limits and a twist (6,)")
     velocity = np.empty(jacobian.shape[1])
-    if not _resolve_loop(
-        *map(np.ascontiguousarray, (jacobian, twist, velocity_limits_rad_s)),
-        *(singular_value_threshold, largest_damping, velocity),
-    ):
+    if not _resolve_loop(*map(np.ascontiguousarray, (jacobian, twist, velocity_limits_rad_s)), velocity):
         refuse(jacobian, twist, velocity_limits_rad_s)
     return velocity
 
@@ -84,14 +67,14 @@ def _factorise(matrix: FloatArray, shift: float, factor: FloatArray) -> bool:
 
 
 @building_block
-def _factorise_damped(gram: FloatArray, threshold: float, largest_damping: float, factor: FloatArray) -> bool:
+def _factorise_damped(gram: FloatArray, factor: FloatArray) -> bool:
     """Cholesky's factor of G + λ²; False for what is no Gram matrix of finite numbers.
 
-    The eigenvalues of G = A Aᵀ are the squares of A's singular values: all of these are above `threshold` where
+    The eigenvalues of G = A Aᵀ are the squares of A's singular values: all of these are above the threshold where
     G - threshold² has a factor. That costs a fraction of a singular value decomposition. Elsewhere the largest s for
     which G - s has one, by bisection, is σ_min².
     """
-    below, above = 0.0, threshold * threshold
+    below, above = 0.0, _THRESHOLD_2
     if _factorise(gram, above, factor):
         return _factorise(gram, 0.0, factor)
     for _ in range(_HALVINGS):
@@ -100,11 +83,11 @@ def _factorise_damped(gram: FloatArray, threshold: float, largest_damping: float
             below = middle
         else:
             above = middle
-    return _factorise(gram, -largest_damping * largest_damping * (1.0 - below / (threshold * threshold)), factor)
+    return _factorise(gram, -_LARGEST_DAMPING * _LARGEST_DAMPING * (1.0 - below / _THRESHOLD_2), factor)
 
 
 @building_block
-def _solve_damped(rows: FloatArray, threshold: float, largest_damping: float, solution: FloatArray) -> bool:
+def _solve_damped(rows: FloatArray, solution: FloatArray) -> bool:
     """Solve (G + λ²) x = `solution` in place, G = A Aᵀ for the matrix A of these rows."""
     size = rows.shape[0]
     gram, factor = np.zeros((size, size)), np.zeros((size, size))
@@ -112,7 +95,7 @@ def _solve_damped(rows: FloatArray, threshold: float, largest_damping: float, so
         for column in range(size):
             for k in range(rows.shape[1]):
                 gram[row, column] += rows[row, k] * rows[column, k]
-    if not _factorise_damped(gram, threshold, largest_damping, factor):
+    if not _factorise_damped(gram, factor):
         return False
     for row in range(size):
         for k in range(row):
@@ -130,8 +113,6 @@ def resolve(
     jacobian: FloatArray,
     twist: FloatArray,
     limits: FloatArray,
-    threshold: float,
-    largest_damping: float,
     velocity: FloatArray,
 ) -> bool:
     """Fill `velocity` (n,) as `joint_velocities` says; False for what is not finite, or for a limit that is none.
@@ -148,7 +129,7 @@ def resolve(
             rows[row, k] = jacobian[row, k] if wide else jacobian[k, row]
             solution[row] += 0.0 if wide else rows[row, k] * twist[k]
         solution[row] += twist[row] if wide else 0.0
-    if not _solve_damped(rows, threshold, largest_damping, solution):
+    if not _solve_damped(rows, solution):
         return False
     for joint in range(velocity.size):
         velocity[joint] = 0.0 if wide else solution[joint]
@@ -171,13 +152,11 @@ def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
     return True
 
 
-@compiled(input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, output_array(1), returns=TRUTH)
+@compiled(input_array(2), input_array(1), input_array(1), output_array(1), returns=TRUTH)
 def _resolve_loop(
     jacobian: FloatArray,
     twist: FloatArray,
     limits: FloatArray,
-    threshold: float,
-    largest_damping: float,
     velocity: FloatArray,
 ) -> bool:
-    return resolve(jacobian, twist, limits, threshold, largest_damping, velocity)
+    return resolve(jacobian, twist, limits, velocity)

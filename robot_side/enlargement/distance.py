@@ -12,7 +12,6 @@ from scipy.special import ndtri
 from common.arrays import FloatArray, require_finite
 from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
-from robot_side.enlargement.delay_displacement import delay_displacement
 from robot_side.enlargement.prediction_errors import PredictionErrors
 
 Vector3 = tuple[float, float, float]
@@ -59,7 +58,7 @@ def enlargement_distance(
 
     probability: P in (0, 1). mean_m: a magnitude, as |μ_ee| + √3 |μ_c|, so never negative.
     variance_m2: σ_p² + σ_c²; with 0 the statistical part is the mean itself.
-    delay_displacement_m: ΔT_d (`delay_displacement`). The arguments broadcast; a float for four scalars.
+    delay_displacement_m: ΔT_d = |v| t_d (eq. 8). The arguments broadcast; a float for four scalars.
     ValueError for P outside (0, 1) and for any other argument that is negative or not finite.
     """
     z = standard_quantile(probability)
@@ -124,7 +123,6 @@ def plain_enlargements_m(
     """
     mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)
     variance_m2 = np.trace(covariances, axis1=-2, axis2=-1) + uncertainty.camera_sd_m**2
-    found = enlargement_distance(
-        uncertainty.probability, mean_m, variance_m2, delay_displacement(velocities_m_s, loop_age_s)
-    )
+    speeds_m_s = np.sqrt(np.einsum("mi,mi->m", velocities_m_s, velocities_m_s))
+    found = enlargement_distance(uncertainty.probability, mean_m, variance_m2, speeds_m_s * loop_age_s)
     return np.asarray(found)

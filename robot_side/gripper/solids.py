@@ -3,17 +3,17 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from common.arrays import FloatArray
+from robot_side.overlap.meshes.mesh_shapes import capsule_mesh, ellipsoid_mesh
 
 _POINTS_AT_A_TIME = 2048
 # An open round solid stands for a polyhedron around it: farther out by this share of its least radius at most.
 _EXCESS = 0.003
-_OCTAHEDRON = 16
+_SUBDIVISIONS = 16
 
 
 @dataclass(frozen=True)
@@ -75,26 +75,14 @@ def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
 
 def ellipsoid(semi_axes_m: FloatArray) -> Solid | None:
     """Along the axes, semi axes (3,), as a polyhedron around it; None without volume."""
-    directions, share = _sphere()
-    return convex_solid(directions * semi_axes_m, share * float(np.max(semi_axes_m)))
+    around = ellipsoid_mesh(semi_axes_m, _SUBDIVISIONS)
+    return convex_solid(around.vertices, around.stands_out_m)
 
 
 def capsule(radius_m: float, half_length_m: float) -> Solid | None:
     """The points within `radius_m` of a line along the z axis, as a polyhedron around it; None without volume."""
-    directions, share = _sphere()
-    ends = [radius_m * directions + [0.0, 0.0, z] for z in (-half_length_m, half_length_m)]
-    return convex_solid(np.concatenate(ends), share * radius_m)
-
-
-@cache
-def _sphere() -> tuple[FloatArray, float]:
-    """Corners (n, 3) of a polyhedron around the unit sphere, and how far they are outside."""
-    steps = range(-_OCTAHEDRON, _OCTAHEDRON + 1)
-    lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == _OCTAHEDRON]
-    directions = np.array(lattice, dtype=np.float64)
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    reach = 1.0 / -float(ConvexHull(directions).equations[:, 3].max())
-    return directions * reach, reach - 1.0
+    around = capsule_mesh(radius_m, half_length_m, _SUBDIVISIONS)
+    return convex_solid(around.vertices, around.stands_out_m)
 
 
 def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:

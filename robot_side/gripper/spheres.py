@@ -55,25 +55,9 @@ def cover_boxes(
     centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3); a half size may be 0. The spheres of a
     box are mirror-symmetric in its three middle planes, and in a fixed order. A box that would need more than 2000
     gets as much more stand-out as it takes for 2000.
-    ValueError for no box, a wrong shape, a negative or non-finite value, or a stand-out that is not above 0.
     """
-    boxes = centers_m.shape[0] if centers_m.ndim == 2 else 0
-    for name, values, shape in (
-        ("centers_m", centers_m, (boxes, 3)),
-        ("rotations", rotations, (boxes, 3, 3)),
-        ("half_sizes_m", half_sizes_m, (boxes, 3)),
-    ):
-        if boxes == 0 or values.shape != shape:
-            raise ValueError(f"{name} has the shape {values.shape}; valid: one row for each of 1 or more boxes")
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")
-    if (half_sizes_m < 0.0).any():
-        raise ValueError(f"half_sizes_m = {half_sizes_m.min()} is negative; valid: 0 or more")
-    if not (math.isfinite(stand_out_m) and stand_out_m > 0.0):
-        raise ValueError(f"stand_out_m = {stand_out_m}; valid: finite and above 0")
-
     covers = [_cover_box(tuple(half_sizes.tolist()), float(stand_out_m)) for half_sizes in half_sizes_m]
-    box = np.repeat(np.arange(boxes), [len(radii) for _, radii, _ in covers])
+    box = np.repeat(np.arange(len(covers)), [len(radii) for _, radii, _ in covers])
     offsets = np.concatenate([offsets for offsets, _, _ in covers])
     return SphereCover(
         centers_m=centers_m[box] + np.einsum("mij,mj->mi", rotations[box], offsets),

@@ -6,7 +6,6 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
-from robot_side.enlargement.kinematic_error import encoder_sigma
 
 
 class Encoder:
@@ -17,10 +16,7 @@ class Encoder:
     """
 
     def __init__(self, sigma_rad: float = 2e-4, resolution_rad: float = 2.0 * math.pi / 2**15, seed: int = 0) -> None:
-        """Seed the noise. ValueError for a negative or non-finite deviation or step; a step of 0 is none."""
-        for name, value in (("sigma_rad", sigma_rad), ("resolution_rad", resolution_rad)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} = {value}; valid: finite and 0 or more")
+        """Seed the noise; a step of 0 is none."""
         self._sigma_rad = sigma_rad
         self._resolution_rad = resolution_rad
         self._noise = np.random.default_rng(seed)
@@ -33,7 +29,7 @@ class Encoder:
 
     def standard_deviation_rad(self) -> float:
         """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
-        return float(encoder_sigma(np.array(self._sigma_rad), np.array(self._resolution_rad)))
+        return float(np.hypot(self._sigma_rad, self._resolution_rad / math.sqrt(12.0)))
 
 
 @compiled(output_array(1), input_array(1), NUMBER, NUMBER)

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.simulation.gripper_travel import GripperTravel
+from robot_side.simulation.gripper_measurement import GripperTravel
 
 # Beyond this share of the stroke between where the drive would stand freely and where it stands, and below this
 # share of the stroke per second, for this long, something stops the fingers.
@@ -45,8 +45,6 @@ class GripperDrive:
 
     def __init__(self, travel: GripperTravel, stroke_time_s: float = 0.6) -> None:
         """Start open. `stroke_time_s`: at full speed; 85 mm at 150 mm/s for a Robotiq 2F-85 (its manual)."""
-        if not (math.isfinite(stroke_time_s) and stroke_time_s > 0.0):
-            raise ValueError(f"stroke_time_s = {stroke_time_s}; valid: finite and above 0")
         stroke = float(travel.lengths[-1] - travel.lengths[0])
         self.drive: np.ndarray = np.zeros(1, GRIPPER)
         """(1,) of GRIPPER"""
@@ -93,15 +91,6 @@ class GripperDrive:
     def moving(self, time_s: float) -> float:
         """What it is told at `time_s`: close (+1), hold (0) or open (-1)."""
         return self._command if time_s < self._valid_until_s else 0.0
-
-    @property
-    def control(self) -> FloatArray:
-        """The actuators' inputs (g,) now."""
-        travel = self._travel
-        control: FloatArray = travel.open_control + self.drive["reference"] * (
-            travel.closed_control - travel.open_control
-        )
-        return control
 
     @property
     def opening_m(self) -> float:

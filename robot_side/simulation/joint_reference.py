@@ -87,21 +87,6 @@ class JointReference:
         self._valid_until_s = -math.inf
         self._following = False
 
-    @property
-    def position_rad(self) -> FloatArray:
-        """(n,) where the joints should be"""
-        return self.joints["position"].copy()
-
-    @property
-    def velocity_rad_s(self) -> FloatArray:
-        """(n,)"""
-        return self.joints["velocity"].copy()
-
-    @property
-    def acceleration_rad_s2(self) -> FloatArray:
-        """(n,)"""
-        return self.joints["acceleration"].copy()
-
     def command(self, velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `velocity_rad_s` (n,), scaled as a whole to the limit, until `valid_until_s`.
 

@@ -1,55 +1,15 @@
-"""MuJoCo's own numbers for the kinds of joints, geoms and actuators in a compiled model.
+"""MuJoCo's own numbers for the kinds of joints, geoms and actuators, in its order; a test compares them with it.
 
-They let a module read a model's arrays without importing the library; a test compares them with it.
+They let a module read a model's arrays without importing the library.
 """
 
 from enum import IntEnum
 
-
-class JointKind(IntEnum):
-    """mjtJoint"""
-
-    FREE = 0
-    BALL = 1
-    SLIDE = 2
-    HINGE = 3
-
-
-class GeomKind(IntEnum):
-    """mjtGeom, the shapes that take part in collisions."""
-
-    PLANE = 0
-    HFIELD = 1
-    SPHERE = 2
-    CAPSULE = 3
-    ELLIPSOID = 4
-    CYLINDER = 5
-    BOX = 6
-    MESH = 7
-
-
-class TransmissionKind(IntEnum):
-    """mjtTrn, as far as an actuator can turn a joint or pull a tendon."""
-
-    JOINT = 0
-    JOINT_IN_PARENT = 1
-    TENDON = 3
-
-
-class WrappedKind(IntEnum):
-    """mjtWrap, the joints of a fixed tendon."""
-
-    JOINT = 1
-
-
-class GainKind(IntEnum):
-    """mjtGain"""
-
-    FIXED = 0
-
-
-class BiasKind(IntEnum):
-    """mjtBias"""
-
-    NONE = 0
-    AFFINE = 1
+JointKind = IntEnum("JointKind", "FREE BALL SLIDE HINGE", start=0)
+GeomKind = IntEnum("GeomKind", "PLANE HFIELD SPHERE CAPSULE ELLIPSOID CYLINDER BOX MESH", start=0)
+"""Shapes that take part in collisions."""
+TransmissionKind = IntEnum("TransmissionKind", "JOINT JOINT_IN_PARENT SLIDER_CRANK TENDON", start=0)
+WrappedKind = IntEnum("WrappedKind", "NONE JOINT", start=0)
+"""Parts of a fixed tendon."""
+GainKind = IntEnum("GainKind", "FIXED", start=0)
+BiasKind = IntEnum("BiasKind", "NONE AFFINE", start=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
@@ -89,11 +89,6 @@ class ObjectPrimitives:
         self._mesh_index = np.array([meshes[int(geom)][0] for geom in self._mesh_geoms], dtype=np.int64)
         self._plane_geoms, self._plane_object = _columns(of_kind["plane"])
 
-    @property
-    def approximated(self) -> tuple[str, ...]:
-        """Names of the objects that are seen larger than they are."""
-        return tuple(self.volume_errors)
-
     def only(self, things: IntArray) -> "ObjectPrimitives":
         """Those of some of the objects, things (m,), rising: by their places among these."""
         part = copy(self)
@@ -119,46 +114,42 @@ class ObjectPrimitives:
         geom_positions_m (g, 3) and geom_rotations (g, 9) are the model's geoms in the world frame.
         """
         seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=bool)
-        spheres = seen[self._sphere_object]
-        boxes = seen[self._box_object]
-        tetrahedra = seen[self._tetrahedron_object]
-        meshes = seen[self._mesh_object]
-        planes = seen[self._plane_object]
 
-        def position(geoms: IntArray, objects: IntArray) -> FloatArray:
-            return geom_positions_m[geoms] + offsets_m[objects]
+        def placed(kind: str) -> tuple[BoolArray, IntArray, FloatArray, FloatArray]:
+            """Which of a kind are seen, their objects (p,), positions (p, 3) and rotations (p, 3, 3)."""
+            owners, geoms = getattr(self, f"_{kind}_object"), getattr(self, f"_{kind}_geoms")
+            kept = seen[owners]
+            positions_m = geom_positions_m[geoms[kept]] + offsets_m[owners[kept]]
+            return kept, owners[kept], positions_m, geom_rotations[geoms[kept]].reshape(-1, 3, 3)
 
-        def rotation(geoms: IntArray) -> FloatArray:
-            return geom_rotations[geoms].reshape(-1, 3, 3)
-
-        box_rotations = rotation(self._box_geoms[boxes])
-        tetrahedron_centers = position(self._tetrahedron_geoms[tetrahedra], self._tetrahedron_object[tetrahedra])
-        tetrahedron_rotations = rotation(self._tetrahedron_geoms[tetrahedra])
-        normals = np.ascontiguousarray(rotation(self._plane_geoms[planes])[:, :, 2])
-        plane_points = position(self._plane_geoms[planes], self._plane_object[planes])
+        spheres, sphere_object, sphere_centers_m, _ = placed("sphere")
+        boxes, box_object, box_places_m, box_rotations = placed("box")
+        tetrahedra, tetrahedron_object, tetrahedron_centers_m, tetrahedron_rotations = placed("tetrahedron")
+        meshes, mesh_object, mesh_positions_m, mesh_rotations = placed("mesh")
+        _, plane_object, plane_points_m, plane_rotations = placed("plane")
+        normals = np.ascontiguousarray(plane_rotations[:, :, 2])
         return PerceivedObjects(
             time_s=time_s,
             names=self._names,
             roles=tuple(roles[name] for name in self._names),
-            sphere_centers_m=position(self._sphere_geoms[spheres], self._sphere_object[spheres]),
+            sphere_centers_m=sphere_centers_m,
             sphere_radii_m=self._radii_m[spheres],
-            sphere_object=self._sphere_object[spheres],
-            box_centers_m=position(self._box_geoms[boxes], self._box_object[boxes])
-            + np.einsum("bij,bj->bi", box_rotations, self._box_offsets_m[boxes]),
+            sphere_object=sphere_object,
+            box_centers_m=box_places_m + np.einsum("bij,bj->bi", box_rotations, self._box_offsets_m[boxes]),
             box_rotations=box_rotations,
             box_half_sizes_m=self._box_half_sizes_m[boxes],
-            box_object=self._box_object[boxes],
-            tetrahedron_vertices_m=tetrahedron_centers[:, None, :]
+            box_object=box_object,
+            tetrahedron_vertices_m=tetrahedron_centers_m[:, None, :]
             + np.einsum("tij,tvj->tvi", tetrahedron_rotations, self._corners_m[tetrahedra]),
-            tetrahedron_object=self._tetrahedron_object[tetrahedra],
+            tetrahedron_object=tetrahedron_object,
             half_space_normals=normals,
-            half_space_offsets_m=np.einsum("pi,pi->p", normals, plane_points),
-            half_space_object=self._plane_object[planes],
+            half_space_offsets_m=np.einsum("pi,pi->p", normals, plane_points_m),
+            half_space_object=plane_object,
             mesh_library=self._mesh_library,
             mesh_index=self._mesh_index[meshes],
-            mesh_positions_m=position(self._mesh_geoms[meshes], self._mesh_object[meshes]),
-            mesh_rotations=rotation(self._mesh_geoms[meshes]),
-            mesh_object=self._mesh_object[meshes],
+            mesh_positions_m=mesh_positions_m,
+            mesh_rotations=mesh_rotations,
+            mesh_object=mesh_object,
         )
 
 

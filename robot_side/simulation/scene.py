@@ -58,21 +58,6 @@ class Scene:
         moves = movable[model.geom_bodyid]
         return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
 
-    @property
-    def approximated(self) -> tuple[str, ...]:
-        """Names of the objects that are perceived larger than they are."""
-        return self.primitives.approximated
-
-    @property
-    def volume_errors(self) -> Mapping[str, float]:
-        """How much larger `approximated` objects are perceived, see `ObjectPrimitives.volume_errors`."""
-        return self.primitives.volume_errors
-
-    @property
-    def stands_out_m(self) -> Mapping[str, float]:
-        """How far what is perceived of these reaches beyond them, see `ObjectPrimitives.stands_out_m`."""
-        return self.primitives.stands_out_m
-
 
 def load_scene(
     model_path: Path | None = None,

@@ -29,7 +29,7 @@ ARROWS = """
     common/command: common common/emulation common/files common/recording
 
     robot_side/compiled: common common/companion common/files
-    robot_side/overlap/checks: common robot_side/compiled
+    robot_side/overlap/checks: common
     robot_side/overlap/digits: common robot_side/compiled
     robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
     robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
@@ -50,8 +50,8 @@ ARROWS = """
         robot_side/overlap/precise
     robot_side/gripper: common common/files robot_side/ahead robot_side/arm robot_side/compiled robot_side/objects
         robot_side/overlap/meshes
-    robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/compiled
-        robot_side/enlargement robot_side/gripper robot_side/objects robot_side/overlap/meshes
+    robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/compiled robot_side/gripper
+        robot_side/objects robot_side/overlap/meshes
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
     robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
         common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled

@@ -9,7 +9,7 @@ import pytest
 from common.errors import ConfigurationError
 from robot_side.ahead.paper_law import PaperLaw
 from robot_side.ahead.swept_law import SweptLaw
-from robot_side.assembly import assemble, build_robot_side
+from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
@@ -17,7 +17,6 @@ from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.objects.perceived import Role
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
-from robot_side.simulation.joint_reference import MotionLimits
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.repository import ROOT
 
@@ -26,7 +25,7 @@ NOT_MEASURED = "has not been measured"
 
 
 def built(**settings: Any) -> RobotSide:
-    return build_robot_side(RobotSettings(**settings), 1, "clock")
+    return assemble(RobotSettings(**settings), 1, "clock").core
 
 
 def knows(robot: RobotSide) -> Uncertainty:
@@ -105,20 +104,6 @@ def test_the_gripper_is_covered_as_closely_as_is_set() -> None:
     assert counts[1] < 50
 
 
-def test_the_law_and_the_motion_know_the_limits_of_the_arms_own_controller() -> None:
-    robot, limits = built(), MotionLimits()
-    np.testing.assert_array_equal(robot._limits.velocity_rad_s, np.full(6, limits.velocity_rad_s))
-    np.testing.assert_array_equal(robot._limits.acceleration_rad_s2, np.full(6, limits.acceleration_rad_s2))
-    assert robot._law._limits is robot._limits  # type: ignore[attr-defined]
-
-
-def test_a_person_is_told_what_is_there() -> None:
-    notes = built().notes
-    assert notes[0].startswith("starts at ")
-    assert notes[1].startswith("objects: target: ")
-    assert not any(NOT_MEASURED in note for note in notes)
-
-
 ROUND_PALM = ('name="palm" type="box"', 'name="palm" type="ellipsoid"')
 CAN = '<body name="can" pos="0.9 0 0.3"><freejoint/><geom type="cylinder" size="0.02 0.03"/></body>'
 BOX = '<body name="carton" pos="0.9 0 0.3"><freejoint/><geom type="box" size="0.02 0.03 0.04"/></body>'
@@ -137,7 +122,7 @@ def test_a_search_for_spheres_is_announced_once_and_only_at_the_first_start(
     model.write_text(model.read_text().replace(*palm))
     said: list[list[str]] = [[], []]
     for told in said:
-        build_robot_side(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
+        assemble(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
     first, again = said
     assert [line.partition(",")[0] for line in first] == (
         ["searching for spheres that cover gripper and objects"] if searches else []

@@ -1,4 +1,3 @@
-import json
 from typing import Any
 
 import numpy as np
@@ -58,21 +57,11 @@ def test_figures_are_in_the_units_of_their_names() -> None:
     assert summary["stiffness"]["r2"] == pytest.approx({"mean": 0.75, "max": 1.0})
 
 
-def test_mean_moving_is_over_the_ticks_in_which_the_tool_moved() -> None:
-    figures = RunFigures()
-    for enlargement_m, speed_m_s in ((0.01, 0.0), (0.02, MOVING_M_S), (0.06, 0.011), (0.08, 0.25), (0.01, 0.009)):
-        figures.tick(sensed(enlargement_m), speed_m_s)
-    enlargement = figures.summary()["enlargement_mm"]
-    assert enlargement["mean_moving"] == pytest.approx(70.0)
-    assert enlargement["mean"] == pytest.approx(36.0)
-    assert MOVING_M_S == 0.01
-
-
 @pytest.mark.parametrize("asked_every", [1, 100, 10_000])
 def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
     generator = np.random.default_rng(0)
     enlargements, overlaps = generator.uniform(0.0, 0.1, (2, 5000))
-    speeds = generator.choice([0.0, 0.25], 5000)
+    speeds = generator.choice([0.0, MOVING_M_S, 0.25], 5000)
     figures = RunFigures()
     for enlargement_m, overlap_m3, speed_m_s in zip(enlargements, overlaps, speeds, strict=True):
         figures.tick(sensed(float(enlargement_m), float(overlap_m3)), float(speed_m_s), armed=False)
@@ -82,7 +71,9 @@ def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
     assert summary["ticks"] == 5000
     assert summary["enlargement_mm"]["mean"] == pytest.approx(1e3 * np.mean(enlargements), rel=1e-12)
     assert summary["enlargement_mm"]["max"] == pytest.approx(1e3 * np.max(enlargements), rel=1e-12)
-    assert summary["enlargement_mm"]["mean_moving"] == pytest.approx(1e3 * np.mean(enlargements[speeds > 0]), rel=1e-12)
+    assert summary["enlargement_mm"]["mean_moving"] == pytest.approx(
+        1e3 * np.mean(enlargements[speeds > 0.01]), rel=1e-12
+    )
     assert summary["overlap_mm3"]["mean"] == pytest.approx(1e9 * np.mean(overlaps), rel=1e-12)
 
 
@@ -137,14 +128,6 @@ def test_contacts_are_counted_by_object_and_those_with_obstacles_apart() -> None
     assert summary["task"]["obstacle_contacts"] == 2
 
 
-def test_two_fingers_that_close_on_an_object_are_one_contact() -> None:
-    figures = RunFigures()
-    figures.truth(truth(("left", "cup")), ROLES, 0.0)
-    figures.truth(truth(("left", "cup"), ("right", "cup")), ROLES, 0.05)
-    figures.truth(truth(("right", "cup")), ROLES, 0.1)
-    assert figures.summary()["contacts"] == 1
-
-
 def test_the_time_to_the_grasp_counts_from_the_first_arming() -> None:
     figures = RunFigures()
     for now_s, armed, held in ((1.0, False, False), (2.0, True, False), (3.0, False, False), (4.0, True, False)):
@@ -168,28 +151,7 @@ def lifted_mm(*ticks: tuple[bool, float | None]) -> float:
 def test_lifted_is_how_far_a_held_target_rose_above_where_it_rested() -> None:
     assert lifted_mm((False, 0.05), (True, 0.05), (True, 0.12), (True, 0.09), (False, 0.05)) == pytest.approx(70.0)
     assert lifted_mm((False, 0.05), (True, 0.03)) == 0.0
-    # Thrown up, or seen higher, without being held.
+    # Without a height at first; thrown up, or seen higher, without being held.
+    assert lifted_mm((False, np.nan), (False, 0.05), (True, 0.05), (True, 0.15)) == pytest.approx(100.0)
     assert lifted_mm((False, 0.05), (False, 0.5), (True, 0.5)) == 0.0
     assert lifted_mm((False, None), (True, None)) == 0.0
-
-
-def test_a_target_without_a_height_spoils_nothing() -> None:
-    assert lifted_mm((False, np.nan), (False, 0.05), (True, 0.05), (True, 0.15)) == pytest.approx(100.0)
-
-
-def test_a_summary_is_json_and_stays_as_it_was_taken() -> None:
-    figures = RunFigures()
-    figures.tick(sensed(0.01), 0.1)
-    first = figures.summary()
-    figures.tick(sensed(0.03), 0.1)
-    assert json.loads(json.dumps(first)) == first
-    assert first["ticks"] == 1
-    assert figures.summary()["enlargement_mm"]["max"] == pytest.approx(30.0)
-
-
-def test_the_first_contact_stays_the_first() -> None:
-    figures = RunFigures()
-    assert (figures.touched, figures.summary()["first_contact"]) == (False, None)
-    figures.first_contact("post", 0.21, 3.4)
-    assert figures.touched
-    assert figures.summary()["first_contact"] == {"with": "post", "speed_mm_s": 210.0, "time_s": 3.4}

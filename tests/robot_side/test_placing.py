@@ -41,12 +41,6 @@ def test_what_is_set_down_upright_and_let_go_is_placed() -> None:
     assert said["off_support_mm"] == pytest.approx(-0.1)
 
 
-def test_what_was_not_felt_says_so() -> None:
-    said = set_down(warned_from_m=None)[0].summary(0.0)
-    assert said["placed"]
-    assert said["felt_before_s"] is said["felt_before_mm"] is None
-
-
 @pytest.mark.parametrize("tilt_deg", [11.0, 90.0])
 def test_what_has_toppled_is_not_placed(tilt_deg: float) -> None:
     assert not set_down(tilt_rad=math.radians(tilt_deg))[0].placed

@@ -11,7 +11,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry, Tune, Watch
 from common.protocol.session import SessionState
 from robot_side.arm.port import Arm, ArmState
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 from robot_side.core import RobotSide
 from robot_side.operators.safety import SafetySettings
 from robot_side.settings import RobotSettings
@@ -120,7 +120,7 @@ class Bench:
     """The robot side, messages to each operator, and the arm's motion."""
 
     def __init__(self, settings: RobotSettings = QUICK) -> None:
-        self.robot: RobotSide = build_robot_side(settings, 1, "clock", self._watch)
+        self.robot: RobotSide = assemble(settings, 1, "clock", self._watch).core
         self.ticks = 0
         self.operators: dict[bytes, Operator] = {}
         self.views: list[Telemetry] = []

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
-from common.arrays import FloatArray
-from robot_side.overlap.checks.array_searches import NONE, first_outside, first_short, first_skewed
+from common.arrays import BoolArray, FloatArray
 
 LARGEST = 1e50
 """The largest magnitude of any coordinate or length (m): products of six of them stay finite."""
@@ -38,8 +36,11 @@ class Argument:
         """The items in one row after the other, (items, *trailing), contiguous."""
         return np.ascontiguousarray(self.values).reshape(-1, *self.trailing)
 
-    def refuse(self, index: tuple[int, ...], what_is_valid: str) -> NoReturn:
-        """ValueError about the item or number at `index`."""
+    def refuse_any(self, wrong: BoolArray, shape: tuple[int, ...], what_is_valid: str) -> None:
+        """ValueError about the first of the items or numbers that is wrong; `shape` is that of their array."""
+        if not wrong.any():
+            return
+        index = tuple(int(place) for place in np.unravel_index(wrong.argmax(), shape))
         label = self.name + (f"[{', '.join(map(str, index))}]" if index else "")
         raise ValueError(f"{label} = {self.values[index].tolist()} is out of range; valid: {what_is_valid}")
 
@@ -52,7 +53,7 @@ class Argument:
 
 
 Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
-"""What is asked of an argument, given its name, its value and its last dimensions; ValueError where it is not so."""
+"""A check of an argument, given its name, value and last dimensions; ValueError where it fails."""
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -87,17 +88,17 @@ def lengths(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> 
 def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)) -> Argument:
     """`numbers` (..., 3) of which no vector is 0."""
     argument = numbers(name, value, trailing)
-    if (short := first_short(argument.items, SMALLEST_NORMAL)) != NONE:
-        argument.refuse(_index(short, argument.leading), f"a vector of length {SMALLEST_NORMAL:g} or more")
+    short = np.hypot(np.hypot(*argument.items.T[:2]), argument.items[:, 2]) < SMALLEST_NORMAL
+    argument.refuse_any(short, argument.leading, f"a vector of length {SMALLEST_NORMAL:g} or more")
     return argument
 
 
 def rotations(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3, 3)) -> Argument:
     """`numbers` (..., 3, 3) of which every matrix is orthonormal."""
     argument = numbers(name, value, trailing)
-    if (skewed := first_skewed(argument.items, ORTHONORMALITY)) != NONE:
-        what_is_valid = f"an orthonormal matrix Q, ‖QᵀQ - I‖ <= {ORTHONORMALITY:g}"
-        argument.refuse(_index(skewed, argument.leading), what_is_valid)
+    excess = argument.items.swapaxes(1, 2) @ argument.items - np.eye(3)
+    skewed = (excess * excess).sum(axis=(1, 2)) > ORTHONORMALITY**2
+    argument.refuse_any(skewed, argument.leading, f"an orthonormal matrix Q, ‖QᵀQ - I‖ <= {ORTHONORMALITY:g}")
     return argument
 
 
@@ -112,8 +113,8 @@ def _within(name: str, value: npt.ArrayLike, trailing: tuple[int, ...], lowest: 
     if values.ndim < len(trailing) or values.shape[values.ndim - len(trailing) :] != trailing:
         raise ValueError(f"{name} has the shape {values.shape}; valid: {_shape_text(trailing)}")
     argument = Argument(name, values, trailing)
-    if (outside := first_outside(argument.items.reshape(-1), lowest, LARGEST)) != NONE:
-        argument.refuse(_index(outside, values.shape), what_is_valid)
+    # Compared so that NaN is outside, too.
+    argument.refuse_any(~((values >= lowest) & (values <= LARGEST)), values.shape, what_is_valid)
     return argument
 
 
@@ -127,10 +128,6 @@ def broadcast(arguments: Sequence[Argument]) -> tuple[int, ...]:
     except ValueError as error:
         shapes = ", ".join(f"{argument.name} {argument.values.shape}" for argument in arguments)
         raise ValueError(f"the leading dimensions do not broadcast: {shapes}") from error
-
-
-def _index(position: int, shape: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(int(place) for place in np.unravel_index(position, shape))
 
 
 def _shape_text(trailing: tuple[int, ...]) -> str:

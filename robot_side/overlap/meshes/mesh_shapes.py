@@ -10,7 +10,6 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from common.arrays import FloatArray, IntArray
-from robot_side.overlap.checks.arguments import lengths, numbers
 
 
 class ShapeMesh(NamedTuple):
@@ -26,17 +25,11 @@ class ShapeMesh(NamedTuple):
     """How far any point of the mesh is from the solid, at most."""
 
 
-_LEAST_SEGMENTS = 3
-
-
 def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> ShapeMesh:
     """A prism of `segments` sides, each touching the cylinder about the z axis, |z| <= half_length; m.
 
-    The excess is that of a circumscribed polygon: (n / π) tan(π / n) - 1. ValueError for sizes not above 0 and fewer
-    than 3 segments.
+    The excess is that of a circumscribed polygon: (n / π) tan(π / n) - 1.
     """
-    _require_sizes(radius=radius, half_length=half_length)
-    _require_segments(segments)
     turns = 2.0 * np.pi * np.arange(segments) / segments
     reach = radius / np.cos(np.pi / segments)
     ring = np.column_stack([reach * np.cos(turns), reach * np.sin(turns)])
@@ -50,12 +43,9 @@ def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh
     """A polyhedron about the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
 
     The sphere's octahedron with `subdivisions` triangles along each edge, enlarged until no face cuts the sphere, and
-    stretched. Its volume is known, so that the excess is the very one. ValueError for sizes not above 0 and fewer
-    than 1 subdivision.
+    stretched. Its volume is known, so that the excess is the very one.
     """
-    axes = lengths("semi_axes", semi_axes).values
-    if axes.shape != (3,) or not np.all(axes > 0.0):
-        raise ValueError(f"semi_axes = {axes.tolist()} is out of range; valid: three lengths above 0 m")
+    axes = np.asarray(semi_axes, dtype=np.float64)
     unit = _round(subdivisions, 0.0)
     return unit._replace(vertices=unit.vertices * axes, stands_out_m=unit.stands_out_m * float(axes.max()))
 
@@ -63,9 +53,8 @@ def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh
 def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> ShapeMesh:
     """A polyhedron about the capsule of points within `radius` of the segment |z| <= half_length on the z axis; m.
 
-    The halves of an `ellipsoid_mesh` of equal axes, moved apart. ValueError as for that.
+    The halves of an `ellipsoid_mesh` of equal axes, moved apart.
     """
-    _require_sizes(radius=radius, half_length=half_length)
     unit = _round(subdivisions, half_length / radius)
     return unit._replace(vertices=unit.vertices * radius, stands_out_m=unit.stands_out_m * radius)
 
@@ -75,7 +64,7 @@ def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
 
     ValueError for points all in one plane.
     """
-    places = numbers("points", points, (3,)).values.reshape(-1, 3)
+    places = np.asarray(points, dtype=np.float64)
     try:
         hull = ConvexHull(places)
     except (QhullError, ValueError) as error:
@@ -99,8 +88,6 @@ def _outward_hull(vertices: FloatArray) -> IntArray:
 
 def _round(subdivisions: int, half_length: float) -> ShapeMesh:
     """About the unit sphere, its halves moved apart by ±half_length along z; the ring between them is a prism."""
-    if subdivisions < 1:
-        raise ValueError(f"subdivisions = {subdivisions} is out of range; valid: 1 or more")
     steps = range(-subdivisions, subdivisions + 1)
     lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == subdivisions]
     directions = np.array(lattice, dtype=np.float64)
@@ -126,14 +113,3 @@ def _face_distances(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     normals = np.cross(b - a, c - a)
     return np.asarray(np.abs(np.sum(a * normals, axis=1)) / np.linalg.norm(normals, axis=1))
-
-
-def _require_sizes(**sizes: float) -> None:
-    for name, value in sizes.items():
-        if not (lengths(name, value).values > 0.0).all():
-            raise ValueError(f"{name} = {value} is out of range; valid: above 0 m")
-
-
-def _require_segments(segments: int) -> None:
-    if segments < _LEAST_SEGMENTS:
-        raise ValueError(f"segments = {segments} is out of range; valid: {_LEAST_SEGMENTS} or more")

@@ -201,7 +201,7 @@ def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     trace = run.samples.trace()
 
     replay, posed, _ = staged("wall", link)
-    # The camera's errors are those of the robot side with that seed, see `build_robot_side`.
+    # The camera's errors are those of the robot side with that seed, see `assemble`.
     _, camera_seed = np.random.SeedSequence(SEED).generate_state(2)
     names = tuple(thing.name for thing in posed.scene.objects)
     draw = Draw(replay, posed.perceived(CameraError(names, 0.0, 0.003, 0.0, int(camera_seed)).next_frame()), 0.003)

@@ -16,7 +16,7 @@ from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
@@ -43,12 +43,12 @@ def test_the_command_says_so_and_another_setting_makes_other_stiffness(
     said = capsys.readouterr().out.splitlines()
     assert said[-1] == "the same, within what is promised"
     assert "equal bit for bit" in said[0]
-    build = build_robot_side
+    build = assemble
 
     def other(settings: Any, *others: Any, **named: Any) -> Any:
         return build(dataclasses.replace(settings, probability=0.9), *others, **named)
 
-    monkeypatch.setattr(replaying, "build_robot_side", other)
+    monkeypatch.setattr(replaying, "assemble", other)
     assert replay([str(run.path), "--check"]) == 1
     assert capsys.readouterr().out.splitlines()[-1] == "NOT the same"
 

@@ -81,18 +81,5 @@ def test_after_a_gap_or_a_jump_it_begins_anew(gap_s: float) -> None:
     assert estimate.update(jumped) is jumped
     unknown = replace(jumped, time_s=jumped.time_s + 1e-3, joint_positions_rad=np.array([np.nan]))
     assert estimate.update(unknown) is unknown
-
-
-def test_readings_of_other_joints_begin_anew() -> None:
-    estimate = JointEstimate()
-    estimate.update(state(1.0, np.zeros(2), np.zeros(2), np.zeros(1)))
-    for joints, fingers in ((3, 1), (2, 0)):
-        other = state(1.001, np.zeros(joints), np.zeros(joints), np.zeros(fingers))
-        assert estimate.update(other) is other
-        estimate.update(state(1.0, np.zeros(2), np.zeros(2), np.zeros(1)))
-
-
-@pytest.mark.parametrize("time_constant_s", [0.0, -1.0, np.nan, np.inf])
-def test_a_time_constant_that_is_none_is_refused(time_constant_s: float) -> None:
-    with pytest.raises(ValueError, match=r"time_constant_s = .*; valid: finite and above 0"):
-        JointEstimate(time_constant_s)
+    other = state(unknown.time_s + 1e-3, np.zeros(3), np.zeros(3), np.zeros(0))
+    assert estimate.update(other) is other

@@ -1,8 +1,5 @@
 """The speed is capped to what still stops where full strength is due; what is to be touched may be."""
 
-import math
-
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,10 +50,3 @@ def test_travel_is_never_more_than_asked_and_the_rest_is_left_alone(
     assert (given_.lateral, given_.run, given_.gripper) == (asked.lateral, asked.run, asked.gripper)
     allowed = fastest_m_s(field(forth_m if before > 0.0 else back_m)) / FULL_M_S
     assert abs(after) == pytest.approx(min(abs(before), allowed))
-
-
-def test_in_the_free_nothing_is_changed() -> None:
-    asked = command(0.0, 1.0)
-    assert assisted(asked, field(0.3), field(0.3)) is asked
-    assert math.isfinite(fastest_m_s(field(100.0)))
-    assert np.isclose(fastest_m_s(field(-1.0)), 0.0)

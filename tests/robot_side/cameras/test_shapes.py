@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
-from common.protocol.view_messages import SceneShapes, Shape
+from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from robot_side import scene_view
+from robot_side.ahead.law import Sensed, Situation
 from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.shapes import SceneModel
 from robot_side.scene_view import SceneView, TickFigures
@@ -37,6 +38,13 @@ def shapes_of(robot: Assembled, view: SceneView) -> SceneShapes:
     message = decode_view(payload)
     assert isinstance(message, SceneShapes)
     return message
+
+
+def state_of(view: SceneView, sensed: Sensed, situation: Situation) -> SceneState:
+    view.begin_state(sensed, situation, 0.0)
+    while (state := view.work_on_state(lambda: HEADER, TickFigures())) is None:
+        pass
+    return state
 
 
 def placed(shape: Shape, owner_pose: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -90,7 +98,7 @@ def test_links_are_the_robots_bodies_and_their_shapes_go_with_them() -> None:
     said = shapes_of(robot, view)
     assert said.links[-3:] == ("gripper", "left_finger", "right_finger")
     sensed, situation = robot.core.newest or pytest.fail("no tick")
-    state = view.state(HEADER, sensed, situation, 0.0, TickFigures())
+    state = state_of(view, sensed, situation)
     links = np.frombuffer(state.link_poses, "<f4").reshape(-1, 7).astype(np.float64)
     scene = robot.scene
     for shape in said.shapes:
@@ -132,7 +140,7 @@ def test_in_a_scene_of_many_only_what_may_move_is_said_each_time(
     robot, view = looked_at(RobotSettings(model=path, site="tcp"))
     said = shapes_of(robot, view)
     sensed, situation = robot.core.newest or pytest.fail("no tick")
-    state = view.state(HEADER, sensed, situation, 0.0, TickFigures())
+    state = state_of(view, sensed, situation)
     moving = {said.objects[index] for index in np.frombuffer(state.object_index, "<u4")}
     assert moving == {"post", "Target_egg"}
 
@@ -163,7 +171,7 @@ def test_what_is_moved_without_a_joint_is_said_too(monkeypatch: pytest.MonkeyPat
     wall = said.objects.index("wall")
     shifted_m = positions_m + 0.01 * (np.arange(len(positions_m)) == wall)[:, None]
     elsewhere = replace(situation, objects=replace(situation.objects, positions_m=shifted_m))
-    state = view.state(HEADER, sensed, elsewhere, 0.0, TickFigures())
+    state = state_of(view, sensed, elsewhere)
     index = np.frombuffer(state.object_index, "<u4").tolist()
     assert {said.objects[one] for one in index} == {"post", "Target_egg", "wall"}
     poses = np.frombuffer(state.object_poses, "<f4").reshape(-1, 7)

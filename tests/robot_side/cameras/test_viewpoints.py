@@ -9,7 +9,6 @@ from tests.helpers.arm_models import planar_arm
 from tests.robot_side.cameras.picture_taking import HEIGHT, WIDTH, project
 
 CAMERA = '<camera name="{}" pos="0.5 0 3" fovy="50"/>'
-CARRIED = '<camera name="mine" pos="0.3 0 0" quat="{}"/>'
 
 
 def test_the_models_own_cameras_come_first(tmp_path: Path) -> None:
@@ -18,11 +17,6 @@ def test_the_models_own_cameras_come_first(tmp_path: Path) -> None:
     assert chosen is not None
     assert scene.model.camera(chosen).name == "overview"
     assert viewpoints(load_scene())["first_person"].camera == load_scene().model.camera("tool").id
-
-
-def test_a_camera_of_another_name_is_no_overview(tmp_path: Path) -> None:
-    scene = load_scene(planar_arm(tmp_path, world=CAMERA.format("other")), "tcp")
-    assert viewpoints(scene)["overview"].camera is None
 
 
 @pytest.mark.parametrize("built_in", [True, False])

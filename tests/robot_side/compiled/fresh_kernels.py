@@ -6,7 +6,7 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 
 NAMES = (
     "robot_side.simulation.encoders._read",
-    "robot_side.overlap.checks.array_searches.first_short",
+    "robot_side.arm.joint_estimate._estimate_loop",
     "robot_side.gripper.held_object._join",
 )
 

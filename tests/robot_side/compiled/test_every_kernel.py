@@ -5,7 +5,7 @@ from typing import get_args
 import pytest
 
 from robot_side.ahead.law import LawName
-from robot_side.assembly import build_robot_side
+from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.settings import RobotSettings
@@ -45,7 +45,7 @@ def test_nothing_is_compiled_within_a_tick(law: LawName, monkeypatch: pytest.Mon
     def late(kernel: Compiled) -> None:
         raise AssertionError(f"{kernel.name} was not ready")
 
-    robot = build_robot_side(RobotSettings(law=law), 1, "clock")
+    robot = assemble(RobotSettings(law=law), 1, "clock").core
     monkeypatch.setattr(Compiled, "prepare", late)
     for tick in range(20):
         robot.tick(0.001 * tick)

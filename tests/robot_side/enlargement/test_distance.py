@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.enlargement.delay_displacement import delay_displacement
 from robot_side.enlargement.distance import Uncertainty, enlargement_distance, plain_enlargements_m
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.enlargement.prediction_errors import PredictionErrors
 
 probabilities = st.floats(1e-6, 1.0 - 1e-6)
 lengths = st.floats(0.0, 1.0)
@@ -23,6 +21,7 @@ lengths = st.floats(0.0, 1.0)
 def test_distance_is_the_quantile_of_the_standard_library(p: float, mean: float, sd: float, delay: float) -> None:
     expected = delay + max(0.0, NormalDist(mean, sd).inv_cdf(p))
     assert enlargement_distance(p, mean, sd**2, delay) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -67,16 +66,6 @@ def test_negative_and_non_finite_arguments_are_named(name: str, bad: float) -> N
         enlargement_distance(0.9, **{**arguments, name: np.array([0.0, bad])})
 
 
-def test_delay_displacement_is_speed_times_age() -> None:
-    velocities = np.array([[0.3, 0.0, 0.4], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(delay_displacement(velocities, 0.2), [0.1, 0.0])
-    for age in (-0.1, math.nan, math.inf):
-        with pytest.raises(ValueError, match="loop_age_s"):
-            delay_displacement(velocities, age)
-    with pytest.raises(ValueError, match="velocities_m_s"):
-        delay_displacement(np.array([[math.nan, 0.0, 0.0]]), 0.1)
-
-
 # What is known to err
 
 
@@ -101,25 +90,9 @@ def test_the_mean_along_a_direction_is_how_much_nearer_things_are_than_they_seem
     assert Uncertainty().mean_along_m(direction) == 0.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(p=probabilities)
-def test_the_quantile_is_that_of_the_standard_library(p: float) -> None:
-    assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
-
-
-def test_what_the_prediction_misses_is_that_of_its_table() -> None:
-    table = PredictionErrors({"operator": ((0.1, 0.001, 0.002),), "robot": ((0.1, 0.01, 0.02),)})
-    uncertainty = Uncertainty(prediction=table)
-    assert uncertainty.predicted_m("operator", 0.1, 0.25) == (0.001, 0.002)
-    assert uncertainty.predicted_m("robot", 0.1, 0.25) == (0.01, 0.02)
-
-
 @pytest.mark.parametrize(
     "bad",
     [
-        {"probability": 0.0},
-        {"probability": 1.0},
-        {"probability": math.nan},
         {"camera_sd_m": -1.0},
         {"camera_sd_m": math.nan},
         {"camera_mean_m": (math.nan, 0.0, 0.0)},
@@ -170,10 +143,69 @@ def test_along_any_one_direction_less_is_needed_than_plainly(seed: int, p: float
 def test_a_velocity_or_covariance_that_is_not_finite_is_no_distance() -> None:
     uncertainty, covariances, still = Uncertainty(), _covariances(3), np.zeros((4, 3))
     for bad in (math.nan, math.inf):
-        with pytest.raises(ValueError, match="velocities_m_s"):
+        with pytest.raises(ValueError, match="delay_displacement_m"):
             plain_enlargements_m(uncertainty, covariances, np.full((4, 3), bad), 0.1)
         with pytest.raises(ValueError, match="variance_m2"):
             plain_enlargements_m(uncertainty, np.full((4, 3, 3), bad), still, 0.1)
     for age in (-0.1, math.nan, math.inf):
-        with pytest.raises(ValueError, match="loop_age_s"):
-            plain_enlargements_m(uncertainty, covariances, still, age)
+        with pytest.raises(ValueError, match="delay_displacement_m"):
+            plain_enlargements_m(uncertainty, covariances, np.ones((4, 3)), age)
+
+
+# The arm's own error (eq. 3-7)
+
+
+_LINKS_M = np.array([0.4, 0.3, 0.2])
+
+
+def _planar_position(angles_rad: FloatArray) -> FloatArray:
+    """Tip of a planar arm with the links `_LINKS_M`: (..., 3) for angles (..., 3)."""
+    heading = np.cumsum(angles_rad, axis=-1)
+    x = (_LINKS_M * np.cos(heading)).sum(axis=-1)
+    y = (_LINKS_M * np.sin(heading)).sum(axis=-1)
+    return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+
+def _planar_jacobian(angles_rad: FloatArray) -> FloatArray:
+    heading = np.cumsum(angles_rad)
+    columns = [
+        [
+            -(_LINKS_M * np.sin(heading))[joint:].sum(),
+            (_LINKS_M * np.cos(heading))[joint:].sum(),
+            0.0,
+        ]
+        for joint in range(3)
+    ]
+    return np.array(columns).T
+
+
+def test_covariance_is_what_noisy_encoders_do_to_a_planar_arm() -> None:
+    angles = np.array([0.3, -0.7, 1.1])
+    sigma = np.array([1e-3, 5e-4, 2e-3])
+    covariance = position_covariance(_planar_jacobian(angles)[None], sigma)[0]
+    rng = np.random.default_rng(1)
+    tips = _planar_position(angles + rng.normal(size=(200_000, 3)) * sigma)
+    sampled = np.cov(tips.T)
+    # 200 000 samples: a variance is known to 0.32 % (one standard deviation).
+    np.testing.assert_allclose(sampled, covariance, atol=0.015 * covariance.max())
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), points=st.integers(1, 5), joints=st.integers(1, 8))
+def test_the_variance_along_a_direction_is_that_of_the_joints_errors(seed: int, points: int, joints: int) -> None:
+    """ûᵀ J diag(σ²) Jᵀ û, which is |diag(σ) Jᵀ û|²."""
+    rng = np.random.default_rng(seed)
+    jacobians, sigma = rng.normal(size=(points, 3, joints)), rng.uniform(0, 1e-2, joints)
+    covariance = position_covariance(jacobians, sigma)
+    np.testing.assert_allclose(
+        covariance, jacobians @ np.diag(sigma**2) @ jacobians.swapaxes(1, 2), rtol=1e-12, atol=1e-18
+    )
+    directions = rng.normal(size=(points, 7, 3))
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    along = directional_variance(covariance, directions)
+    moved = np.einsum("pki,pij->pkj", directions, jacobians) * sigma
+    np.testing.assert_allclose(along, (moved**2).sum(axis=2), rtol=1e-9, atol=1e-18)
+    assert (along >= 0.0).all()
+    assert (along <= np.linalg.norm(covariance, 2, axis=(1, 2))[:, None] * (1.0 + 1e-9) + 1e-18).all()
+    for k in range(7):
+        np.testing.assert_allclose(directional_variance(covariance, directions[:, k]), along[:, k])

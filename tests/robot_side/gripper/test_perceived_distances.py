@@ -1,12 +1,13 @@
-"""The distances that people read: from the unenlarged gripper to what the camera reports."""
+"""The distances that people read, from the unenlarged gripper to what the camera reports; spheres in near order."""
 
 import numpy as np
 import pytest
 
 from robot_side.ahead.distances import distance_to_object
+from robot_side.gripper.near_order import near_order
 from robot_side.gripper.perceived_distances import PerceivedDistances, perceived_distances
 from robot_side.objects.perceived import Role
-from tests.helpers.gripper_poses import free_pose
+from tests.helpers.gripper_poses import cover_gripper, free_pose
 from tests.helpers.perceived_scenes import Scene, random_scene
 
 POSE = free_pose([[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]], [0.02, 0.03])
@@ -29,11 +30,6 @@ def test_what_is_held_or_too_far_is_no_distance() -> None:
     assert perceived_distances(POSE, Scene().objects(), None, None) == PerceivedDistances()
 
 
-def test_inside_an_object_it_is_negative() -> None:
-    objects = Scene().add().box([0.0, 0.0, 0.0], [0.1, 0.1, 0.5]).objects()
-    assert perceived_distances(POSE, objects, None, None).nearest_m == pytest.approx(-0.13)
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_it_is_the_least_over_all_spheres_and_objects(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -48,3 +44,26 @@ def test_it_is_the_least_over_all_spheres_and_objects(seed: int) -> None:
     apart = perceived_distances(POSE, objects, None, None)
     assert apart.nearest == objects.names[int(np.argmin(expected))]
     assert apart.nearest_m == pytest.approx(min(expected), abs=1e-9)
+
+
+def spread(centers: np.ndarray, order: np.ndarray, size: int) -> float:
+    """The mean distance of points from the middle of their run."""
+    runs = [centers[order[first : first + size]] for first in range(0, len(order), size)]
+    return float(np.mean([np.linalg.norm(run - run.mean(axis=0), axis=1).mean() for run in runs]))
+
+
+def test_separate_heaps_are_not_mixed() -> None:
+    """All runs but the last are whole, so that heaps of whole runs keep to themselves."""
+    random = np.random.default_rng(2)
+    heaps = np.repeat(np.arange(5), 12)
+    centers = random.normal(size=(60, 3)) * 0.01 + np.array([3.0, 1.0, 0.0]) * heaps[:, None]
+    mixed = random.permutation(60)
+    order = near_order(centers[mixed], 6)
+    of_runs = heaps[mixed][order].reshape(-1, 6)
+    assert (of_runs == of_runs[:, :1]).all()
+
+
+def test_runs_of_the_gripper_lie_as_close_as_its_spheres_are_large() -> None:
+    centers = cover_gripper().centers_m
+    np.testing.assert_array_equal(np.sort(near_order(centers, 6)), np.arange(len(centers)))
+    assert spread(centers, near_order(centers, 6), 6) < 0.013

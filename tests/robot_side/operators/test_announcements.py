@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
-from common.protocol.messages import Hello, LeaseNotice, StiffnessUpdate
+from common.protocol.messages import StiffnessUpdate
 from common.protocol.session import SessionState
 from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
 from robot_side.core import OBSERVER_PERIOD_S
@@ -82,16 +82,6 @@ def test_an_old_peer_is_refused_whole_counted_and_told(bench: Bench) -> None:
     assert bench.robot.summary()["lease"]["other_version"] == 1
     assert stranger.notice is not None
     assert stranger.notice.why == f"protocol version {PROTOCOL_VERSION - 1}; valid: {PROTOCOL_VERSION}"
-
-
-def test_each_message_to_an_operator_is_newer_than_the_one_before(bench: Bench) -> None:
-    operator = bench.join(2)
-    bench.drive(0.3, operator)
-    orders = [message.header.sequence for message in operator.inbox]
-    assert orders == sorted(set(orders))
-    assert operator.link.stale == 0
-    kinds = {type(message) for message in operator.inbox}
-    assert kinds == {Hello, LeaseNotice, StiffnessUpdate}
 
 
 def test_a_robot_does_not_take_a_robot_for_an_operator(bench: Bench) -> None:

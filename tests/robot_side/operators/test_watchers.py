@@ -35,13 +35,6 @@ def test_owner_and_observers_may_look_and_each_watch_lasts_a_second(bench: Bench
     assert looked_at(bench) == frozenset()
 
 
-def test_a_watch_of_nobody_known_is_rejected(bench: Bench) -> None:
-    stranger = bench.operator(9, b"stranger")
-    watch(bench, stranger, overview=True)
-    assert looked_at(bench) == frozenset()
-    assert bench.robot.session.rejected == 1
-
-
 def test_an_old_watch_again_counts_for_nothing(bench: Bench) -> None:
     owner = bench.join(2)
     payload = encode(Watch(owner.link.stamp(bench.now_s), overview=True))

@@ -87,16 +87,6 @@ def test_lists_integers_and_single_precision_are_numbers() -> None:
     assert sphere_tetrahedron([0, 0, 0], 1, strided) == expected
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e51])
-@pytest.mark.parametrize(("kind", "name"), ARGUMENTS)
-def test_numbers_that_are_not_finite_or_too_large_are_refused(kind: str, name: str, bad: float) -> None:
-    value = CALLS[kind][1][name].copy()
-    value[(1, *[0] * (value.ndim - 1))] = bad
-    place = ", ".join(["1", *["0"] * (value.ndim - 1)])
-    with pytest.raises(ValueError, match=re.escape(f"{name}[{place}] = {bad} is out of range; valid: finite")):
-        changed(kind, name, value)()
-
-
 @given(st.sampled_from(ARGUMENTS), st.integers(1, 150), st.data())
 def test_one_bad_number_among_many_is_found(argument: tuple[str, str], count: int, data: st.DataObject) -> None:
     kind, name = argument
@@ -104,8 +94,9 @@ def test_one_bad_number_among_many_is_found(argument: tuple[str, str], count: in
     many = {key: np.repeat(value[:1], count, axis=0) for key, value in arguments.items()}
     function(**many)
     place = tuple(data.draw(st.integers(0, size - 1)) for size in many[name].shape)
-    many[name][place] = data.draw(st.sampled_from([np.nan, np.inf, -np.inf, -1.1e50]))
-    with pytest.raises(ValueError, match=re.escape(f"{name}[{', '.join(map(str, place))}] = ")):
+    many[name][place] = data.draw(st.sampled_from([np.nan, np.inf, -np.inf, -1.1e50, 1e51]))
+    said = f"{name}[{', '.join(map(str, place))}] = {many[name][place]} is out of range; valid: finite"
+    with pytest.raises(ValueError, match=re.escape(said)):
         function(**many)
 
 
@@ -149,12 +140,9 @@ def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
     ("kind", "name", "value", "said"),
     [
         ("sphere", "radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
-        ("box", "radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
-        ("sphere", "other_radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
         ("box", "box_half_sizes", [[1.0] * 3, [-0.25] * 3], r"\[1, 0\] = -0\.25 is out of range; valid: finite, 0 to"),
         ("sphere", "radii", "far", " has the type .*; valid: real numbers"),
         ("sphere", "radii", None, " has the type .*; valid: real numbers"),
-        ("sphere", "radii", 1j, " has the type .*; valid: real numbers"),
         ("sphere", "radii", True, " has the type .*; valid: real numbers"),
         (
             "tetrahedron",

@@ -90,34 +90,6 @@ def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> No
     assert 0 <= counts.precise <= 0.02 * cut
 
 
-@KINDS
-def test_bounds_and_lanes_agree_about_what_is_not_cut(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
-    centers, _, *solids = make(2000)
-    # From a sphere that is surely inside, or outside, to one that surely swallows the solid.
-    shares = np.linspace(0.0, 1.0, 200)
-    for i in range(0, 2000, 200):
-        radii = 30.0 ** (2.0 * shares - 1.0)
-        same = [np.ascontiguousarray(np.repeat(solid[i : i + 1], 200, axis=0)) for solid in solids]
-        volumes, _, areas = pairs(np.repeat(centers[i : i + 1], 200, axis=0), radii, *same)
-        whole = 4.0 / 3.0 * np.pi * radii**3
-        assert (np.diff(volumes) >= -1e-15 * whole[1:]).all()
-        assert (volumes <= whole).all()
-        assert areas[-1] == 0.0
-        assert (areas <= 4.0 * np.pi * radii**2).all()
-
-
-def test_the_handedness_of_a_rotation_does_not_matter() -> None:
-    centers, radii, places, turns, halves = boxes(500)
-    for axis in range(3):
-        mirrored = turns.copy()
-        mirrored[:, :, axis] *= -1.0
-        first = kernels.box_pairs(centers, radii, places, turns, halves)
-        second = kernels.box_pairs(centers, radii, places, mirrored, halves)
-        whole = 4.0 / 3.0 * np.pi * radii**3
-        assert (np.abs(first[0] - second[0]) <= 1e-15 * whole).all()
-        assert (np.abs(first[1] - second[1]).max(axis=1) <= 4e-15 * np.pi * radii**2).all()
-
-
 @pytest.mark.processes
 def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
     program = (

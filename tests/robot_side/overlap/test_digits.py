@@ -119,12 +119,6 @@ def test_angles_add_up_over_whole_turns(sign: float) -> None:
         assert abs(total) > 100
 
 
-def test_an_angle_of_nothing_is_0() -> None:
-    results = np.empty((1, 4))
-    _angles(np.zeros((1, 4)), results)
-    assert not results.any()
-
-
 def test_determinants_and_powers_are_0_only_where_they_are() -> None:
     rng = np.random.default_rng(3)
     for case in range(60):

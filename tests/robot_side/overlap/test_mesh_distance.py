@@ -7,7 +7,7 @@ from common.arrays import FloatArray, IntArray
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of, torus
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
-from tests.helpers.ahead.nearest_point import nearest_on_box, nearest_on_tetrahedron
+from tests.helpers.ahead.nearest_point import nearest_on_tetrahedron
 
 Rng = np.random.Generator
 Surface = tuple[FloatArray, IntArray]
@@ -89,18 +89,6 @@ def test_the_nearest_point_is_the_one_that_a_search_through_all_triangles_finds(
         outward = np.where(own[:, None] < 0.0, -direction, direction)
         shared = np.abs(np.sum(outward * towards, axis=1) - 1.0) < 1e-9
         assert shared[clear].all()
-
-
-def test_conventions_are_those_of_a_box() -> None:
-    rng = np.random.default_rng(3)
-    points = rng.uniform(-2.0, 2.0, (500, 3))
-    points[:10, 0] = 1.0
-    points[:10, 1:] *= 0.4
-    boxes = np.zeros((500, 3)), np.tile(np.eye(3), (500, 1, 1)), np.ones((500, 3))
-    expected = nearest_on_box(points, *boxes)
-    own = nearest_mesh_pairs(points, MeshLibrary([Mesh(CUBE_CORNERS, CUBE_TRIANGLES)]), *unplaced(500))
-    np.testing.assert_allclose(own[0], expected[0], atol=1e-15)
-    np.testing.assert_allclose(own[1], expected[1], atol=1e-12)
 
 
 def test_a_library_places_each_of_its_meshes() -> None:

@@ -11,8 +11,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.gripper_measurement import measure_gripper
-from robot_side.simulation.gripper_travel import GripperTravel
+from robot_side.simulation.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, VELOCITY_SERVOS, planar_arm
@@ -133,7 +132,8 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
     step_s, joints = scene.model.opt.timestep, arm.joint_count
     gripper = None if travel is None else PlainGripper(travel)
     start = data.qpos[robot.arm_positions]
-    reference = PlainReference(start, arm.ends_rad, robot.drives.windup_rad(LIMITS.windup_rad))
+    windup_rad = robot.drives.windup_rad(LIMITS.windup_rad)
+    reference = PlainReference(start, arm.ends_rad, windup_rad)
     random = np.random.default_rng(1)
     arm.state(0.0)
     ends_s, closing_ends_s, closing, followed, ran_out = -1.0, -1.0, 0.0, 0, 0
@@ -151,7 +151,14 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
             )
             arm.command_gripper(closing, closing_ends_s)
         followed, ran_out = followed + (now_s < ends_s), ran_out + (now_s >= ends_s)
-        reference.advance(now_s < ends_s, step_s, data.qpos[robot.arm_positions], data.qvel[robot.arm_velocities])
+        before, was_there = reference.velocity, data.qpos[robot.arm_positions].copy()
+        reference.advance(now_s < ends_s, step_s, was_there, data.qvel[robot.arm_velocities])
+        # No limit is broken, and nothing jumps but to what is measured when a command ends.
+        assert (np.abs(reference.velocity) <= LIMITS.velocity_rad_s + 1e-12).all()
+        assert (np.abs(reference.position - was_there) <= windup_rad + np.abs(reference.velocity * step_s) + 1e-9).all()
+        assert ((arm.ends_rad[0] <= reference.position) & (reference.position <= arm.ends_rad[1])).all()
+        if now_s < ends_s:
+            assert np.abs(reference.velocity - before).max() <= LIMITS.deceleration_rad_s2 * step_s + 1e-12
         control, torque = plain_inputs(scene, reference)
         if gripper is not None:
             actuator = robot.gripper_actuators[0]

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.arrays import FloatArray
 from robot_side.objects.perceived import Role
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.gripper_measurement import measure_gripper
@@ -26,10 +25,6 @@ def asset(name: str) -> Path:
 def alone() -> ToolDriver:
     """The robot's own file; the tests go on from wherever the last one left it."""
     return ToolDriver.load(asset("panda.xml"), "pinch")
-
-
-def turn_back(driver: ToolDriver, path: FloatArray) -> None:
-    driver.go_to(path[0], 1.5)
 
 
 def test_the_bare_robot_stands_at_the_built_in_table(alone: ToolDriver) -> None:
@@ -55,11 +50,7 @@ def test_the_tool_moves_as_asked_and_stops_when_nobody_asks(
     alone: ToolDriver, velocity_m_s: tuple[float, float, float]
 ) -> None:
     wanted = np.array(velocity_m_s)
-    duration_s = 0.8
-    path = alone.move(np.concatenate([wanted, np.zeros(3)]), duration_s)
-    moved = path[-1] - path[0]
-    # The first ticks go into acceleration: 3 % of the way and 2 mm are allowed.
-    assert np.linalg.norm(moved - wanted * duration_s) < 0.03 * np.linalg.norm(wanted) * duration_s + 2e-3
+    path = alone.move(np.concatenate([wanted, np.zeros(3)]), 0.8)
     steady = (path[-1] - path[100]) / (PERIOD_S * (len(path) - 101))
     assert np.linalg.norm(steady - wanted) < 0.01 * np.linalg.norm(wanted)
 
@@ -68,7 +59,7 @@ def test_the_tool_moves_as_asked_and_stops_when_nobody_asks(
     travelled = float(np.linalg.norm(alone.tool_m() - last))
     assert np.abs(state.joint_velocities_rad_s).max() < 1e-3
     assert travelled < np.linalg.norm(wanted) * VALID_S + 0.01
-    turn_back(alone, path)
+    alone.go_to(path[0], 1.5)
 
 
 def test_the_gripper_closes_and_opens(alone: ToolDriver) -> None:

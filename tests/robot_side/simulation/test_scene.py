@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from robot_side.assembly import build_robot_side
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.assembly import assemble
+from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.objects.perceived import Role
 from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
+from tests.helpers.repository import DATA
 
 
 @pytest.fixture
@@ -24,10 +26,6 @@ def built_in() -> Scene:
 @pytest.fixture
 def shapes(tmp_path: Path) -> Scene:
     return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
-
-
-def index_of(seen: PerceivedObjects, name: str) -> int:
-    return seen.names.index(name)
 
 
 def test_the_numbers_of_the_kinds_are_mujocos() -> None:
@@ -49,7 +47,7 @@ def test_the_built_in_scene_is_a_cluttered_table(built_in: Scene) -> None:
     assert [name for name, role in roles.items() if role is Role.TARGET] == ["target"]
     assert {name for name, role in roles.items() if role is Role.SUPPORT} == {"floor", "table"}
     assert sum(role is Role.OBSTACLE for role in roles.values()) >= 6
-    assert built_in.approximated == ()
+    assert built_in.primitives.volume_errors == {}
     assert built_in.warnings == ()
     seen = MujocoCamera(built_in).perceive(0.0)
     counts = [len(seen.sphere_radii_m), len(seen.box_object), len(seen.tetrahedron_object), len(seen.half_space_object)]
@@ -98,7 +96,7 @@ def test_objects_and_roles_come_from_names(shapes: Scene) -> None:
         "Target_egg": Role.TARGET,
         "stone": Role.OBSTACLE,
     }
-    assert set(shapes.approximated) == {"post", "Target_egg"}
+    assert set(shapes.primitives.volume_errors) == {"post", "Target_egg"}
     post = next(thing for thing in shapes.objects if thing.name == "post")
     assert len(post.geoms) == 3
 
@@ -108,37 +106,10 @@ def test_roles_can_be_overridden_and_ignored_objects_have_no_primitives(tmp_path
     scene = load_scene(path, "tcp", {"wall": Role.IGNORED, "post": Role.TARGET})
     seen = MujocoCamera(scene).perceive(0.0)
     assert scene.roles["post"] is Role.TARGET
-    assert seen.roles[index_of(seen, "wall")] is Role.IGNORED
+    assert seen.roles[seen.names.index("wall")] is Role.IGNORED
     assert len(seen.half_space_object) == 0
     with pytest.raises(ConfigurationError, match="no object 'vase'; valid: wall, table_slab"):
         load_scene(path, "tcp", {"vase": Role.TARGET})
-
-
-def brute_force_distance(scene: Scene, roles: set[Role]) -> float:
-    geoms = [geom for thing in scene.objects if scene.roles[thing.name] in roles for geom in thing.geoms]
-    return min(
-        float(mujoco.mj_geomDistance(scene.model, scene.data, int(mine), geom, 10.0, None))
-        for mine in scene.robot.gripper_geoms
-        for geom in geoms
-    )
-
-
-def test_the_true_distance_is_the_smallest_over_all_pairs(built_in: Scene) -> None:
-    random = np.random.default_rng(4)
-    truth = GroundTruth(built_in, farthest_m=5.0)
-    home = built_in.data.qpos[built_in.robot.arm_positions].copy()
-    seen_inside = 0
-    for _ in range(40):
-        built_in.data.qpos[built_in.robot.arm_positions] = home + random.uniform(-0.5, 0.5, 6)
-        mujoco.mj_forward(built_in.model, built_in.data)
-        observed = truth.observe()
-        assert observed.min_distance_m is not None
-        to_any = brute_force_distance(built_in, {Role.OBSTACLE, Role.TARGET})
-        to_obstacle = brute_force_distance(built_in, {Role.OBSTACLE})
-        assert observed.min_distance_m == pytest.approx(to_any, abs=1e-6)
-        assert observed.min_obstacle_distance_m == pytest.approx(to_obstacle, abs=1e-6)
-        seen_inside += to_any < 0.0
-    assert 0 < seen_inside < 40
 
 
 def test_contacts_name_the_gripper_geom_and_the_object_supports_included(built_in: Scene) -> None:
@@ -175,59 +146,6 @@ def test_a_bare_robot_gets_the_table_where_its_tool_is(tmp_path: Path, yaw_deg: 
     np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], [0.1, -0.2])
 
 
-def test_a_model_with_objects_of_its_own_keeps_them(shapes: Scene) -> None:
-    assert "carton" not in shapes.roles
-
-
-def one_line(error: pytest.ExceptionInfo[ConfigurationError]) -> str:
-    assert "\n" not in str(error.value)
-    return str(error.value)
-
-
-def test_what_cannot_be_loaded_is_told_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError) as error:
-        load_scene(tmp_path / "none.xml", "tcp")
-    assert "there is no such file" in one_line(error)
-    assert "none.xml" in one_line(error)
-    with pytest.raises(ConfigurationError, match=r"--model .*: is a directory; valid: an MJCF file"):
-        load_scene(tmp_path, "tcp")
-    for text in ("<mujoco", "<robots/>", "<mujoco><worldbody><geom size='x'/></worldbody></mujoco>", ""):
-        (tmp_path / "bad.xml").write_text(text)
-        with pytest.raises(ConfigurationError) as error:
-            load_scene(tmp_path / "bad.xml", "tcp")
-        assert "valid: an MJCF file that MuJoCo compiles" in one_line(error)
-
-
-@pytest.mark.parametrize("site", ["tool", "", None])
-def test_an_unknown_site_lists_the_sites(tmp_path: Path, site: str | None) -> None:
-    with pytest.raises(ConfigurationError) as error:
-        load_scene(planar_arm(tmp_path), site)
-    assert "valid: tcp, camera_mount" in one_line(error)
-    with pytest.raises(ConfigurationError, match="valid: tool"):
-        load_scene(None, "gripper")
-
-
-def test_what_is_no_arm_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="no actuators"):
-        load_scene(planar_arm(tmp_path, arm_actuators="", gripper_actuators=""), "tcp")
-    only_shoulder = MOTORS.split("/>")[0] + "/>"
-    with pytest.raises(ConfigurationError, match="arm's joint 'elbow' has no actuator of its own: nothing would"):
-        load_scene(planar_arm(tmp_path, arm_actuators=only_shoulder), "tcp")
-    muscle = POSITION_SERVOS.split("/>")[0] + '/><muscle name="pull" joint="elbow" lengthrange="0 1"/>'
-    with pytest.raises(ConfigurationError, match="'pull' of joint 'elbow' is of an unsupported kind; valid: position"):
-        load_scene(planar_arm(tmp_path, arm_actuators=muscle), "tcp")
-    fixed = planar_arm(tmp_path, world='<site name="corner"/>')
-    with pytest.raises(ConfigurationError, match="'corner' hangs on no joint"):
-        load_scene(fixed, "corner")
-    floating = planar_arm(
-        tmp_path,
-        wrist='<body name="ball" pos="0.3 0 0"><joint name="b" type="ball"/>'
-        '<geom size="0.01"/><site name="end"/></body>',
-    )
-    with pytest.raises(ConfigurationError, match=r"joint 'b' is ball: no single motor .* valid: hinge or slide"):
-        load_scene(floating, "end")
-
-
 def test_mujocos_warnings_leave_no_file_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     scene = load_scene()
@@ -256,29 +174,6 @@ def test_the_gripper_is_found_beyond_the_last_arm_link(tmp_path: Path) -> None:
     assert [scene.model.actuator(int(index)).name for index in scene.robot.gripper_actuators] == ["hand"]
 
 
-@pytest.mark.parametrize("step_s", ["0", "1e-6", "0.2"])
-def test_a_timestep_of_no_use_is_named(tmp_path: Path, step_s: str) -> None:
-    path = planar_arm(tmp_path)
-    path.write_text(path.read_text().replace("<worldbody>", f'<option timestep="{step_s}"/><worldbody>', 1))
-    with pytest.raises(ConfigurationError, match=r"timestep = .*; valid: 1e-05 to 0.02 s"):
-        load_scene(path, "tcp")
-
-
-def test_a_model_that_mujoco_has_no_memory_for_is_one_line(tmp_path: Path) -> None:
-    # Enough to compile it, too little for its contacts.
-    balls = "".join(f'<body pos="1 {0.01 * ball} 2"><freejoint/><geom size="0.05"/></body>' for ball in range(40))
-    path = planar_arm(tmp_path, world=balls, extra_top='<size memory="50K"/>')
-    with pytest.raises(ConfigurationError, match=r"model: MuJoCo cannot simulate it: .*out of memory") as raised:
-        load_scene(path, "tcp")
-    assert "\n" not in str(raised.value)
-
-
-def test_a_keyframe_that_is_no_number_is_named(tmp_path: Path) -> None:
-    path = planar_arm(tmp_path, extra_bottom='<keyframe><key name="home" qpos="nan 0 0 0"/></keyframe>')
-    with pytest.raises(ConfigurationError, match="'home'"):
-        load_scene(path, "tcp")
-
-
 KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{second}" qpos="0 0 0 0"/></keyframe>'
 
 
@@ -293,7 +188,7 @@ KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{sec
 def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) -> None:
     model = planar_arm(tmp_path, extra_bottom=extra_bottom)
     assert load_scene(model, "tcp").start_pose.startswith(said)
-    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
     assert notes[0].startswith(f"starts at {said}")
     assert notes[1].startswith("objects: target: target; obstacle: ")
 
@@ -301,12 +196,12 @@ def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) ->
 def test_a_scene_without_a_target_says_how_to_name_one(tmp_path: Path) -> None:
     world = '<geom name="tin" type="sphere" size="0.1" pos="1 1 0"/><geom name="table" type="sphere" size="0.1"/>'
     model = planar_arm(tmp_path, world=world)
-    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
     assert notes[1] == "objects: obstacle: tin; support: table"
     assert "no object is a target" in notes[2]
     assert '[roles] NAME = "target"' in notes[2]
     settings = RobotSettings(model=model, site="tcp", roles={"tin": Role.TARGET})
-    notes = build_robot_side(settings, 1, "clock").notes
+    notes = assemble(settings, 1, "clock").core.notes
     assert notes[1] == "objects: target: tin; support: table"
     assert not any("no object is a target" in note for note in notes)
 
@@ -318,34 +213,106 @@ def test_a_body_and_a_geom_of_one_name_are_one_object_and_that_is_said(tmp_path:
     )
     model = planar_arm(tmp_path, world=world)
     assert load_scene(model, "tcp").shared_names == ("target",)
-    notes = build_robot_side(RobotSettings(model=model, site="tcp"), 1, "clock").notes
+    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
     assert notes[2].startswith("'target' names more than one thing")
     assert load_scene().shared_names == ()
 
 
-@pytest.mark.parametrize(
-    ("joint", "more", "said"),
-    [
-        ("<freejoint/>", "", "unnamed joint 0 of body 'arm' is free: the robot's base must stand fixed; valid: hinge"),
-        (
-            "<joint/>",
-            '<body mocap="true"/>',
-            "unnamed joint 0 of body 'arm' has no actuator of its own: the model is",
-        ),
-    ],
-)
-def test_a_kind_of_robot_that_is_refused_is_told_why(tmp_path: Path, joint: str, more: str, said: str) -> None:
-    (tmp_path / "arm.xml").write_text(
-        f"""<mujoco><worldbody>{more}<body name="arm">{joint}<geom size="0.1"/><site name="end"/>
-        <body><joint name="other"/><geom size="0.1"/></body></body></worldbody>
-        <actuator><motor joint="other"/></actuator></mujoco>"""
-    )
+NO_BASE = """<mujoco><worldbody>{more}<body name="arm">{joint}<geom size="0.1"/><site name="end"/>
+<body><joint name="other"/><geom size="0.1"/></body></body></worldbody>
+<actuator><motor joint="other"/></actuator></mujoco>"""
+BALL_JOINT = '<body pos="0.3 0 0"><joint name="b" type="ball"/><geom size="0.01"/><site name="end"/></body>'
+MUSCLE = POSITION_SERVOS.split("/>")[0] + '/><muscle name="pull" joint="elbow" lengthrange="0 1"/>'
+KEY = '<keyframe><key name="home" qpos="{} 0 0 0" qvel="0 0 0 {}"/></keyframe>'
+# Enough memory to compile it, too little for its contacts.
+HEAP = "".join(f'<body pos="1 {0.01 * ball} 2"><freejoint/><geom size="0.05"/></body>' for ball in range(40))
+REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
+    ("<mujoco", "tcp", "valid: an MJCF file that MuJoCo compiles"),
+    ("<robots/>", "tcp", "valid: an MJCF file that MuJoCo compiles"),
+    ({}, "tool", "valid: tcp, camera_mount"),
+    ({}, None, "none was named; valid: tcp, camera_mount"),
+    ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
+    ({"arm_actuators": MOTORS.split("/>")[0] + "/>"}, "tcp", "arm's joint 'elbow' has no actuator of its own: nothing"),
+    ({"arm_actuators": MUSCLE}, "tcp", "'pull' of joint 'elbow' is of an unsupported kind; valid: position"),
+    ({"world": '<site name="corner"/>'}, "corner", "'corner' hangs on no joint"),
+    (
+        {"world": '<body mocap="true"><geom size="1"/><site name="grip"/></body>'},
+        "grip",
+        "no joint: a mocap body carries it",
+    ),
+    ({"wrist": BALL_JOINT}, "end", "joint 'b' is ball: no single motor moves such a joint; valid: hinge or slide"),
+    (NO_BASE.format(joint="<freejoint/>", more=""), "end", "of body 'arm' is free: the robot's base must stand fixed"),
+    (
+        NO_BASE.format(joint="<joint/>", more='<body mocap="true"/>'),
+        "end",
+        "of its own: the model is moved by a mocap",
+    ),
+    ({"extra_top": '<option timestep="1e-6"/>'}, "tcp", "timestep = 1e-06; valid: 1e-05 to 0.02 s"),
+    ({"extra_top": '<option timestep="0.2"/>'}, "tcp", "timestep = 0.2; valid: 1e-05 to 0.02 s"),
+    ({"extra_top": '<size memory="50K"/>', "world": HEAP}, "tcp", "MuJoCo cannot simulate it: "),
+    ({"extra_bottom": KEY.format("nan", "0")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qpos"),
+    ({"extra_bottom": KEY.format("0", "inf")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qvel"),
+    ({"world": '<geom name="post" size="0.1" pos="nan 0 0"/>'}, "tcp", "post"),
+]
+
+
+@pytest.mark.parametrize(("model", "site", "said"), REFUSED)
+def test_what_cannot_be_used_is_told_in_one_line(
+    tmp_path: Path, model: dict[str, str] | str, site: str | None, said: str
+) -> None:
+    path = tmp_path / "arm.xml"
+    if isinstance(model, str):
+        path.write_text(model)
+    else:
+        planar_arm(tmp_path, **model)  # type: ignore[arg-type]
     with pytest.raises(ConfigurationError) as caught:
-        load_scene(tmp_path / "arm.xml", "end")
-    assert said in one_line(caught)
+        load_scene(path, site)
+    assert said in str(caught.value)
+    assert "valid: " in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_an_arm_that_hangs_on_a_mocap_body_is_told_so(tmp_path: Path) -> None:
-    hand = '<body mocap="true"><geom size="0.1"/><site name="grip"/></body>'
-    with pytest.raises(ConfigurationError, match="'grip' hangs on no joint: a mocap body carries it"):
-        load_scene(planar_arm(tmp_path, world=hand), "grip")
+def test_a_file_that_is_none_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"none\.xml.*there is no such file"):
+        load_scene(tmp_path / "none.xml", "tcp")
+    with pytest.raises(ConfigurationError, match=r"--model .*: is a directory; valid: an MJCF file"):
+        load_scene(tmp_path, "tcp")
+
+
+def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path) -> None:
+    mover = '<body pos="0.9 0 0.2"><joint name="mover" type="slide"/><geom size="0.02"/></body>'
+    key = '<keyframe><key name="home" qpos="0.05 0 0 0 0" qvel="-0.5 0.3 0.1 0 0"/></keyframe>'
+    post = '<geom name="post" size="0.1" pos="2 0 0"/>'
+    scene = load_scene(planar_arm(tmp_path, world=mover + post, extra_bottom=key), "tcp")
+    np.testing.assert_array_equal(scene.data.qvel, [-0.5, 0.0, 0.0, 0.0, 0.0])
+    assert scene.fixed == {"post"}
+    assert load_scene().fixed == {"floor", "table"}
+
+
+# What tells an arm: its joints, links and limits, and nothing of where it stands or what stands around it.
+
+
+def test_the_built_in_table_of_prediction_errors_is_for_the_built_in_arm_in_every_scene() -> None:
+    expected = load_prediction_errors(BUILT_IN).arm
+    assert load_scene().robot.fingerprint == load_scene(DATA / "u_mesh.xml", "tool").robot.fingerprint == expected
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ('<body name="base" pos="0 0 0" euler="0 0 0.0">', '<body name="base" pos="1 2 0" euler="0 0 30">', True),
+        ('kp="1000"', 'kp="900"', True),
+        ('range="-170 170"', 'range="-160 170"', False),
+        ('<body name="lower" pos="0.3 0 0">', '<body name="lower" pos="0.31 0 0">', False),
+        ('<joint name="elbow" axis="0 1 0"', '<joint name="elbow" axis="0 0.1 1"', False),
+        ('<joint name="elbow" axis', '<joint name="elbow" pos="0 0.01 0" axis', False),
+        ('<site name="tcp" pos="0 0 0.08"/>', '<site name="tcp" pos="0 0 0.09"/>', False),
+    ],
+    ids=["stands elsewhere", "other servos", "a limit", "a link", "an axis", "where it turns", "the tool"],
+)
+def test_another_limit_link_axis_or_tool_makes_another_arm(old: str, new: str, same: bool, tmp_path: Path) -> None:
+    file = planar_arm(tmp_path)
+    plain, text = load_scene(file, "tcp").robot.fingerprint, file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    assert (load_scene(file, "tcp").robot.fingerprint == plain) is same
