@@ -1,6 +1,5 @@
 """Errors of overlaps beside the truth, and counts of what must not happen even once."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +12,6 @@ from feelahead.lab.reference.pairs import Pairs
 from robot_side.overlap import kernels
 
 Overlaps = tuple[FloatArray, FloatArray, FloatArray]
-Volumes = Callable[[Pairs], FloatArray]
-"""Volumes (p,) in m³, NaN where a pair raised an exception."""
 
 LEAST_SHARE = 1e-12
 """Smaller overlaps, as shares of the sphere, are held to no relative error but where they are made so shallow."""

@@ -6,12 +6,12 @@ Meshes are not looked at.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Final
+from functools import lru_cache, partial
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 from feelahead.lab.reference.plain_ramp import Ramp
 from robot_side.ahead.field import LEAST_DEPTH_M, MARGIN_M, Along
 from robot_side.ahead.find import PASSED_OVER, TARGET, TOUCHABLE
@@ -19,12 +19,9 @@ from robot_side.ahead.kinds.layout import CLOSING, LEAST_WAY_M, MOST_STEPS, TOUC
 from robot_side.ahead.tables import STRENGTHS, TOUCH_STRENGTH
 from robot_side.arm.port import GripperPose
 from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap import MeshLibrary, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
-from robot_side.overlap.meshes.mesh_library import mesh_pairs
+from robot_side.overlap import Mesh, MeshLibrary, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
 
-_CORNERS: Final = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
-"""Corners of a tetrahedron's faces, and the vertex that each lies opposite to."""
-_EDGES: Final = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 Nearest = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """From points (m, 3) to distances (m,), negative or 0 inside, and unit directions (m, 3) in which they fall."""
 Overlaps = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
@@ -73,13 +70,15 @@ def _sphere(thing: int, center: FloatArray, radius: float) -> Primitive:
 
 
 def _box(thing: int, *box: FloatArray) -> Primitive:
-    return Primitive(thing, 8.0 * float(np.prod(box[2])), _overlap(sphere_box, *box), _advance(_nearest_on_box(*box)))
+    center, rotation, half_sizes = box
+    nearest = _nearest_on(center + CUBE_CORNERS * half_sizes @ rotation.T, CUBE_TRIANGLES)
+    return Primitive(thing, 8.0 * float(np.prod(half_sizes)), _overlap(sphere_box, *box), _advance(nearest))
 
 
 def _tetrahedron(thing: int, vertices: FloatArray) -> Primitive:
     volume = abs(float(np.linalg.det(vertices[1:] - vertices[0]))) / 6.0
-    overlap = _overlap(sphere_tetrahedron, vertices)
-    return Primitive(thing, volume, overlap, _advance(_nearest_on_tetrahedron(vertices)))
+    nearest = _nearest_on(vertices, TETRAHEDRON_TRIANGLES)
+    return Primitive(thing, volume, _overlap(sphere_tetrahedron, vertices), _advance(nearest))
 
 
 def _half_space(thing: int, normal: FloatArray, offset: float) -> Primitive:
@@ -231,41 +230,20 @@ def _advance(nearest: Nearest) -> Ways:
     return ways
 
 
-def _nearest_on_box(center: FloatArray, rotation: FloatArray, half_sizes: FloatArray) -> Nearest:
+def _nearest_on(corners: FloatArray, triangles: IntArray) -> Nearest:
+    """Ask how far the surface of a solid is, whose triangles face outwards if the corners are right-handed."""
+    edges = corners[triangles[0]] - corners.mean(axis=0)
+    library = _library(corners.tobytes(), (triangles if np.linalg.det(edges) > 0.0 else triangles[:, ::-1]).tobytes())
+
     def nearest(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        local = (points - center) @ rotation
-        away = local - np.clip(local, -half_sizes, half_sizes)
-        distances = np.linalg.norm(away, axis=1)
-        return distances, -(away / np.where(distances > 0.0, distances, 1.0)[:, None]) @ rotation.T
+        count = len(points)
+        turns = np.ascontiguousarray(np.broadcast_to(np.eye(3), (count, 3, 3)))
+        return nearest_mesh_pairs(points, library, np.zeros(count, np.int64), np.zeros((count, 3)), turns)
 
     return nearest
 
 
-def _nearest_on_tetrahedron(vertices: FloatArray) -> Nearest:
-    def nearest(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        feet, heights, normals = [], [], []
-        for start, end in _EDGES:
-            edge = vertices[end] - vertices[start]
-            share = np.clip((points - vertices[start]) @ edge / (edge @ edge), 0.0, 1.0)
-            feet.append(vertices[start] + share[:, None] * edge - points)
-        for *corners, opposite in _CORNERS:
-            a, b, c = vertices[corners]
-            normal = np.cross(b - a, c - a)
-            normal *= -np.sign(normal @ (vertices[opposite] - a)) / np.linalg.norm(normal)
-            height = (points - a) @ normal
-            foot = points - height[:, None] * normal
-            turns = [np.cross(v - u, foot - u) @ normal for u, v in ((a, b), (b, c), (c, a))]
-            inside = (np.min(turns, axis=0) >= 0.0) | (np.max(turns, axis=0) <= 0.0)
-            feet.append(np.where(inside[:, None], foot - points, np.inf))
-            heights.append(height)
-            normals.append(normal)
-        squared = np.array([np.einsum("mi,mi->m", foot, foot) for foot in feet])
-        best, every = squared.argmin(axis=0), np.arange(len(points))
-        distances = np.sqrt(squared[best, every])
-        towards = np.array(feet)[best, every] / np.where(distances > 0.0, distances, 1.0)[:, None]
-        face = np.argmax(heights, axis=0)
-        deepest = np.array(heights)[face, every]
-        outside = deepest > 0.0
-        return np.where(outside, distances, deepest), np.where(outside[:, None], towards, -np.array(normals)[face])
-
-    return nearest
+@lru_cache(maxsize=1000)
+def _library(corners: bytes, triangles: bytes) -> MeshLibrary:
+    """Keep the surfaces of what stands still."""
+    return MeshLibrary([Mesh(np.frombuffer(corners).reshape(-1, 3), np.frombuffer(triangles, np.int64).reshape(-1, 3))])
