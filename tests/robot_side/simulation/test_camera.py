@@ -1,5 +1,4 @@
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,18 +8,7 @@ from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.scene import Scene, load_scene
-from tests.helpers.arm_models import SHAPES, STONE, planar_arm
 from tests.helpers.repository import DATA
-
-
-@pytest.fixture
-def built_in() -> Scene:
-    return load_scene()
-
-
-@pytest.fixture
-def shapes(tmp_path: Path) -> Scene:
-    return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
 
 
 def test_every_array_is_contiguous(shapes: Scene) -> None:

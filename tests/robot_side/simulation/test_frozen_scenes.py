@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.gripper.held_object import gripped_object
 from robot_side.objects.perceived import Role
-from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import MujocoCamera
-from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.repository import DATA
 from tests.robot_side.simulation.test_scene_meshes import overlap_of
@@ -168,31 +165,3 @@ def test_the_four_tables_are_perceived_as_one_solid() -> None:
     for name in TABLES:
         # MuJoCo keeps vertices in single precision.
         np.testing.assert_allclose(volumes[name], expected, rtol=1e-6, atol=1e-10, err_msg=name)
-
-
-def test_the_held_box_stays_between_open_fingers_and_is_gripped_when_they_close() -> None:
-    scene = load("place_held")
-    arm, camera = MujocoArm(scene, Encoder()), MujocoCamera(scene)
-    arm.state(0.0)
-    target, gripper = scene.data.body("target"), scene.data.body("gripper")
-
-    def place_in_gripper() -> FloatArray:
-        place: FloatArray = (target.xpos - gripper.xpos) @ gripper.xmat.reshape(3, 3)
-        return place
-
-    for tick in range(1, 2001):
-        state = arm.state(1e-3 * tick)
-        np.testing.assert_allclose(place_in_gripper(), [0.0, 0.0, 0.16], atol=5e-4)
-        assert scene.data.ncon == 0
-        assert not state.gripper_holding
-    arm.command_gripper(1.0, 10.0)
-    for tick in range(2001, 3001):
-        state = arm.state(1e-3 * tick)
-    assert state.gripper_holding
-    assert state.gripper_opening_m == pytest.approx(0.05, abs=1e-3)
-    np.testing.assert_allclose(place_in_gripper(), [0.0, 0.0, 0.16], atol=5e-4)
-    np.testing.assert_allclose(scene.data.site_xpos[scene.robot.site], [0.45, 0.0, 0.48], atol=1e-3)
-    seen = camera.perceive(3.0)
-    index = gripped_object(seen, scene.data.site_xpos[scene.robot.site], state.gripper_opening_m)
-    assert index is not None
-    assert seen.names[index] == "target"

@@ -18,16 +18,6 @@ from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TEN
 from tests.helpers.repository import DATA
 
 
-@pytest.fixture
-def built_in() -> Scene:
-    return load_scene()
-
-
-@pytest.fixture
-def shapes(tmp_path: Path) -> Scene:
-    return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")
-
-
 def test_the_numbers_of_the_kinds_are_mujocos() -> None:
     names = {
         model_enums.JointKind: (mujoco.mjtJoint, "mjJNT_"),
