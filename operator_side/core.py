@@ -130,6 +130,8 @@ class OperatorSide:
                 self._blindness.end()
                 self.stiffness, self.stiffness_s = message, now_s
                 self._has_been_armed |= message.state == "armed"
+                if message.state != "armed" and self._lost_s is not None and now_s > self._lost_s:
+                    self._lost_s = None
                 if arrival.one_way_s is not None:
                     self.applied_age.add(arrival.one_way_s)
 
@@ -208,7 +210,8 @@ class OperatorSide:
             return None
         state = None if self.stiffness is None else self.stiffness.state
         intent = STOPPING if self.stop_button.holds(now_s, state) else self._present_intent(now_s)
-        if intent is None or (self._must_stop_first() and not intent.emergency_stop):
+        # The arm may still be armed from before the controller was lost: then silence disarms it.
+        if intent is None or (self._lost_s is not None and not intent.emergency_stop):
             return None
         if self._blindness.holds:
             intent = intent.resting()
@@ -223,14 +226,6 @@ class OperatorSide:
             self.stiffness = None
             if self._standing.owns:
                 self._blindness.lose(now_s)
-
-    def _must_stop_first(self) -> bool:
-        """Whether the arm may still be armed from before the controller was lost: then silence disarms it."""
-        if self._lost_s is None:
-            return False
-        if self.stiffness is not None and self.stiffness_s > self._lost_s and self.stiffness.state != "armed":
-            self._lost_s = None
-        return self._lost_s is not None
 
     def output_report(self, now_s: float) -> OutputReport | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait."""

@@ -204,7 +204,7 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         (["--equality", "--picture", "out.png"], "--equality has no figure"),
         (["--equality", "--field"], "--equality and --field exclude each other; valid: one of them"),
         (["--model", WALL], "--model and --site are for --field; valid: with it"),
-        (["--field", "--step-mm", "nan"], "step_mm = nan; valid: 1 to 150"),
+        (["--field", "--step-mm", "nan"], "--step-mm = nan; valid: 1 to 150"),
         (["--field", "--model", "no_such.xml"], "no_such.xml: there is no such file"),
         (["--field", "--model", WALL, "--site", "hand"], "'hand'; valid: tool"),
         (["--field", "--model", str(DATA / "empty.xml")], "nothing is ahead of the gripper within 2 m"),
