@@ -1,6 +1,6 @@
 """The shapes of a scene as triangles that a browser draws: one mesh for all that differ in size alone.
 
-The meshes are trimesh's, which viser brings.
+The meshes are trimesh's.
 
 Vertices (v, 3) float32 in metres, triangles (t, 3) uint32, seen from outside counterclockwise.
 """

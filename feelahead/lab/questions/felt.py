@@ -2,6 +2,7 @@
 
 feelahead bench felt --quick --picture felt.png
 feelahead bench felt --equality
+feelahead bench felt --cover
 feelahead bench felt --field --picture ways.png
 """
 
@@ -17,6 +18,7 @@ from rich.table import Table as Shown
 from common.files.input_file import require_input_file
 from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene, scene_names
 from feelahead.lab.approaches.ticks import DEMO, record
+from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
 from feelahead.lab.field import CONVEX, DRAWN, Facing, draw_field, look_ahead, way_name
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
@@ -24,9 +26,11 @@ from feelahead.lab.reference.beside import compare_ticks
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.variants import COVERS_M, KINDS, errors_mm, replay
+from feelahead.lab.variants import COVER_M, COVERS_M, KINDS, errors_mm, replay
 
 _LIMIT_M: Final = 1e-12
+_LIMIT_COVER_MM: Final = 1e3 * COVER_M
+_QUICK_POINTS: Final = 10_000
 _QUICK_SCENES: Final = 2
 _LEAST_MM: Final = 1e-3
 """Errors below are drawn here: the axis is logarithmic."""
@@ -41,24 +45,31 @@ class FeltSweep(Sweep):
 
     equality: bool = False
     """Instead: the demo's 10 000 ticks by the compiled law and by plain NumPy; how far the two are apart."""
+    cover: bool = False
+    """Instead: how closely spheres cover grippers: the built-in one, and those of --model."""
     field: bool = False
     """Instead: how far before things R2's strengths begin, without camera error. The frozen scenes with one convex
     thing ahead, or those of --model, are moved along the approach."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
-    """--field: MJCF files with an arm."""
+    """--cover, --field: MJCF files with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """--field: the site between the fingertips, z along the approach."""
+    """--cover, --field: the site between the fingertips, z along the approach."""
+    points: Annotated[int, Meta(ge=100, le=10_000_000), tyro.conf.arg(metavar="N")] = 200_000
+    """--cover: points of either surface, shared among a gripper's links."""
     step_mm: Annotated[float, Meta(ge=1.0, le=150.0), tyro.conf.arg(metavar="MM")] = 10.0
     """--field: free ways from 0 to 150 mm in such steps."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.equality and self.field:
-            raise ValueError("--equality and --field exclude each other; valid: one of them")
+        asked = [f"--{name}" for name in ("equality", "cover", "field") if getattr(self, name)]
+        if len(asked) > 1:
+            raise ValueError(f"{' and '.join(asked)} exclude each other; valid: one of them")
         if self.equality and self.picture is not None:
             raise ValueError(f"--picture {self.picture}: --equality has no figure; valid: without --equality")
-        if (self.model or self.site is not None) and not self.field:
-            raise ValueError("--model and --site are for --field; valid: with it")
+        if (self.model or self.site is not None) and not (self.cover or self.field):
+            raise ValueError("--model and --site are for --cover and --field; valid: with one of them")
+        if self.cover and bool(self.model) != (self.site is not None):
+            raise ValueError("--cover takes --model and --site together; valid: both, or neither")
         for model in self.model:
             require_input_file("--model", model, "an MJCF file")
 
@@ -79,9 +90,14 @@ class Run:
     """Each tick is gone through this often; the least time counts."""
 
 
-def cells(settings: FeltSweep) -> Iterator[Run | Facing]:
-    """Lay out the recorded runs, or the scenes."""
-    if settings.field:
+def cells(settings: FeltSweep) -> Iterator[Run | Gripper | Facing]:
+    """Lay out the recorded runs, the grippers, or the scenes."""
+    if settings.cover:
+        points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
+        yield Gripper("built-in", None, None, points)
+        for model, name in scene_names(settings.model).items():
+            yield Gripper(name, model, settings.site, points)
+    elif settings.field:
         for model, name in settings.scenes().items():
             yield Facing(name, model, settings.site or SITE, settings.step_mm)
     elif settings.equality:
@@ -92,10 +108,10 @@ def cells(settings: FeltSweep) -> Iterator[Run | Facing]:
             yield Run(scene, 3.0 if settings.quick else 3.5)
 
 
-def run(cell: Run | Facing, seed: int) -> Iterator[Row]:
-    """Record one run, and ask the law its ticks with each cover: a row for each. Or look ahead."""
-    if isinstance(cell, Facing):
-        yield from look_ahead(cell)
+def run(cell: Run | Gripper | Facing, seed: int) -> Iterator[Row]:
+    """Record one run, and ask the law its ticks with each cover: a row for each. Or measure a cover, or look ahead."""
+    if not isinstance(cell, Run):
+        yield from measure_cover(cell, seed) if isinstance(cell, Gripper) else look_ahead(cell)
         return
     recorded = record(cell.run, cell.duration_s, seed)
     if cell.equality:
@@ -111,7 +127,12 @@ def run(cell: Run | Facing, seed: int) -> Iterator[Row]:
 
 
 def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
-    """Make a table for each run: a row for each cover; or one of the largest differences, or of the scenes."""
+    """Make a table for each run: a row for each cover; or one of the largest differences, the links, or the scenes."""
+    if settings.cover:
+        measures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
+        links = ((f"{row['gripper']}: {row['part']}", *map(row.get, measures)) for row in table)
+        yield shown("grippers in spheres: geoms out of spheres, spheres out of geoms", ("part", *measures), links)
+        return
     if settings.field:
         nearest = [rows.rows[-1] for _, rows in table.groups("scene")]
         figures = ("free_mm", *map(way_name, DRAWN), "sigma_mm")
@@ -135,15 +156,18 @@ def _apart(row: Row, kind: str) -> str | None:
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Hold the compiled law to the plain one."""
+    """Hold the compiled law to the plain one, and spheres to what they cover."""
+    for (name,), rows in table.groups("gripper") if settings.cover else ():
+        yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
+        yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
     if settings.equality:
         yield Goal("largest difference of compiled and plain, SI units", max(table.values("largest")), _LIMIT_M)
 
 
 def draw(settings: FeltSweep, table: Table, path: Path) -> None:
-    """Draw run time against error of full strength, a line for each run; or where strengths begin."""
-    if settings.field:
-        draw_field(table, frozen(settings), path)
+    """Draw run time against error of full strength, a line for each run; or grippers, or where strengths begin."""
+    if settings.cover or settings.field:
+        draw_cover(table, path) if settings.cover else draw_field(table, frozen(settings), path)
         return
     with figure(path, figsize=(5.2, 3.8)) as (_, axes):
         for (name,), rows in table.groups("run"):

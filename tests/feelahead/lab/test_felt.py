@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 
 import feelahead.main
 from common.errors import ConfigurationError
+from feelahead.lab import cover
 from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.ticks import DEMO, Recorded, record, with_cover
+from feelahead.lab.cover import STANDS_OUT, Gripper
 from feelahead.lab.field import way_name
 from feelahead.lab.questions.felt import Run, run
 from feelahead.lab.reference import plain_feel, plain_ramp, plain_ways
@@ -26,7 +29,9 @@ from robot_side.ahead.scene_table import scene_table
 from robot_side.objects.perceived import PerceivedObjects
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
+from robot_side.simulation.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.ahead.fields import along, ball_pose
+from tests.helpers.arm_models import planar_arm
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.repository import DATA
@@ -175,6 +180,44 @@ def test_equality_is_a_table_a_goal_and_a_file(tmp_path: Path, capsys: pytest.Ca
         assert all(float(row["largest"]) <= LIMIT for row in csv.DictReader(file))
 
 
+def test_the_cover_of_a_gripper_is_a_row_for_each_part_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written, picture = tmp_path / "out.csv", tmp_path / "out.png"
+    own = ["--model", str(planar_arm(tmp_path)), "--site", "tcp"]
+    few = ["--points", "2000", "--csv", str(written), "--picture", str(picture)]
+    assert feelahead.main.command(["bench", "felt", "--cover", *own, *few]) == 0
+    assert "missed" not in capsys.readouterr().out
+    with written.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["gripper"], row["part"], row["spheres"]) for row in rows[:3]] == [
+        ("built-in", "gripper", "158"),
+        ("built-in", "left_finger", "44"),
+        ("built-in", "right_finger", "44"),
+    ]
+    assert [(row["gripper"], row["part"]) for row in rows[3:]] == [("arm", "hand"), ("arm", "left"), ("arm", "right")]
+    for row in rows:
+        assert float(row["sticks_out_mm"]) == 0.0
+        median_mm, p99_mm, most_mm = (float(row[name]) for name in STANDS_OUT)
+        assert 1.0 < median_mm < p99_mm < most_mm <= 3.0
+        assert most_mm > 2.0
+    assert [round(float(rows[0][name]), 1) for name in ("gap_mm", "gap_kept_mm")] == [85.0, 79.0]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_spheres_that_are_too_small_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spheres of half a millimetre less leave corners out, and stand out by that much less."""
+
+    def smaller(*arguments: Any) -> GripperCover:
+        found = cover_gripper(*arguments)
+        return replace(found, radii_m=found.radii_m - 0.0005)
+
+    monkeypatch.setattr(cover, "cover_gripper", smaller)
+    for row in run(Gripper("built-in", None, None, 2000), 0):
+        assert 0.1 < row["sticks_out_mm"] <= 0.5 + 1e-6
+        assert 2.0 < row["stands_out_mm"] <= 2.5 + 1e-6
+
+
 def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -203,7 +246,8 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
     [
         (["--equality", "--picture", "out.png"], "--equality has no figure"),
         (["--equality", "--field"], "--equality and --field exclude each other; valid: one of them"),
-        (["--model", WALL], "--model and --site are for --field; valid: with it"),
+        (["--model", WALL], "--model and --site are for --cover and --field"),
+        (["--cover", "--site", "tcp"], "--cover takes --model and --site together"),
         (["--field", "--step-mm", "nan"], "--step-mm = nan; valid: 1 to 150"),
         (["--field", "--model", "no_such.xml"], "no_such.xml: there is no such file"),
         (["--field", "--model", WALL, "--site", "hand"], "'hand'; valid: tool"),
