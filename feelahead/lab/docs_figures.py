@@ -1,8 +1,9 @@
-"""Make every figure of the documents again, by the commands beside them: `make figures`.
+"""Make every figure of the documents again, by the commands beside them, and say which changed: `make figures`.
 
 A command is an indented line of a page that names a place in docs/ or is `make pictures`; a backslash continues it.
 """
 
+import hashlib
 import os
 import re
 import subprocess
@@ -20,6 +21,7 @@ from feelahead.lab.progress import progress
 
 _ROOT: Final = Path(__file__).parents[2]
 _COMMAND: Final = re.compile(r"^    ((?:feelahead |python -m |make )(?:.*\\\n)*.*)$", re.MULTILINE)
+_PICTURES: Final = (".png", ".svg", ".webp")
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,14 @@ def commands(docs: Path) -> Iterator[str]:
     yield from found
 
 
+def pictures(docs: Path) -> dict[str, str]:
+    """Hash every picture of the documents, by its path."""
+    paths = sorted(path for path in docs.rglob("*") if path.suffix in _PICTURES)
+    return {path.relative_to(docs.parent).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
+
+
 def make_figures(arguments: Sequence[str]) -> int:
-    """Run the commands; 1 where one failed."""
+    """Run the commands, and say which pictures changed; 1 where a command failed."""
     settings = parse_settings(DocsFigures, "make figures", arguments)
     docs = _ROOT / "docs"
     if not docs.is_dir():
@@ -56,13 +64,15 @@ def make_figures(arguments: Sequence[str]) -> int:
     # The same interpreter's console scripts come first.
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     failed: list[str] = []
+    before = pictures(docs)
     with progress("figures", float(len(wanted) or 1)) as shown:
         for command in wanted:
             shown.begin(command)
             done = subprocess.run(command, shell=True, cwd=_ROOT, env=environment, check=False)  # noqa: S602  # ours
             failed += [f"failed: {command}\n"] if done.returncode else []
             shown.advance(1.0)
-    sys.stdout.write("".join(failed))
+    changed = [f"changed: {path}\n" for path, content in pictures(docs).items() if before.get(path) != content]
+    sys.stdout.write("".join(failed + changed) or "no figure changed\n")
     return 1 if failed else 0
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from common.protocol.messages import Vector2
@@ -79,7 +80,14 @@ class PullRun:
             person=lambda _: self.hands,
             after_robot_tick=self._after_robot_tick,
         )
+        self._scene = scene
         self._next_s = -math.inf
+
+    @property
+    def tool_position_m(self) -> FloatArray:
+        """Position (3,) of the true tool in the world frame."""
+        position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
+        return position
 
     @property
     def disarmed_because(self) -> str | None:

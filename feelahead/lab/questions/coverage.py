@@ -18,6 +18,7 @@ from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
+from feelahead.lab.approaches.race import RACED, race
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
@@ -42,14 +43,17 @@ class CoverageSettings(Sweep):
 
     Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
     the finger reaches until then. False alarm: strength of 4 or more under the finger, while that zone's stopping path
-    from the true pose stays D_σ(P) + 15 mm clear. Pulls are recorded open loop over the emulated link, and judged for
-    every scene, camera draw, law and P. --quick: a few cells in two minutes, instead of all in two hours.
+    from the true pose stays D_σ(P) + 15 mm clear. Slowdown: the time to a goal in the free over that without haptics.
+    Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P. --quick: a
+    few cells in three minutes, instead of all in two hours.
     """
 
     laws: tuple[Law, ...] = LAWS
     """The laws that are set side by side."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
+    raced: Annotated[Annotated[int, Meta(ge=0)] | None, tyro.conf.arg(metavar="N")] = None
+    """Number of seeds for the time to a goal; 10 unless given, 2 with --quick; 0 leaves it out."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
     """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
     spoil: Spoil = "nothing"
@@ -76,6 +80,23 @@ class CoverageSettings(Sweep):
             Pulls(*motion, tuple(cells), sizes, chosen, self.laws, self.spoil) for motion, cells in found.items()
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
+
+
+@dataclass(frozen=True)
+class Race:
+    """The time to a goal in one scene under one law."""
+
+    scene: str
+    law: Law
+    count: int
+    spoil: Spoil
+
+
+def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
+    """Lay out motions and races."""
+    yield from settings.pulls()
+    if count := settings.raced if settings.raced is not None else (2 if settings.quick else 10):
+        yield from (Race(scene, law, count, settings.spoil) for scene in RACED for law in settings.laws)
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
@@ -107,14 +128,18 @@ def quick_cells() -> Iterator[tuple[PullKind, str, Placed]]:
         yield "bell", "200 ms", Placed(name)
 
 
-def run(cell: Pulls, seed: int) -> Iterator[Row]:
-    """Record one motion, and judge its cells."""
-    yield from evaluate(cell, seed)
+def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
+    """Record one motion, and judge its cells; or race."""
+    if isinstance(cell, Pulls):
+        yield from evaluate(cell, seed)
+    else:
+        first = cell.count * seed
+        yield race(cell.scene, cell.law, range(first, first + cell.count), cell.spoil)
 
 
 def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     """Make tables by cell, by pull and by law."""
-    found = Table(sorted(table, key=lambda row: row["cell"]))
+    found = judged(table)
     yield _by_cell(
         found, settings.laws, "covered: full strength stood in time, share [95 %], * where it holds", _covered
     )
@@ -122,7 +147,12 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     yield "n: draws (approaches). apart: places in which no release avoids the contact / that were not found"
     yield from (by_pull(found, law) for law in settings.laws)
     yield "once reported: draws in which the operator side had a report of the drift or turn in time"
-    yield by_law(found, settings.laws)
+    yield by_law(table, settings.laws)
+
+
+def judged(table: Table) -> Table:
+    """Choose the rows of cells, in their order."""
+    return Table(sorted((row for row in table if "cell" in row), key=lambda row: row["cell"]))
 
 
 def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row], str]) -> Shown:
@@ -166,20 +196,28 @@ def _where(rows: Table, name: str, value: float, form: str) -> str:
     return f"{value:{form}} ({rows.where(**{name: value}).rows[0]['scene']})"
 
 
-def by_law(found: Table, laws: Sequence[str]) -> Shown:
-    """Make a row for each law and P, over all cells."""
+def by_law(table: Table, laws: Sequence[str]) -> Shown:
+    """Make a row for each law and P, over all cells, with the cost in time."""
+    found, raced = judged(table), Table(row for row in table if "slowdown" in row)
     figures = {"coverage": ".3f", "mean_strength": ".2f", "late_ms": ".0f", "never": ".0%"}
     figures |= {"alarms_per_min": ".1f", "alarm_share": ".0%"}
     entries = [
         (
             *(law, f"{probability:g}", f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"),
             *(mean(rows, name, form) for name, form in figures.items()),
+            *(_slowdown(row) for scene in RACED for row in raced.where(law=law, scene=scene)),
         )
         for law in laws
         for (probability,), rows in found.where(law=law).groups("probability")
     ]
     headings = ("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never")
-    return shown("the laws side by side, means over the cells", (*headings, "false alarms a minute", "share"), entries)
+    slow = (f"slowdown, {scene}" for scene in RACED if len(raced))
+    title = "the laws side by side, means over the cells; slowdown at 200 ms (arrived)"
+    return shown(title, (*headings, "false alarms a minute", "share", *slow), entries)
+
+
+def _slowdown(row: Row) -> str:
+    return f"{'-' if row['slowdown'] is None else format(row['slowdown'], '.2f')} ({row['arrived']}/{row['of']})"
 
 
 def mean(rows: Table, name: str, form: str = ".3f") -> str:
@@ -190,6 +228,7 @@ def mean(rows: Table, name: str, form: str = ".3f") -> str:
 
 def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
     """Draw coverage against false alarms: a point for each law and P, means over the cells."""
+    table = judged(table)
     marks = dict(zip(sorted(set(table.values("probability"))), _MARKS, strict=False))
     with figure(path, figsize=(7.2, 4.6)) as (_, axes):
         for law in settings.laws:
@@ -215,7 +254,7 @@ def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
 QUESTION = Question(
     "bench coverage",
     CoverageSettings,
-    CoverageSettings.pulls,
+    cells,
     run,
     show,
     draw=draw,

@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-from feelahead.lab.docs_figures import commands
+from feelahead.lab.docs_figures import commands, pictures
 from tests.helpers.repository import ROOT
-
-PICTURES = (".png", ".svg", ".webp")
 
 
 def test_commands_are_read_with_their_continuations_and_without_remarks(tmp_path: Path) -> None:
@@ -21,7 +19,7 @@ def test_every_picture_of_the_documents_is_made_by_one_of_the_commands() -> None
     found = list(commands(docs))
     orphans = [
         picture
-        for picture in (path.relative_to(ROOT).as_posix() for path in docs.rglob("*") if path.suffix in PICTURES)
+        for picture in pictures(docs)
         if not any(f" {picture}" in command or f" {Path(picture).parent}" in command.split("#")[0] for command in found)
         and not ("make pictures" in found and picture.startswith(("docs/console/", "docs/recording/")))
     ]

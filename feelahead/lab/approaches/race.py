@@ -1,0 +1,59 @@
+"""The time that a law costs: to a goal in the free, in closed loop, over the time without haptics."""
+
+from collections.abc import Sequence
+from functools import cache
+from statistics import median
+from typing import Final
+
+from feelahead.lab.approaches.approach import Approach, PullRun
+from feelahead.lab.approaches.evaluation import LINKS
+from feelahead.lab.approaches.frozen import frozen_scene
+from feelahead.lab.approaches.laws import Law
+from feelahead.lab.approaches.pulls import make_pull
+from feelahead.lab.approaches.spoilt import Spoil
+from feelahead.lab.table import Row
+
+RACED: Final = ("empty", "cluttered")
+"""Scenes with a free corridor to the goal."""
+_GOAL_M: Final = 0.25
+_LIMIT_S: Final = 15.0
+_LINK: Final = "200 ms"
+_PROBABILITY: Final = 0.99
+
+
+def race(scene: str, law: Law, seeds: Sequence[int], spoil: Spoil = "nothing") -> Row:
+    """Compare the time to a goal with that without haptics, for the same hands and seeds.
+
+    The ratio is the median over the seeds, half of them with bells and half with steady pulls; None where most never
+    arrive.
+    """
+    ratios = []
+    for seed in seeds:
+        free_s, felt_s = _time_s(scene, "none", seed, "nothing"), _time_s(scene, law, seed, spoil)
+        if free_s is not None:
+            ratios.append(felt_s / free_s if felt_s is not None else float("inf"))
+    arrived, middle = sum(ratio < float("inf") for ratio in ratios), median(ratios) if ratios else float("inf")
+    row: Row = {"scene": scene, "law": law, "slowdown": middle if middle < float("inf") else None}
+    return row | {"arrived": arrived, "of": len(ratios)}
+
+
+@cache
+def _time_s(scene: str, law: Law, seed: int, spoil: Spoil) -> float | None:
+    """Bring the tool to the goal; None where it touches or is late."""
+    approach = Approach(
+        model=frozen_scene(scene),
+        force_n=0.0,
+        link=LINKS[_LINK],
+        law=law,
+        probability=_PROBABILITY,
+        duration_s=_LIMIT_S,
+        seed=seed,
+        spoil=spoil,
+    )
+    run = PullRun(approach, make_pull("bell" if seed % 2 else "steady", seed))
+    began_s = run.arm()
+    axis, start_m = run.truth.approach()[0], run.tool_position_m
+    for now_s in run.go_on(began_s + approach.duration_s):
+        if (run.tool_position_m - start_m) @ axis >= _GOAL_M:
+            return now_s - began_s
+    return None
