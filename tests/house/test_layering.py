@@ -98,6 +98,7 @@ What has no row of its own counts to the room around it.
 
 LIBRARIES = {
     "viser": ("operator_side/console",),
+    "trimesh": ("operator_side/console",),
     "websockets": ("operator_side/console",),
     "zmq": ("common/sockets", "feelahead/lab/link/bare.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),

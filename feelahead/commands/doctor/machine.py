@@ -19,7 +19,7 @@ from feelahead.commands.doctor.finding import Finding, Verdict
 OLDEST_PYTHON: Final = (3, 11)
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
     "robot": ("mujoco", "numba", "simplejpeg"),
-    "operator": ("hidapi", "viser"),
+    "operator": ("hidapi", "viser", "trimesh"),
     "record": ("foxglove", "mcap"),
     "experiments": ("matplotlib", "pyarrow", "distributed"),
 }
