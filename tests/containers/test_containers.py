@@ -105,7 +105,7 @@ def test_sigterm_ends_both_sides_well(running: Engine) -> None:
 
 def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> None:
     """Both media know of one contact, and the containers leave nothing."""
-    words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "4", "--media", "virtual", "--compose"]
+    words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "8", "--media", "virtual", "--compose"]
     # Others' trials, and what older ones left, are not ours to judge.
     before = compose.existing(f"name={TRIALS}")
     summary = tmp_path / "latency.json"

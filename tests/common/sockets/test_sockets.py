@@ -1,6 +1,7 @@
 """Real sockets on loopback. Nothing here sleeps: every wait is for a message, or for a bounded time at most."""
 
 import pytest
+import zmq
 
 from common.sockets import inbox
 from common.sockets.operator import OperatorSockets
@@ -188,6 +189,12 @@ def test_refuses_heartbeats_that_cannot_work(timeout_s: float) -> None:
         RobotSockets(EPHEMERAL, heartbeat_timeout_s=timeout_s)
     with pytest.raises(ValueError, match="heartbeat_timeout_s = "):
         OperatorSockets("tcp://127.0.0.1:5555", heartbeat_timeout_s=timeout_s)
+
+
+def test_a_peer_is_asked_three_times_before_its_silence_ends_the_connection(robot: RobotSockets) -> None:
+    """Once would not do: one late answer would end it."""
+    asked_ms = robot._control.get(zmq.HEARTBEAT_IVL)
+    assert 3 * asked_ms == robot._control.get(zmq.HEARTBEAT_TIMEOUT)
 
 
 def test_closing_twice_and_with_unsent_messages_ends(robot: RobotSockets, operator: OperatorSockets) -> None:

@@ -148,6 +148,10 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
     for tick in range(2000):
         commands.sent(1.0 + PERIOD_S * tick, 0.0)
     assert len(commands) <= MAX_DELAY_S / PERIOD_S + 2
+    short = CommandsUnderWay(window_s=0.1)
+    for tick in range(100):
+        short.sent(PERIOD_S * tick, 0.0)
+    assert len(short) <= 0.1 / PERIOD_S + 2
 
 
 MOMENT = (0.01, 0.0, 0.0)
