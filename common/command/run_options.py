@@ -24,8 +24,8 @@ class RunOptions:
     """Settings from a file, under these flags; every flag's name is a key."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = ""
     """Emulated link for what this side sends, in netem's words: "delay 50ms 10ms distribution normal loss 1%", with
-    duplicate, corrupt, reorder, rate, limit and slot, and "trace FILE.csv" or "outage 2s at 10s every 30s" (after the
-    first message); or per direction and stream: "to_robot: delay 20ms; to_operator: delay 50ms 10ms; video: rate
+    duplicate, corrupt, reorder, rate and limit, and "trace FILE.csv" or "outage 2s at 10s every 30s" (after the first
+    message); or per direction and stream: "to_robot: delay 20ms; to_operator: delay 50ms 10ms; video: rate
     2mbit; to_operator.telemetry: loss 5%". Or by name: lan, wifi, lte, low-orbit, intercontinental, satellite."""
     link_model: LinkModel = "datagram"
     """datagram loses and reorders messages as UDP does; stream keeps them in order as TCP does, and loss becomes

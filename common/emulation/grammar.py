@@ -132,6 +132,8 @@ def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
         p, *rest = words.shares("loss", ["p", "r", "1-h", "1-k"])
         # One probability alone is independent loss: the bad state is left as often as it is not entered.
         loss = GilbertElliott(p, *(rest or [1.0 - p]))
+    elif words.take_if("state"):
+        raise ConfigurationError(f"link {words.spec!r}: 'loss state' is not emulated; valid: {GRAMMAR['loss']}")
     else:
         words.take_if("random")
         loss = RandomLoss(*words.shares("loss", ["probability", "correlation"]))

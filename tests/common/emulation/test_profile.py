@@ -88,7 +88,7 @@ WORDS = (
         ("outage 0s at 1s", "duration_s = 0.0", "above 0"),
         ("rate 10mbit 42 48", "'48'", "delay TIME"),
         ("slot 1ms", "'slot' is unknown", "delay TIME"),
-        ("loss state 1%", "'state'", "0% to 100%"),
+        ("loss state 1%", "'loss state'", "gemodel"),
         ("delay 5ms 1ms distribution my.dist", "'my.dist'", "paretonormal, exponential"),
         ("outage 2s at 1s every 2s", "every 2.0 s", "longer than the 2 s"),
         ("retransmit 200ms", "'retransmit'", "retransmit TIME"),

@@ -91,6 +91,14 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
 
 
+def test_what_had_come_before_is_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
+    ours, theirs = pair
+    theirs.send(b"early")
+    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # which takes the signal
+        assert ours.poll(round(1e3 * PATIENT_S))
+    assert Inbox(ours, frames=1).has_some()
+
+
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
     robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
