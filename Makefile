@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel test-netem test-two-hosts test-containers test-console pictures figures latency-experiment soak lock clean
+.PHONY: demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures figures latency-experiment soak lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -57,6 +57,10 @@ test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual
 # Needs root and iproute2.
 test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, followed on two hosts in network namespaces
 	$(SUITE) -m two_hosts tests/two_hosts $(ARGS)
+
+# Needs root, iproute2 and /dev/net/tun: make wide-area ARGS="--loss 0 1 --control reno bbr --csv wide.csv"
+wide-area: $(VENV)/.installed $(VENV)/.kernels ## both sides over the kernel's own TCP with delay, loss, rate and queue: a table
+	$(BIN)/python -m tests.two_hosts.wide_area $(ARGS)
 
 test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
 	$(SUITE) -m netem tests/netem $(ARGS)

@@ -149,6 +149,8 @@ class SlidingQuantile:
             raise ValueError(f"probability = {probability}; valid: above 0, up to 1")
         self._window = window
         self._probability = probability
+        self._rank = math.ceil(probability * window) - 1
+        """The index of the quantile in a full window, sorted"""
         self._arrivals: deque[float] = deque()
         self._sorted: list[float] = []
         self.value: float | None = None
@@ -161,11 +163,14 @@ class SlidingQuantile:
         """
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
-        if len(self._arrivals) == self._window:
-            del self._sorted[bisect_left(self._sorted, self._arrivals.popleft())]
-        self._arrivals.append(value)
-        insort(self._sorted, value)
-        self.value = newest = self._sorted[math.ceil(self._probability * len(self._sorted)) - 1]
+        arrivals, ordered, rank = self._arrivals, self._sorted, self._rank
+        if len(arrivals) == self._window:
+            del ordered[bisect_left(ordered, arrivals.popleft())]
+        else:
+            rank = math.ceil(self._probability * (len(ordered) + 1)) - 1
+        arrivals.append(value)
+        insort(ordered, value)
+        self.value = newest = ordered[rank]
         return newest
 
     def clear(self) -> None:

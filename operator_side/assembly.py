@@ -20,4 +20,5 @@ def build_operator_side(
         swap_sides=settings.swap_sides,
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
+        full_rate=settings.full_rate,
     )

@@ -9,14 +9,13 @@ view payloads ─▶ receive_view ─▶ screen
 import math
 from typing import Any
 
-from common.command.live_view import LINK_LOST, LINK_REFUSED, LINK_UP
+from common.command.live_view import LINK_UP
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
-from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Compensation, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry
-from common.protocol.session import OWNING, SessionState
+from common.protocol.link_end import Arrival, LinkEnd
+from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
 from common.statistics import RunningStatistics
-from operator_side.commanding import STOPPING, StopButton, motion_command
+from operator_side.commanding import STOPPING, HeldCommand, StopButton, ToRobot, motion_command
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.feel.blindness import Blindness, Sight
@@ -50,8 +49,9 @@ class OperatorSide:
         swap_sides: bool = False,
         seed: int = 0,
         asymmetry_s: float = 0.0,
+        full_rate: bool = False,
     ) -> None:
-        """`swap_sides`: left and right of the controller swapped; `asymmetry_s`: see LinkEnd."""
+        """`swap_sides`: left and right of the controller swapped; the last two: see LinkEnd and HeldCommand."""
         self.link = LinkEnd("operator", epoch, clock_domain, seed, asymmetry_s)
         self.screen: Telemetry | None = None
         """The newest view of the robot; None before the first."""
@@ -78,6 +78,7 @@ class OperatorSide:
         )
         """What the fingers are told, and why."""
         self.stop_button = StopButton()
+        self.held_command = HeldCommand(full_rate=full_rate)
         self.tuner = Tuner()
         self._blindness = Blindness()
         self._standing = Standing()
@@ -107,33 +108,45 @@ class OperatorSide:
             if isinstance(error, OtherVersionError):
                 self.other_version = str(error)
             return
-        if not isinstance(message, Hello | LeaseNotice | StiffnessUpdate):
+        if not isinstance(message, Hello | LeaseNotice | LinkReport | StiffnessUpdate):
             self.rejected += 1
             return
         self.other_version = None
+        if isinstance(message, LinkReport):
+            # In a sequence of its own, which must not be taken for the order of what is felt.
+            if message.header.epoch == self.link.peer_epoch:
+                self._standing.note(message, now_s)
+            return
         known_epoch = self.link.peer_epoch
         arrival = self.link.arrived(message, now_s)
         if self.link.peer_epoch != known_epoch:
             self._standing.forget()
-        if isinstance(message, LeaseNotice) and arrival.fresh:
-            if self._standing.follow(message, now_s):
-                self.link.begin_anew()
-            if not self._standing.owns:
-                self._blindness.end()
-                self.stop_button.forget()
         if isinstance(message, StiffnessUpdate):
-            self.stiffness_received += 1
-            if message.state == "armed" and arrival.one_way_s is not None:
-                self.driving_delay.add(arrival.one_way_s)
-            if arrival.fresh:
-                self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
-                self._blindness.end()
-                self.stiffness, self.stiffness_s = message, now_s
-                self._has_been_armed |= message.state == "armed"
-                if message.state != "armed" and self._lost_s is not None and now_s > self._lost_s:
-                    self._lost_s = None
-                if arrival.one_way_s is not None:
-                    self.applied_age.add(arrival.one_way_s)
+            self._feel(message, arrival, now_s)
+        elif isinstance(message, LeaseNotice) and arrival.fresh:
+            self._follow(message, now_s)
+
+    def _feel(self, felt: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
+        self.stiffness_received += not arrival.copy
+        armed, one_way_s = felt.state == "armed", arrival.one_way_s
+        if armed and one_way_s is not None and not arrival.copy:
+            self.driving_delay.add(one_way_s)
+        if arrival.fresh:
+            self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
+            self._blindness.end()
+            self.stiffness, self.stiffness_s = felt, now_s
+            self._has_been_armed |= armed
+            if not armed and self._lost_s is not None and now_s > self._lost_s:
+                self._lost_s = None
+            if one_way_s is not None:
+                self.applied_age.add(one_way_s)
+
+    def _follow(self, notice: LeaseNotice, now_s: float) -> None:
+        if self._standing.follow(notice, now_s):
+            self.link.begin_anew()
+        if not self._standing.owns:
+            self._blindness.end()
+            self.stop_button.forget()
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; only the newest of the robot's present epoch is kept."""
@@ -182,40 +195,39 @@ class OperatorSide:
         """The controller went: what the hands did last counts no more, and not again before the arm has stopped."""
         self._intent, self._lost_s = None, now_s
 
-    def motion(self, now_s: float) -> list[bytes]:
+    def motion(self, now_s: float) -> list[ToRobot]:
         """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
         self._look(now_s)
         self._standing.expire(now_s)
         linked = self.stiffness is not None and now_s - self.stiffness_s < 2 * HEARTBEAT_PERIOD_S
-        payloads = []
-        command = self._command(now_s)
-        if self._standing.owns:
-            self.haptics.commanded(command, now_s)
-        else:
-            self.haptics.forget_commands()
-        if command is not None:
-            self.motion_sent += 1
-            payloads.append(encode(command))
-        if (command is None or not linked) and now_s - self._hello_s >= HEARTBEAT_PERIOD_S:
-            self._hello_s = now_s
-            payloads.append(encode(self.link.hello(now_s)))
-        if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
-            payloads.append(encode(tune))
-        return payloads
-
-    def _command(self, now_s: float) -> MotionCommand | None:
-        """What the hands do; None while there is no lease to send it under, or neither controller nor stop."""
+        messages = []
         lease = self.lease
-        if lease is None or not self._standing.owns:
+        intent = self._meant(now_s)
+        if intent is None or lease is None:
+            self.held_command.forget()
+            self.haptics.silent(now_s, owns=self._standing.owns)
+        elif (leaving := self.held_command.due(intent, lease.token, now_s)) is not None:
+            command = motion_command(self.link.stamp(now_s), intent, lease.token, self._compensation)
+            self.haptics.commanded(command)
+            self.motion_sent += 1
+            messages.append(leaving._replace(payload=encode(command)))
+        if (intent is None or not linked) and now_s - self._hello_s >= HEARTBEAT_PERIOD_S:
+            self._hello_s = now_s
+            messages.append(ToRobot(encode(self.link.hello(now_s)), everywhere=True))
+        if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
+            messages.append(ToRobot(encode(tune)))
+        return messages
+
+    def _meant(self, now_s: float) -> OperatorIntent | None:
+        """What the hands do; None while there is no lease to send it under, or neither controller nor stop."""
+        if self.lease is None or not self._standing.owns:
             return None
         state = None if self.stiffness is None else self.stiffness.state
         intent = STOPPING if self.stop_button.holds(now_s, state) else self._present_intent(now_s)
         # The arm may still be armed from before the controller was lost: then silence disarms it.
         if intent is None or (self._lost_s is not None and not intent.emergency_stop):
             return None
-        if self._blindness.holds:
-            intent = intent.resting()
-        return motion_command(self.link.stamp(now_s), intent, lease.token, self._compensation)
+        return intent.resting() if self._blindness.holds else intent
 
     def _present_intent(self, now_s: float) -> OperatorIntent | None:
         return None if now_s - self._intent_s > INTENT_EXPIRES_S else self._intent
@@ -259,6 +271,7 @@ class OperatorSide:
             "release_first": sight is Sight.WAITING,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
+        values |= self._standing.link_values(now_s)
         if screen is not None and values["link"] == LINK_UP:
             centre_m = screen.target_in_tool_m
             values |= {
@@ -269,17 +282,8 @@ class OperatorSide:
         return values
 
     def _link_status(self, now_s: float) -> str:
-        lease = self.lease
-        if self.other_version is not None:
-            return f"{LINK_REFUSED}{self.other_version}"
-        if lease is not None and lease.session is SessionState.OBSERVING:
-            return f"observing ({lease.place} of {lease.waiting} waiting)"
-        if lease is not None and lease.session not in OWNING:
-            return f"{LINK_REFUSED}{lease.why}"
         linked = self.stiffness is not None and now_s - self.stiffness_s <= STIFFNESS_EXPIRES_S
-        if linked and lease is not None:
-            return LINK_UP
-        return f"{LINK_LOST}nothing heard from the robot" if self.stiffness_received else "waiting for the robot side"
+        return self._standing.link_status(self.other_version, linked=linked, heard=self.stiffness_received > 0)
 
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""
@@ -299,6 +303,7 @@ class OperatorSide:
                 "to_operator": self.link.delay.summary_ms(),
                 "round_trip": self.link.round_trip.summary_ms(),
             },
+            "gaps": {"to_operator": self.link.gaps},
             "driving_delay_ms": {"to_operator": self.driving_delay.summary_ms()},
             "applied_age_ms": {"to_operator": self.applied_age.summary_ms()},
             "offset_ms": {"operator": self.link.offset_summary_ms()},

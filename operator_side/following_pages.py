@@ -2,7 +2,6 @@
 
 import functools
 
-from common.emulation.delay_line import DelayLine
 from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -10,6 +9,7 @@ from operator_side.facts import HandsFacts
 from operator_side.facts_of_core import Surroundings
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
+from operator_side.sending import Sending
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
 
@@ -61,18 +61,18 @@ def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSi
 
 def surroundings_of(
     core: OperatorSide,
-    line: DelayLine[bytes],
+    sending: Sending,
     pages: DrivingPage,
     shared: SharedHands | None,
     now_s: float,
     *,
     swap_sides: bool,
 ) -> Surroundings:
-    """Collect all that the facts of `now_s` need besides the core; `line`: to the robot side."""
+    """Collect all that the facts of `now_s` need besides the core."""
     lease = core.lease
     return Surroundings(
         hands="controller" if shared is None else shared.hands,
-        asked_to_robot=line.profile.words,
+        asked_to_robot=sending.asked,
         swap_sides=swap_sides,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,

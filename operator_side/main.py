@@ -12,9 +12,7 @@ from common.command.command_line import given_fields, parse_settings, run_comman
 from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
-from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import unused_clauses
-from common.emulation.tuned import tuned_link
 from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.keeping_up import KeepingUp
@@ -22,8 +20,10 @@ from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.priority import make_realtime, raise_priority
 from common.realtime.stages import Stages
 from common.recording.side import SideRecording, recording_to
+from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
+from operator_side.commanding import ToRobot
 from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
@@ -37,12 +37,12 @@ from operator_side.following_pages import follow_pages, shared_hands, surroundin
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
+from operator_side.sending import Sending
 from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
 from operator_side.terminal_view.status import TerminalStatus
 from operator_side.viewing import Viewing, view_topics
 
-MOTION_PERIOD_S = 1 / 250
 _HELPS = {
     "sockets": "a slower link",
     "messages": "a slower link",
@@ -70,13 +70,19 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
-    line: DelayLine[bytes] = DelayLine(link.profile("to_robot"))
     with (
-        OperatorSockets(settings.connect, settings.view_connect, topics=view_topics(settings), keys=keys) as sockets,
+        OperatorSockets(
+            settings.connect,
+            settings.view_connect,
+            topics=view_topics(settings),
+            keys=keys,
+            connections=settings.connections,
+        ) as sockets,
         StopSignal() as stop,
         TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
         recording_to(settings.record, "operator", OperatorEncoder()) as recording,
     ):
+        sending = Sending(link, sockets)
         core = build_recorded(settings, secrets.randbits(53), recording)
         if recording is not None:
             status.also = recording.note
@@ -96,7 +102,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
-            surroundings = functools.partial(surroundings_of, core, line, pages, person, swap_sides=settings.swap_sides)
+            surroundings = functools.partial(
+                surroundings_of, core, sending, pages, person, swap_sides=settings.swap_sides
+            )
             # The console before our own priority is raised, which it would inherit.
             viewing = Viewing(core, surroundings, status, pages, _console(settings, stack), recording)
             raise_priority()
@@ -105,7 +113,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             given = "calibration" in given_fields(arguments, OperatorSettings)
             people = _People(person, pages, viewing)
             travel = None if given else StoredTravel(connection, core, viewing.note)
-            loop = _Loop(settings, core, line, sockets, connection, guard, people, status, travel)
+            loop = _Loop(settings, core, sending, sockets, connection, guard, people, status, travel)
             loop.recording = recording
             failure: Exception | None = None
             try:
@@ -153,7 +161,7 @@ class _Loop:
         self,
         settings: OperatorSettings,
         core: OperatorSide,
-        line: DelayLine[bytes],
+        sending: Sending,
         sockets: OperatorSockets,
         connection: Connection,
         guard: ReleaseGuard | None,
@@ -167,13 +175,12 @@ class _Loop:
         self._travel = travel
         self._duration_s = settings.duration
         self._core = core
-        self._line = line
+        self._sending = sending
         self._sockets = sockets
         self._connection = connection
         self._guard = guard
         self._guard_s = 0.0
         self._person, self._pages, self._viewing = people
-        self._link = settings.link_spec()
         self._status = status
         self._clock = MonotonicClock()
         self._collection = IdleCollection(self._clock)
@@ -209,7 +216,7 @@ class _Loop:
                     self._use_idle_time(self._clock.now())
                 if (said := self._keeping_up.end(turned=moved)) is not None:
                     self._viewing.note(said)
-                wait_for_turn(self._pacer, self._clock, self._sockets.wait, self._line.next_due())
+                wait_for_turn(self._pacer, self._clock, self._sockets.wait, self._sending.next_due())
 
     def _take(self, received: Sequence[bytes], seen: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
         for payload in received:
@@ -224,8 +231,8 @@ class _Loop:
             self._connection.write(output, now_s)
 
     def _send(self) -> None:
-        for payload in self._line.pop(self._clock.now()):
-            self._sockets.send(payload)
+        if not self._sending.send(self._clock.now()):
+            self._core.held_command.forget()
 
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
@@ -234,7 +241,7 @@ class _Loop:
             "stages": {"operator": self._stages.summary()},
             "machine": {"operator": self._keeping_up.summary()},
             "pacing": {"operator": self._pacer.summary() | {"garbage": self._collection.summary()}},
-            "link": link_summary("to_robot", {"haptics": self._line}),
+            **self._sending.summary(),
             "pages": {"rejected": self._pages.rejected, "stale": self._pages.stale, "silences": self._pages.silences},
         }
 
@@ -243,8 +250,7 @@ class _Loop:
         follow_pages(self._pages, self._core, now_s)
         # Before anything else is sent: the wish arrives after all that took the old way.
         if (words := self._core.tuner.take_link()) is not None:
-            self._link = tuned_link(self._link, words)
-            self._line.change(self._link.profile("to_robot"))
+            self._sending.tune(words)
         if self._person is not None:
             self._person.tick(now_s, self._core.screen, self._core.link.round_trip.mean or 0.0)
         self._connection.update(now_s)
@@ -253,8 +259,8 @@ class _Loop:
             self._travel.follow()
         if (report := self._connection.read(now_s)) is not None:
             self._core.read_report(report, now_s)
-        for payload in [*self._core.motion(now_s), *self._viewing.requests(now_s)]:
-            self._line.push(now_s, payload)
+        self._sending.push([*self._core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
+        self._sending.measure(self._core.link.outgoing, now_s)
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
@@ -290,6 +296,7 @@ class _Loop:
         if self._person is not None:
             values["person"] = self._person.doing
         values["motion_overruns"] = self._pacer.overruns
+        values["queue_to_robot_ms"] = self._sending.queue_ms
         return values
 
 

@@ -12,7 +12,7 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
-from operator_side.commanding import StopButton
+from operator_side.commanding import StopButton, ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -67,11 +67,11 @@ class RecordedOperatorSide(OperatorSide):
         self._note((Kind.LOST, now_s, b""))
         super().controller_lost(now_s)
 
-    def motion(self, now_s: float) -> list[bytes]:
+    def motion(self, now_s: float) -> list[ToRobot]:
         """As the core's."""
-        payloads = super().motion(now_s)
-        self._note((Kind.MOTION, now_s, payloads))
-        return payloads
+        messages = super().motion(now_s)
+        self._note((Kind.MOTION, now_s, messages))
+        return messages
 
     def output_report(self, now_s: float) -> OutputReport | None:
         """As the core's."""
@@ -103,7 +103,7 @@ class OperatorEncoder:
         """When it happened, and its entries; view payloads go to `views`, too."""
         kind, now_s, content = noted
         if kind == Kind.MOTION:
-            sent = [entry(Kind.SENT, now_s, _HAPTICS, _NOBODY, payload) for payload in content]
+            sent = [entry(Kind.SENT, now_s, _HAPTICS, _NOBODY, message.payload) for message in content]
             return now_s, b"".join((entry(kind, now_s), *sent))
         if kind == Kind.OUTPUT:
             asked = entry(kind, now_s)

@@ -10,6 +10,7 @@ from msgspec import Meta
 from common.command.run_options import RunOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
+from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.settings import PersonSettings
@@ -34,6 +35,9 @@ class OperatorSettings(RunOptions):
     it in after: feelahead keys allow NAME KEY."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
     """With --keys: the robot side's public key, as shown on its machine by: feelahead keys show robot."""
+    connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
+    """Messages go to the robot side and back over several connections in turn. A packet that the network loses then
+    holds up a part of the messages, and newer ones overtake. 8 help where packets are lost in bursts."""
     realtime: bool = False
     """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     device: Literal["hid", "simulated", "browser"] = "hid"

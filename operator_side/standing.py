@@ -3,11 +3,14 @@
 import math
 from typing import Final
 
-from common.protocol.messages import LeaseNotice
+from common.command.live_view import LINK_LOST, LINK_REFUSED, LINK_UP
+from common.protocol.messages import LeaseNotice, LinkReport
 from common.protocol.session import OWNING, SessionState
 
 NOTICE_EXPIRES_S: Final = 0.5
 """Without a notice for this long nobody knows whose lease it is."""
+REPORT_EXPIRES_S: Final = 2.0
+"""A report of the link is shown for so long."""
 _ANEW_PERIOD_S: Final = 5.0
 """What is said of an ended epoch for so long after another began may still be about the one before."""
 _REMEMBERED: Final = 100
@@ -21,7 +24,8 @@ class Standing:
         """None before the first notice and once it has expired."""
         self.history: list[str] = []
         """Each standing that we had in turn, the latest ones."""
-        self._heard_s = 0.0
+        self._heard_s = self._reported_s = 0.0
+        self._report: LinkReport | None = None
         self._anew_s = -math.inf
 
     @property
@@ -31,14 +35,43 @@ class Standing:
 
     def follow(self, notice: LeaseNotice, now_s: float) -> bool:
         """Another notice arrived; whether it asks us to start anew, because the robot side forgot us."""
+        anew = now_s - self._anew_s < _ANEW_PERIOD_S
+        known = None if self.lease is None else self.lease.session
+        if anew and notice.session is SessionState.ENDED and known not in (None, SessionState.ENDED):
+            return False  # the epoch before, by a slower connection
         standing = "owner" if notice.session in OWNING else str(notice.session)
         if not self.history or self.history[-1] != standing:
             self.history = [*self.history, standing][-_REMEMBERED:]
         self.lease, self._heard_s = notice, now_s
-        if notice.session is not SessionState.ENDED or now_s - self._anew_s < _ANEW_PERIOD_S:
+        if notice.session is not SessionState.ENDED or anew:
             return False
         self._anew_s = now_s
         return True
+
+    def note(self, report: LinkReport, now_s: float) -> None:
+        """A report of the link arrived; one that was overtaken counts no more."""
+        known = self._report
+        if known is None or report.header.epoch != known.header.epoch or report.header.sequence > known.header.sequence:
+            self._report, self._reported_s = report, now_s
+
+    def link_values(self, now_s: float) -> dict[str, float | str | None]:
+        """The newest report as status values; none where it is old."""
+        if self._report is None or now_s - self._reported_s > REPORT_EXPIRES_S:
+            return {}
+        return self._report.values()
+
+    def link_status(self, other_version: str | None, *, linked: bool, heard: bool) -> str:
+        """The link in words. linked: stiffness comes; heard: some came once."""
+        lease = self.lease
+        if other_version is not None:
+            return f"{LINK_REFUSED}{other_version}"
+        if lease is not None and lease.session is SessionState.OBSERVING:
+            return f"observing ({lease.place} of {lease.waiting} waiting)"
+        if lease is not None and lease.session not in OWNING:
+            return f"{LINK_REFUSED}{lease.why}"
+        if linked and lease is not None:
+            return LINK_UP
+        return f"{LINK_LOST}nothing heard from the robot" if heard else "waiting for the robot side"
 
     def expire(self, now_s: float) -> None:
         """Nothing is known any more once the last notice is too old."""

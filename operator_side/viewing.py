@@ -7,9 +7,10 @@ from typing import Final
 from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import RemoteProtocolError
-from common.protocol.codec import claims_to_be, decode_view, encode
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, claims_to_be, decode_view, encode
 from common.protocol.messages import Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
+from common.rate.pieces import PIECE, Joining
 from common.recording.entries import Kind
 from common.recording.side import SideRecording
 from operator_side.console.console import Console
@@ -81,7 +82,10 @@ class Viewing:
         self._surroundings = surroundings
         self._status = status
         self._figures = SceneFigures()
+        self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
         self._told: str | None = None
+        self._asked = False
+        """Whether the newest Watch asks for a whole picture"""
         self._watch_s = self._facts_s = -math.inf
 
     def note(self, text: str) -> None:
@@ -91,9 +95,13 @@ class Viewing:
             self.console.note(text)
 
     def take(self, topic: bytes, payload: bytes) -> bool:
-        """Whether a view payload is for who looks, and not for the core."""
-        if topic not in (VIDEO_TOPIC, SCENE_TOPIC):
+        """Whether a view payload is for those who look, and not for the core; pieces are put together first."""
+        of, is_piece, _ = topic.partition(PIECE)
+        if of not in self._joining:
             return False
+        if is_piece:
+            whole = self._joining[of].take(payload)
+            return whole is None or self.take(of, whole)
         if topic == SCENE_TOPIC and self._status.wants_facts:
             self._figures.take(payload)
         if self.console is not None:
@@ -105,10 +113,12 @@ class Viewing:
         if self.console is not None:
             hear_pages(self.console, self._pages, now_s)
         pages = self.console is not None and self.console.pages > 0
-        if not (pages or self._status.wants_facts) or now_s - self._watch_s < _WATCH_PERIOD_S:
+        lacks = None if self.console is None else self.console.lacks
+        stands_still = lacks is not None and any(lacks) and not self._asked
+        if not (pages or self._status.wants_facts) or (now_s - self._watch_s < _WATCH_PERIOD_S and not stands_still):
             return []
-        self._watch_s = now_s
-        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True)
+        self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True, lacks=lacks)
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]

@@ -10,16 +10,15 @@ import numpy as np
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
-from robot_side.ahead.law import Law
-from robot_side.ahead.paper_law import PaperLaw
-from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.port import Arm
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotSide
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.laws.law import Law
+from robot_side.laws.paper import PaperLaw
+from robot_side.laws.swept import SweptLaw
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
@@ -33,13 +32,14 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 from robot_side.simulation.true_contact import TrueContact
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
-_FOR_BOXES = frozenset({"overlap_boxes", "precise_boxes"})
-_FOR_TETRAHEDRA = frozenset({"overlap_tetrahedra", "precise_tetrahedra"})
-"""Kernels that run for such primitives alone; those for meshes are not even imported without them."""
+_LIBRARY = ("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise.")
+"""Batches and precise forms are for programs that use the overlaps as a library: no tick calls them."""
 
 
 class SimulationObserver:
@@ -73,17 +73,15 @@ class Assembled:
 
     @property
     def kernels(self) -> list[Compiled]:
-        """What ticks may run: a scene without boxes, or without tetrahedra, needs no kernels for them.
+        """What ticks may run: a scene without primitives of a kind needs no kernel for their overlaps.
 
         Its primitives are the same throughout, and counted here with those of the objects that are ignored now.
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
-        unneeded: set[str] = set()
-        if not len(seen.box_object):
-            unneeded |= _FOR_BOXES
-        if not len(seen.tetrahedron_object):
-            unneeded |= _FOR_TETRAHEDRA
-        return [kernel for kernel in imported_kernels() if kernel.name.rpartition(".")[2] not in unneeded]
+        unneeded = {kind.kernel for kind in KINDS if not len(getattr(seen, kind.owner))}
+        return [
+            kernel for kernel in imported_kernels() if kernel not in unneeded and not kernel.name.startswith(_LIBRARY)
+        ]
 
 
 def assemble(
@@ -125,18 +123,21 @@ def assemble(
     # Before the first tick, as a search for spheres takes far longer than one.
     held_covers = HeldCovers(_as_loaded(scene, scene.roles), settings.cover_m, scene.fixed, searching)
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
+    surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
     law = (SweptLaw if settings.law == "swept" else PaperLaw)(
         settings.uncertainty(prediction),
         np.full(arm.joint_count, encoder.standard_deviation_rad()),
         joint_limits,
         settings.motion,
+        surroundings,
     )
     core = side(
         arm if watch is None else watch(arm),
         kinematics,
         camera,
         law if other_law is None else other_law(law),
+        surroundings,
         OperatorSession(
             lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
             Safety(settings.safety),
@@ -151,6 +152,7 @@ def assemble(
         seed=settings.seed,
         notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
         held_covers=held_covers,
+        full_rate=settings.full_rate,
     )
     return Assembled(core, scene, kinematics, law, arm)
 

@@ -7,13 +7,14 @@ arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemet
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import msgspec
 import numpy as np
 
 from common.arrays import FloatArray
 from common.command.live_view import LINK_LOST, LINK_UP
+from common.protocol.codec import encode
 from common.statistics import RunningStatistics
 from common.timing.ages import LoopAge
-from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import commanded
 from robot_side.arm.joint_estimate import JointEstimate
@@ -24,14 +25,16 @@ from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.objects.perceived import ObjectSource, PerceivedObjects, Role
-from robot_side.objects.target import next_target, object_center, object_centers, target_index
+from robot_side.laws.law import Law, Sensed, Situation
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
-from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry_message
+from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry
+from robot_side.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
 from robot_side.placing import scaled
+from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.surroundings.surroundings import Surroundings
+from robot_side.surroundings.target import next_target, object_centers
 
-TELEMETRY_PERIOD_S = 0.02
 OBSERVER_PERIOD_S = 0.02
 """How often those who only observe are told the stiffness."""
 TRUTH_PERIOD_S = 0.01
@@ -60,6 +63,7 @@ class RobotSide:
         kinematics: GripperKinematics,
         camera: ObjectSource,
         law: Law,
+        surroundings: Surroundings,
         session: OperatorSession,
         loop_age: LoopAge,
         limits: JointLimits,
@@ -70,17 +74,18 @@ class RobotSide:
         seed: int = 0,
         notes: Sequence[str] = (),
         held_covers: HeldCovers | None = None,
+        full_rate: bool = False,
     ) -> None:
-        """assists: cap the speed along the triggers (see `speed_assist`)."""
+        """assists: cap the speed along the triggers (see `speed_assist`). full_rate: a stiffness in every tick."""
         self.notes = tuple(notes)
         """What a person should know about the scene before the run."""
-        self.figures = RunFigures(seed)
+        self.figures, self.stiffness_sent = RunFigures(seed), 0
         self.session = session
-        self.stiffness_sent = 0
         self._arm = arm
         self._kinematics = kinematics
         self._camera = camera
         self._law = law
+        self._surroundings = surroundings
         self._loop_age = loop_age
         self._limits = limits
         self._motion = motion
@@ -92,7 +97,7 @@ class RobotSide:
         self._held_covers = held_covers
         self._start_s: float | None = None
         self._held: HeldObject | None = None
-        self._held_s = -np.inf
+        self._held_s = self._next_observers_s = self._next_truth_s = -np.inf
         self._measured: ArmState | None = None
         self._frame: PerceivedObjects | None = None
         self._target: int | None = None
@@ -100,9 +105,9 @@ class RobotSide:
         self.newest: tuple[Sensed, Situation] | None = None
         """What the last tick found out, and where."""
         self._loop_age_s = RunningStatistics(seed)
-        self._next_telemetry_s = -np.inf
-        self._next_observers_s = -np.inf
-        self._next_truth_s = -np.inf
+        self.felt = StiffnessDeadband(full_rate=full_rate)
+        """When a stiffness leaves"""
+        self._seen = TelemetryDeadband()
 
     @property
     def held(self) -> str | None:
@@ -124,16 +129,17 @@ class RobotSide:
         self.session.update(now_s)
         if self.session.take_owner_changed():
             self._loop_age.reset()
+            self.felt.forget()
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
-            self._loop_age.update(age_s, now_s)
-        delay_s = self._loop_age.value(now_s)
-        if age_s is not None:
+            delay_s = self._loop_age.update(age_s, now_s)
             self._loop_age_s.add(delay_s)
+        else:
+            delay_s = self._loop_age.value(now_s)
         self._measured = self._arm.state(now_s)
         state = self._joints.update(self._measured)
         pose = self._kinematics.pose(state)
-        objects = self._perceive(now_s)
+        objects = self.see(now_s) if self._frame is None else self._frame
         self._follow_target(objects, pose)
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
@@ -155,21 +161,24 @@ class RobotSide:
         self.newest = sensed, situation
         speed_m_s = tool_speed_m_s(pose.tool_jacobian, state.joint_velocities_rad_s)
         self._record(sensed, speed_m_s, permission.state == "armed", now_s)
-        return self._outgoing(permission, pose, objects, state, sensed, speed_m_s, now_s)
+        return self._outgoing(permission, situation, state, sensed, speed_m_s, now_s)
 
-    def _perceive(self, now_s: float) -> PerceivedObjects:
+    def see(self, now_s: float) -> PerceivedObjects:
+        """Take in the camera's newest frame, from the next tick on: no message waits for what is made of it."""
         objects = self._camera.perceive(now_s)
         if objects is not self._frame:
+            self._surroundings.see(objects)
             self._frame = objects
-            self._target = target_index(objects)
-            self._target_m = None if self._target is None else object_center(objects, self._target)
+            self._target = self._surroundings.target(objects)
+            self._target_m = None if self._target is None else self._surroundings.center_m(objects, self._target)
         return objects
 
     def _follow_target(self, objects: PerceivedObjects, pose: GripperPose) -> None:
         """Make the next object the target, once for each press of the button."""
         if not self.session.take_next_target():
             return
-        chosen = next_target(objects, object_centers(objects), pose.tool_position_m, pose.tool_rotation[:, 2])
+        where = object_centers(objects), pose.tool_position_m, pose.tool_rotation[:, 2]
+        chosen = next_target(objects, self._target, *where)
         if chosen is None or self._held is not None:
             return
         if self._target is not None:
@@ -183,7 +192,7 @@ class RobotSide:
         if self._held is not None and state.time_s - self._held_s > _LET_GO_S:
             self._held = None
         elif self._held is None and state.gripper_holding:
-            index = gripped_object(objects, pose.tool_position_m, state.gripper_opening_m)
+            index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
             if index is not None:
                 self._held = grip(objects, index, pose, self._held_covers)
 
@@ -204,12 +213,12 @@ class RobotSide:
 
     def _record(self, sensed: Sensed, speed_m_s: float, armed: bool, now_s: float) -> None:
         self.figures.tick(sensed, speed_m_s, armed=armed)
-        target = self._target
-        held = self._held is not None and self._held.index == target
+        held = self._held is not None and self._held.index == self._target
         self.figures.task(armed, held, self._target_m, now_s)
 
     def observe(self, now_s: float) -> None:
-        """After the messages of the tick at `now_s` have left: note what was true, where somebody sees it."""
+        """After the messages of the tick at `now_s` have left: see, and note what was true, where somebody knows it."""
+        self.see(now_s)
         self.figures.reckon()
         if self._observer is not None:
             self._observer.watch(self.figures, now_s - (self._start_s or 0.0))
@@ -220,36 +229,29 @@ class RobotSide:
     def _outgoing(
         self,
         permission: Permission,
-        pose: GripperPose,
-        objects: PerceivedObjects,
+        situation: Situation,
         state: ArmState,
         sensed: Sensed,
         speed_m_s: float,
         now_s: float,
     ) -> list[Outgoing]:
-        outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in self.session.take_answers(now_s)]
-        if (owner := self.session.owner(now_s)) is not None:
+        session, told_m_s = self.session, self._told_m_s
+        outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
+        if session.owner_peer is not None and self.felt.due(
+            sensed, told_m_s, permission.state, permission.command, now_s
+        ):
             self.stiffness_sent += 1
-            outgoing.append(stiffness_message(owner, sensed, self._told_m_s, permission.state))
+            outgoing += [stiffness_message(one, sensed, told_m_s, permission.state) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
-            observers = self.session.observers(now_s)
-            outgoing += [stiffness_message(one, sensed, self._told_m_s, permission.state) for one in observers]
-        if now_s >= self._next_telemetry_s:
-            self._next_telemetry_s = now_s + TELEMETRY_PERIOD_S
-            target, target_m = self._target, self._target_m
-            outgoing.append(
-                telemetry_message(
-                    self.session.view_header(now_s),
-                    permission.state,
-                    pose,
-                    sensed,
-                    speed_m_s=speed_m_s,
-                    gripper_opening_m=state.gripper_opening_m,
-                    target=None if target is None or target_m is None else (objects.names[target], target_m),
-                    holding=self._held is not None,
-                )
-            )
+            outgoing += [stiffness_message(one, sensed, told_m_s, permission.state) for one in session.observers(now_s)]
+        holding = self._held is not None
+        if self._seen.may_be_due((session.lease.token, permission.state, self._target, holding), now_s):
+            target = None if self._target is None else (situation.objects.names[self._target], self._target_m)
+            view = telemetry(permission.state, situation.pose, sensed, speed_m_s, state, target, holding=holding)
+            if self._seen.due(view, now_s):
+                view = msgspec.structs.replace(view, header=session.view_header(now_s))
+                outgoing.append(Outgoing("telemetry", b"", encode(view)))
         return outgoing
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:
@@ -269,10 +271,10 @@ class RobotSide:
             "L2_pulled": None if command is None else command.l2,
             "R2_pulled": None if command is None else command.r2,
         }
-        if self.newest is not None:
-            sensed, (pose, objects) = self.newest[0], (self.newest[1].pose, self.newest[1].objects)
+        if self.newest is not None and (objects := self._frame) is not None:
+            sensed, pose = self.newest[0], self.newest[1].pose
             target, held = self._target, None if self._held is None else self._held.index
-            apart = perceived_distances(pose, objects, target, held)
+            apart = perceived_distances(pose, self._surroundings.see(objects), target, held)
             values |= {
                 "L2": sensed.l2.stiffness,
                 "R2": sensed.r2.stiffness,
@@ -299,6 +301,7 @@ class RobotSide:
             },
             "lease": self.session.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
+            "gaps": {"to_robot": self.session.link.gaps},
             "driving_delay_ms": {"to_robot": self.session.driving_delay.summary_ms()},
             "loop_age_ms": self._loop_age_s.summary_ms(),
             "applied_age_ms": {"to_robot": self.session.applied_age.summary_ms()},

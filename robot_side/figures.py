@@ -9,9 +9,9 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.statistics import BLOCK, RunningStatistics
-from robot_side.ahead.law import Sensed
-from robot_side.objects.perceived import Role
+from robot_side.laws.law import Sensed
 from robot_side.placing import Placing, scaled
+from robot_side.surroundings.perceived import Role
 
 if TYPE_CHECKING:
     from robot_side.simulation.ground_truth import Truth

@@ -2,11 +2,11 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection
-from typing import Any, Final
+from collections.abc import Collection
+from typing import Any, Final, Protocol
 
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, encode
-from common.protocol.view_messages import VIEW_NAMES, VideoFrame, ViewName
+from common.protocol.view_messages import VIEW_NAMES, ViewName
 from common.statistics import RunningStatistics
 from robot_side.cameras.pictures import Cameras
 from robot_side.core import RobotSide
@@ -16,11 +16,30 @@ from robot_side.scene_view import SceneView, TickFigures
 SCENE_PERIOD_S: Final = 1.0 / 30.0
 SHAPES_PERIOD_S: Final = 3.0
 _SHAPES_BYTES_PER_S: Final = 400_000.0
-"""Large shapes are repeated less often, so that they take no more of a link than this."""
+_SHAPES_SHARE: Final = 0.1
+"""Large shapes are repeated less often, so that they take no more of a link than this, in bytes and as a share."""
 _BACKLOG_S: Final = 0.03
-"""While so much waits in an emulated link, nothing more is made for it: the newest is worth more than the next."""
+"""While that much waits to leave, nothing more is made: the newest is worth more than the next."""
 _SEEN_TO_S: Final = 0.1
 _FIGURES_S: Final = 1.0
+
+
+class Room(Protocol):
+    """The room that a link has for what is made here."""
+
+    @property
+    def left_bit_s(self) -> float:
+        """Bits a second that are left for it."""
+        ...
+
+    @property
+    def begins(self) -> bool:
+        """Whether the link has shown no limit yet."""
+        ...
+
+    def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
+        """Seconds that a message made for `stream` now would wait for those before it."""
+        ...
 
 
 class Looking:
@@ -31,24 +50,22 @@ class Looking:
         core: RobotSide,
         scene_view: SceneView,
         cameras: Cameras | None,
-        backlog_s: Callable[[OutgoingStream, float], float],
+        room: Room,
         *,
         always: Collection[str] = (),
         seed: int = 0,
     ) -> None:
-        """always: of `overview`, `first_person` and `scene`, what is made although nobody looks: it is recorded.
-
-        backlog_s: how long what is pushed now would wait for what already waits in a stream of the link.
-        """
+        """always: of `overview`, `first_person` and `scene`, what is made although nobody looks: it is recorded."""
         self._core = core
         self._scene_view = scene_view
         self._cameras = cameras
-        self._backlog_s = backlog_s
+        self._room = room
         self._always = frozenset(always)
         self._ticks_s: deque[float] = deque(maxlen=1000)
         self._ticks = TickFigures()
         self._next_figures_s = self._next_look_s = -math.inf
         self._next_s: dict[str, float] = {}
+        self._late: set[str] = set()
         self._next_shapes_s = -math.inf
         self._begun = -1
         self._counts = {name: {"sent": 0, "nobody_looks": 0, "behind": 0} for name in (*VIEW_NAMES, "scene")}
@@ -73,7 +90,7 @@ class Looking:
                 counts["nobody_looks"] += turns
             elif turns:
                 due.add(name)
-        outgoing = self._pictures(now_s, taken_s, due)
+        outgoing = self._pictures(now_s, taken_s, due, looked_at)
         if "scene" in looked_at:
             outgoing += self._scene(now_s, taken_s, is_due="scene" in due)
         return outgoing
@@ -88,6 +105,14 @@ class Looking:
         age = {f"p{q}": None if (s := self._frame_age.quantile(q / 100)) is None else 1e3 * s for q in (50, 99)}
         return counts | {"companion": {"starts": starts, "picture_ms": middle, "picture_age_ms": age}}
 
+    @property
+    def pictures(self) -> dict[str, float | int] | None:
+        """Pictures as they are made now: `rate_hz`, `quality`, `size` (share of the width); None without cameras."""
+        if self._cameras is None:
+            return None
+        step = self._cameras.giving_way.step
+        return {"rate_hz": step.rate_hz, "quality": step.quality, "size": 0.5 if step.halved else 1.0}
+
     def close(self) -> None:
         """End the companion."""
         if self._cameras is not None:
@@ -95,7 +120,8 @@ class Looking:
 
     def _turns(self, name: str, now_s: float) -> int:
         """How often something has become due since this was last asked; 0 for not yet."""
-        period_s = SCENE_PERIOD_S if name == "scene" or self._cameras is None else self._cameras.period_s
+        rate_hz = None if name == "scene" or self._cameras is None else self._cameras.giving_way.step.rate_hz
+        period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
         # The views take turns, so that neither waits for the other.
         next_s = self._next_s.setdefault(name, now_s + (0.5 * period_s if name == VIEW_NAMES[1] else 0.0))
         if now_s < next_s:
@@ -104,30 +130,34 @@ class Looking:
         self._next_s[name] = next_s + turns * period_s
         return turns
 
-    def _pictures(self, now_s: float, taken_s: float, due: Collection[str]) -> list[Outgoing]:
+    def _pictures(
+        self, now_s: float, taken_s: float, due: Collection[str], looked_at: frozenset[str]
+    ) -> list[Outgoing]:
         cameras = self._cameras
         if cameras is None:
             return []
+        views = len(looked_at & set(VIEW_NAMES))
+        # What is recorded is JPEG: replay and export begin anywhere.
+        lacks = None if self._always else self._core.session.watchers.lacks(now_s)
+        h264 = cameras.makes_h264(lacks)
+        cameras.giving_way.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
         wanted: list[ViewName] = []
+        full = self._room.backlog_s("video", now_s) > _BACKLOG_S
+        # A late view comes as soon as there is room: at its next turn, the other one could again be before it.
+        self._late &= looked_at
         for name in VIEW_NAMES:
-            if name in due and cameras.works:
-                if cameras.busy(name) or self._backlog_s("video", now_s) > _BACKLOG_S:
-                    self._counts[name]["behind"] += 1
+            if cameras.works and (name in due or name in self._late):
+                if cameras.busy(name) or full:
+                    self._counts[name]["behind"] += name in due
+                    self._late.add(name)
                 else:
+                    self._late.discard(name)
                     wanted.append(name)
         outgoing = []
-        for picture in cameras.update(now_s, taken_s, wanted):
+        for picture in cameras.update(now_s, taken_s, wanted, lacks):
             self._counts[picture.view]["sent"] += 1
             self._frame_age.add(now_s - picture.captured_s)
-            width, height = cameras.size
-            frame = VideoFrame(
-                self._core.session.shown_header(now_s),
-                view=picture.view,
-                captured_s=picture.captured_s,
-                width=width,
-                height=height,
-                jpeg=picture.jpeg,
-            )
+            frame = cameras.message(picture, self._core.session.shown_header(now_s))
             outgoing.append(Outgoing("video", b"", encode(frame)))
         return outgoing
 
@@ -144,12 +174,13 @@ class Looking:
         if not view.work_on_shapes() or view.shapes is None:
             return []
         if now_s >= self._next_shapes_s:
-            self._next_shapes_s = now_s + max(SHAPES_PERIOD_S, view.shapes_bytes / _SHAPES_BYTES_PER_S)
+            most_bytes_per_s = min(_SHAPES_BYTES_PER_S, _SHAPES_SHARE * self._room.left_bit_s / 8.0)
+            self._next_shapes_s = now_s + max(SHAPES_PERIOD_S, view.shapes_bytes / most_bytes_per_s)
             if view.shapes_bytes > VIEW_MAXIMUM_BYTES:
                 return []
             self._shapes_sent += 1
             return [Outgoing("scene", b"", view.shapes.under(session.shown_header(now_s)))]
-        if is_due and self._backlog_s("scene", now_s) > _BACKLOG_S:
+        if is_due and self._room.backlog_s("scene", now_s) > _BACKLOG_S:
             self._counts["scene"]["behind"] += 1
         elif is_due:
             view.begin_state(sensed, situation, taken_s)

@@ -11,8 +11,7 @@ from common.command.command_line import parse_settings, run_command
 from common.command.live_view import SLOW
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
-from common.emulation.delay_line import BitFlip, DelayLine, link_summary
-from common.emulation.spec import LinkSpec, Stream, unused_clauses
+from common.emulation.spec import LinkSpec, unused_clauses
 from common.emulation.tuned import tuned_link
 from common.files.output_file import write_json
 from common.protocol.view_messages import VIEW_NAMES
@@ -30,10 +29,11 @@ from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.pictures import Cameras
 from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
+from robot_side.link_reporter import LinkReporter
 from robot_side.looking import Looking
-from robot_side.outgoing_messages import TOPICS, Outgoing
 from robot_side.recorded import RobotEncoder, recorded_by, recorded_status, robot_header
 from robot_side.scene_view import SceneView
+from robot_side.sending import SENT_STREAMS, Sending
 from robot_side.settings import RobotSettings
 from robot_side.timed import HELPS, STAGES, TimedArm, TimedLaw
 
@@ -45,7 +45,6 @@ _COMPILING = (
     "compiling for this processor, about half a minute; the next start is quick (to do it beforehand: feelahead doctor"
     " --compile)"
 )
-SENT_STREAMS: tuple[Stream, ...] = ("haptics", "telemetry", "video", "scene")
 
 
 def main() -> None:
@@ -117,10 +116,6 @@ def command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _corrupted(message: Outgoing, flip: BitFlip) -> Outgoing:
-    return message._replace(payload=flip(message.payload))
-
-
 class _Loop:
     """Ticks at absolute deadlines, messages as they come, and all that may wait after the tick's messages have left."""
 
@@ -149,16 +144,17 @@ class _Loop:
         self._tick_time = RunningStatistics(settings.seed)
         self._tick_cpu_time = RunningStatistics(settings.seed)
         self._latest_tick_times_s: deque[float] = deque(maxlen=1000)
-        self._lines: dict[Stream, DelayLine[Outgoing]] = {
-            stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
-        }
+        self._sending = Sending(link, sockets, secrets.randbits(32))
         self._looking = Looking(
             core,
             SceneView(SceneModel(assembled.scene), assembled.kinematics, assembled.law),
             Cameras(assembled.scene, settings.cameras, status.note) if settings.cameras.on else None,
-            lambda stream, now_s: self._lines[stream].backlog_s(now_s),
+            self._sending,
             always=() if recording is None else (*VIEW_NAMES, "scene"),
             seed=settings.seed,
+        )
+        self._reporter = LinkReporter(
+            core.session, self._sending.budget, lambda: self._looking.pictures, sockets.tcp_figures
         )
         self._collection = IdleCollection(self._clock)
         self._start_s = self._clock.now()
@@ -191,12 +187,11 @@ class _Loop:
                     self._tick(now_s)
                 send()
                 if ticked:
-                    self._core.observe(now_s)
                     self._use_idle_time(self._clock.now(), now_s)
+                    self._core.observe(now_s)
                 if (said := self._keeping_up.end(turned=ticked)) is not None:
                     self._status.note(said)
-                dues_s = [due_s for line in self._lines.values() if (due_s := line.next_due()) is not None]
-                wait_for_turn(self._pacer, self._clock, self._sockets.wait, min(dues_s, default=None))
+                wait_for_turn(self._pacer, self._clock, self._sockets.wait, self._sending.next_due())
 
     def summary(self) -> dict[str, Any]:
         """The process's part of the run's figures."""
@@ -210,9 +205,8 @@ class _Loop:
             "stages": {"robot": stages},
             "machine": {"robot": self._keeping_up.summary()},
             **paced,
-            "link": link_summary(
-                "to_operator", {name: line for name, line in self._lines.items() if line.figures.sent}
-            ),
+            "link": self._sending.summary(),
+            "rate": {"robot": self._sending.budget.summary() | {"pictures": self._looking.pictures}},
             "simulation": {"share_of_real_time": self._arm.share_of_real_time},
             "looked_at": self._looking.summary(),
             "pacing": {"robot": paced | {"garbage": self._collection.summary()}},
@@ -230,23 +224,18 @@ class _Loop:
         self._pacer.begin(now_s)
         self._admission.begin_tick()
         began_s, computed_s = self._clock.now(), self._computed.now()
+        self._core.felt.interval_s = self._sending.budget.haptic_interval_s
         outgoing = self._core.tick(now_s)
         self._tick_cpu_time.add(self._computed.now() - computed_s)
         took_s = self._clock.now() - began_s
         self._tick_time.add(took_s)
         self._latest_tick_times_s.append(took_s)
         self._looking.ticked(took_s, self._pacer.overruns)
-        for message in outgoing:
-            self._lines[message.stream].push(now_s, message, len(message.payload))
+        self._sending.push(outgoing, now_s)
 
     def _send(self) -> None:
-        due_s = self._clock.now()
-        for line in self._lines.values():
-            for message in line.pop(due_s):
-                if message.stream == "haptics":
-                    self._sockets.send(message.peer, message.payload)
-                else:
-                    self._sockets.publish(TOPICS[message.stream], message.payload)
+        session = self._core.session
+        self._sending.send(None if session.owner_peer is None else session.link.outgoing, self._clock.now())
 
     def _paced(self) -> dict[str, float | int]:
         """The ticks since this was last asked for."""
@@ -274,15 +263,17 @@ class _Loop:
     def _use_idle_time(self, now_s: float, ticked_s: float) -> None:
         """What no tick should wait for. ticked_s: the newest tick's `now`."""
         seen = self._looking.idle(now_s, ticked_s)
-        for message in seen:
-            self._lines[message.stream].push(now_s, message, len(message.payload))
+        self._sending.push(seen, now_s)
         if self._recording is not None:
             for message in seen:
                 self._recording.view(now_s, message.payload)
-            for text in self._recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+            for text in self._recording.idle(
+                now_s, lambda: recorded_status(self._core, now_s) | self._reporter.status()
+            ):
                 self._status.note(text)
+        self._sending.push(self._reporter.due(now_s), now_s)
         if self._status.due(now_s):
-            self._status.show(now_s, self._core.status(now_s) | self._paced())
+            self._status.show(now_s, self._core.status(now_s) | self._paced() | self._reporter.status())
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
@@ -293,8 +284,7 @@ class _Loop:
             self._status.note(text)
         if (words := tuning.take_link()) is not None:
             self._link = tuned_link(self._link, words)
-            for stream, line in self._lines.items():
-                line.change(self._link.profile("to_operator", stream))
+            self._sending.change(self._link)
         self._collection.idle(now_s, resting=self._core.session.safety.state != "armed")
 
 

@@ -8,8 +8,8 @@ from common.arrays import FloatArray
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
-from robot_side.ahead.law import Sensed
-from robot_side.arm.port import GripperPose
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.laws.law import Sensed
 from robot_side.operators.operator_session import Receiver
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
@@ -18,16 +18,19 @@ TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video"
 
 SHOWN_NAME = 100
 """Characters of an object's name that are sent and shown; a message has a limit."""
+_NO_HEADER = Header(0, 0, 0.0)
 _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 """A simulation about to become unstable shows wild figures, and must get as far as saying so."""
 
 
 class Outgoing(NamedTuple):
-    """One payload to send: haptics to `peer` over the control port, all else to whoever looks."""
+    """One payload to send: haptics to `peer` over the control port, all else to all who look."""
 
     stream: OutgoingStream
     peer: bytes
     payload: bytes
+    everywhere: bool = False
+    """Over every connection of `peer`, as something that must arrive soon; else over the next in turn."""
 
 
 def stiffness_message(receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState) -> Outgoing:
@@ -42,39 +45,40 @@ def stiffness_message(receiver: Receiver, sensed: Sensed, told_m_s: float, state
         state=state,
         told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
     )
-    return Outgoing("haptics", receiver.peer, encode(update))
+    return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
 
 
-def telemetry_message(
-    header: Header,
+def telemetry(
     state: MotionState,
     pose: GripperPose,
     sensed: Sensed,
-    *,
     speed_m_s: float,
-    gripper_opening_m: float,
-    target: tuple[str, FloatArray] | None,
+    arm: ArmState,
+    target: tuple[str, FloatArray | None] | None,
+    *,
     holding: bool,
-) -> Outgoing:
-    """What anyone who looks is shown; `target` is a name and where its centre (3,) is, in metres, NaN where unknown."""
+) -> Telemetry:
+    """What anyone who looks is shown, still without a header.
+
+    `target`: a name and where its centre (3,) is, in metres, NaN where unknown.
+    """
     target_in_tool = None
-    if target is not None and np.isfinite(target[1]).all():
+    if target is not None and target[1] is not None and np.isfinite(target[1]).all():
         target_in_tool = (target[1] - pose.tool_position_m) @ pose.tool_rotation
-    view = Telemetry(
-        header,
+    return Telemetry(
+        _NO_HEADER,
         state=state,
         tool_position_m=_vector3(pose.tool_position_m),
         tool_speed_m_s=min(speed_m_s, _FASTEST_M_S),
         target=None if target is None else target[0][:SHOWN_NAME],
         target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
         up_in_tool=_vector3(pose.tool_rotation[2]),
-        gripper_opening_m=max(0.0, gripper_opening_m),
+        gripper_opening_m=max(0.0, arm.gripper_opening_m),
         holding=holding,
         enlargement_m=min(sensed.enlargement_m, _LARGEST_M),
         l2=sensed.l2.stiffness,
         r2=sensed.r2.stiffness,
     )
-    return Outgoing("telemetry", b"", encode(view))
 
 
 def _vector3(values: FloatArray) -> tuple[float, float, float]:

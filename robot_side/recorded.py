@@ -15,10 +15,10 @@ from common.recording.side import SideRecording
 from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.core import RobotSide
-from robot_side.objects.perceived import PerceivedObjects
 from robot_side.outgoing_messages import Outgoing
 from robot_side.recorded_inputs import FramePacker, pack_state
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _HAPTICS: Final = "haptics"
 Note = Callable[[Any], None]

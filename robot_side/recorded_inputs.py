@@ -19,27 +19,16 @@ import msgspec
 import numpy as np
 
 from robot_side.arm.port import ArmState
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
-    "sphere_centers_m": (np.float64, (3,)),
-    "sphere_radii_m": (np.float64, ()),
-    "sphere_object": (np.int64, ()),
-    "box_centers_m": (np.float64, (3,)),
-    "box_rotations": (np.float64, (3, 3)),
-    "box_half_sizes_m": (np.float64, (3,)),
-    "box_object": (np.int64, ()),
-    "tetrahedron_vertices_m": (np.float64, (4, 3)),
-    "tetrahedron_object": (np.int64, ()),
-    "half_space_normals": (np.float64, (3,)),
-    "half_space_offsets_m": (np.float64, ()),
-    "half_space_object": (np.int64, ()),
-    "mesh_index": (np.int64, ()),
-    "mesh_positions_m": (np.float64, (3,)),
-    "mesh_rotations": (np.float64, (3, 3)),
-    "mesh_object": (np.int64, ()),
-    "velocities_m_s": (np.float64, (3,)),
-}
+    name: described
+    for kind in KINDS
+    for name, described in (
+        *((array.name, (array.type, array.row)) for array in kind.arrays),
+        (kind.owner, (np.int64, ())),
+    )
+} | {"velocities_m_s": (np.float64, (3,))}
 """The arrays of a frame in their order, with the kind of their values and the shape of a row."""
 _SAME, _WHOLE, _ROWS, _NONE = range(4)
 _FRAME: Final = struct.Struct("<dB")

@@ -11,11 +11,11 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
-from robot_side.ahead.explanation import Explains, Trigger, TriggerExplained
-from robot_side.ahead.law import Sensed, Situation
 from robot_side.cameras.shapes import SceneModel, bytes_of
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
+from robot_side.laws.law import Sensed, Situation
 from robot_side.simulation.kinematics import MujocoKinematics
+from robot_side.surroundings.perceived import PerceivedObjects, Role
 
 _ROLES: Final = {Role.OBSTACLE: 0, Role.TARGET: 1, Role.SUPPORT: 2, Role.IGNORED: 3}
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")

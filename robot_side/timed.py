@@ -1,8 +1,8 @@
 """An arm and a law whose time counts to a stage of the turn."""
 
 from common.realtime.stages import Stages
-from robot_side.ahead.law import Law
 from robot_side.arm.port import Arm
+from robot_side.laws.law import Law
 
 STAGES = ("sockets", "messages", "physics", "sensing")
 """Of a turn: sending and receiving; decoding and judging what arrived; the arm's state, for which a simulation

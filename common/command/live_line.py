@@ -6,6 +6,9 @@ from common.command.live_view import SLOW, LiveView
 
 _BETWEEN = "  "
 UNKNOWN = "–"
+_QUEUE_MS = 5.0
+_LOST_PERCENT = 0.05
+"""Less of either is not worth a place."""
 _LONGEST_NAME = 12
 """An object with a longer name is shown without it."""
 
@@ -59,6 +62,10 @@ def _facts(view: LiveView) -> list[_Fact]:
     ]
     if view.linked:
         facts.append((5, f"link {UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}ms"))
+        if view.queue_ms is not None and view.queue_ms >= _QUEUE_MS:
+            facts.append((6, f"queue {view.queue_ms:.0f}ms"))
+        if view.lost_percent is not None and view.lost_percent >= _LOST_PERCENT:
+            facts.append((6, f"lost {view.lost_percent:.1f}%"))
     return facts
 
 

@@ -47,6 +47,10 @@ class LiveView:
     real_time: float | None = None
     """The simulation's share of it."""
     delay_ms: float | None = None
+    queue_ms: float | None = None
+    """The queue that the robot side's own messages make in the link."""
+    lost_percent: float | None = None
+    """Packets that were lost on the way to the operator."""
     l2: TriggerView = TriggerView()
     r2: TriggerView = TriggerView()
     haptics: bool = True
@@ -83,6 +87,8 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
         linked=None if link is None else link == LINK_UP,
         real_time=number(values.get("real_time")),
         delay_ms=number(values.get("delay_ms")),
+        queue_ms=number(values.get("queue_ms")),
+        lost_percent=number(values.get("lost_percent")),
         l2=l2,
         r2=r2,
         haptics=values.get("haptics") is not False,

@@ -33,6 +33,9 @@ class RunOptions:
     asymmetry: Annotated[str, tyro.conf.arg(metavar="TIME")] = "0ms"
     """By how much the least delay to the robot exceeds that to the operator (12ms, or -12ms), where that is known from
     elsewhere: no exchange of messages between two clocks can tell. Half of it would be an error of the offset."""
+    full_rate: bool = False
+    """Send a stiffness each millisecond and 250 commands a second, whatever they say, to compare with: otherwise one
+    leaves as soon as it would be felt, and 50 times a second."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after this long; without it, at Ctrl-C."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0

@@ -1,22 +1,25 @@
-"""Messages to bytes and back: MessagePack, straight from and into the frozen types of common.protocol.messages.
+"""Messages to bytes and back: MessagePack, from and into the frozen types of common.protocol.messages.
 
 A payload is `[version, message]`. The version is read first, so that a peer of another version is told apart
-from garbage.
+from garbage. Stiffness and telemetry travel packed (common/protocol/compact.py).
 """
 
+import struct
 from typing import Final, TypeVar
 
 import msgspec
 
 from common.errors import OtherVersionError, RemoteProtocolError
+from common.protocol.compact import AnyOnWire, packed, unpacked
 from common.protocol.messages import AnyMessage, Header, Message
 from common.protocol.view_messages import AnyViewMessage
 
 Kind = TypeVar("Kind")
 
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
-each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what."""
+each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what.
+7: stiffness and telemetry packed."""
 MAXIMUM_BYTES = 4096
 """The largest message is an eighth of this; a longer payload is not looked into."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
@@ -25,14 +28,14 @@ VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _PAIR: Final = msgspec.msgpack.Decoder(tuple[int, msgspec.Raw])
-_MESSAGE: Final["msgspec.msgpack.Decoder[AnyMessage]"] = msgspec.msgpack.Decoder(AnyMessage)
+_MESSAGE: Final["msgspec.msgpack.Decoder[AnyOnWire]"] = msgspec.msgpack.Decoder(AnyOnWire)
 _VIEW_MESSAGE: Final["msgspec.msgpack.Decoder[AnyViewMessage]"] = msgspec.msgpack.Decoder(AnyViewMessage)
 _BAD_BYTES: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def encode(message: Message) -> bytes:
     """Pack one message."""
-    return _ENCODER.encode((PROTOCOL_VERSION, message))
+    return _ENCODER.encode((PROTOCOL_VERSION, packed(message)))
 
 
 class Prepared:
@@ -52,7 +55,11 @@ def decode(payload: bytes) -> AnyMessage:
 
     OtherVersionError, a kind of it, for a peer of another version, whatever else the bytes hold.
     """
-    return _decode(payload, _MESSAGE, MAXIMUM_BYTES)
+    message = _decode(payload, _MESSAGE, MAXIMUM_BYTES)
+    try:
+        return unpacked(message)
+    except (ValueError, struct.error) as error:
+        raise RemoteProtocolError(f"no valid message: {error}") from error
 
 
 def decode_view(payload: bytes) -> AnyViewMessage:

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from common.protocol.messages import AnyMessage, Header, Hello
+from common.rate.outgoing_queue import OutgoingQueue
+from common.silence import counted_s
 from common.statistics import RunningStatistics
 from common.timing.ages import QueueingAge
 from common.timing.clock_offset import ClockOffset
 
+_GAP_S = 0.1
 _REMEMBERED_EPOCHS = 64
 """Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""
 _MOST_RECENT = 4096
@@ -29,7 +32,10 @@ class Arrival:
     one_way_s: float | None
     """Its delay from the peer, as uncertain as the clock offset; None while that is unknown."""
     loop_age_s: float | None
-    """Since we sent the stamp that it echoes: both ways, holding and ticks; None before the first echo."""
+    """Since we sent the stamp that it echoes: both ways, and of the holding what counts (common/silence.py). None
+    before the first echo."""
+    copy: bool = False
+    """The newest of its kind once more, by another connection."""
 
 
 class LinkEnd:
@@ -54,8 +60,12 @@ class LinkEnd:
         """Both ways without the peer's holding time, in seconds, every arrival that echoes a stamp."""
         self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
         """(now_s, one-way delay from the peer, round trip) of the newest arrivals in seconds, the oldest first."""
+        self.outgoing = OutgoingQueue(seed)
+        """The queue in front of what we send to the peer."""
         self.stale = 0
         """Messages that came too late to be applied, or of no known epoch."""
+        self.gaps = 0
+        """Silences of more than 100 ms that something newer ended."""
         self._side = side
         self._epoch = epoch
         self._clock_domain = clock_domain
@@ -69,6 +79,7 @@ class LinkEnd:
         self.clock_offset = ClockOffset(shared_clock=shared_clock, asymmetry_s=self._to_peer_asymmetry_s)
         """What the peer's clock is ahead of ours; another one in each of its epochs."""
         self._jumps = 0
+        self.outgoing.reset()
         self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
         self._queueing = QueueingAge()
         self._newest_of_kind: dict[type, int] = {}
@@ -110,6 +121,7 @@ class LinkEnd:
     def expect_other_delay(self) -> None:
         """The peer's link was changed on purpose: what queues is judged by what comes from now on."""
         self._queueing.reset()
+        self.outgoing.reset()
 
     def arrived(self, message: AnyMessage, now_s: float) -> Arrival:
         """Measure and order one message from the peer."""
@@ -124,14 +136,15 @@ class LinkEnd:
         self.recent.append((now_s, one_way_s, self.clock_offset.round_trip_s))
         queueing_age_s = self._queueing.update(header.sent_s, now_s)
         if self._newest is None or header.sequence > self._newest.sequence:
+            self.gaps += self._newest is not None and now_s - self._newest_received_s > _GAP_S
             self._newest, self._newest_received_s = header, now_s
         self._last_sent_s, self._last_received_s = header.sent_s, now_s
-        fresh = header.sequence > self._newest_of_kind.get(type(message), 0)
+        newest = self._newest_of_kind.get(type(message), 0)
+        fresh, copy = header.sequence > newest, header.sequence == newest
         if fresh:
             self._newest_of_kind[type(message)] = header.sequence
-        else:
-            self.stale += 1
-        return Arrival(fresh, queueing_age_s, one_way_s, loop_age_s)
+        self.stale += not fresh and not copy
+        return Arrival(fresh, queueing_age_s, one_way_s, loop_age_s, copy)
 
     def _begin_epoch(self, hello: Hello) -> None:
         epoch = hello.header.epoch
@@ -152,17 +165,19 @@ class LinkEnd:
         # A stamp from before our own restart, or a peer that invents one, says nothing about the link.
         if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s, arrived_last=last):
             return None
+        self.outgoing.echoed(sent_s, header.sent_s - held_s)
         if header.last_sent_s is not None and header.last_held_s is not None:
             self.clock_offset.overtaken(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
         if self.clock_offset.round_trip_s is not None:
             self.round_trip.add(self.clock_offset.round_trip_s)
-        return now_s - sent_s
+        return max(0.0, now_s - sent_s - held_s) + counted_s(held_s)
 
     def _measure_one_way(self, sent_s: float, now_s: float) -> float | None:
         if self.clock_offset.jumps != self._jumps:
             # The peer's clock counts from another origin now, and old delays cannot be told any more.
             self._jumps = self.clock_offset.jumps
             self._queueing.reset()
+            self.outgoing.reset()
             self._unmeasured.clear()
         one_way_s = self.clock_offset.one_way_from_peer_s(sent_s, now_s)
         if one_way_s is None or not self.clock_offset.settled:

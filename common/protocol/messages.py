@@ -1,7 +1,7 @@
 """Every message that crosses the link, frozen and validated when it is made and when it is decoded.
 
     operator ── Hello, MotionCommand, Watch, Tune ──▶ robot     control, ROUTER/DEALER
-    robot ── Hello, LeaseNotice, StiffnessUpdate ──▶ operator   control
+    robot ── Hello, LeaseNotice, LinkReport, StiffnessUpdate ──▶ operator   control
     robot ── Telemetry ──▶ whoever looks                    view, PUB/SUB; view_messages.py has the others
 
 A field out of range or not finite makes the whole message invalid: nothing of it is ever applied.
@@ -27,15 +27,16 @@ Compensation = Literal["operator", "robot"]
 
 _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
-_SLOWEST = 1e-6
+_SLOWEST = 2.0**-20
 _Words = Annotated[str, Meta(max_length=200)]
 _Number = Annotated[int, Meta(ge=0, le=_LARGEST)]
 _Few = Annotated[int, Meta(ge=0, le=1000)]
 _Far = Annotated[float, Meta(ge=0.0, le=_FARTHEST_M)]
 _Place = tuple[Finite, Finite, Finite]
-_Component = Annotated[float, Meta(ge=-1.001, le=1.001)]
+_Component = Annotated[float, Meta(ge=-1.0 - 2.0**-10, le=1.0 + 2.0**-10)]
 """A component of a unit vector, with room for rounding."""
 
+# Every limit is one that single precision holds exactly: what is valid stays valid on the wire.
 # Messages that are made up to 1000 times a second check their ranges by hand: `check_limits` takes four times as long.
 
 
@@ -157,6 +158,11 @@ class Watch(Message, frozen=True, tag="watch"):
     first_person: bool = False
     scene: bool = False
     """SceneShapes and SceneState"""
+    lacks: tuple[_Number, _Number] | None = None
+    """The newest VideoStep of each view that could not be shown, 0 for none; None: the sender can show JPEG alone."""
+
+    def __post_init__(self) -> None:
+        check_limits(self)
 
 
 class Tune(Message, frozen=True, tag="tune"):
@@ -194,6 +200,34 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
 
     def __post_init__(self) -> None:
         check_limits(self)
+
+
+class LinkReport(Message, frozen=True, tag="report"):
+    """The robot side's view of the link to the owner, twice a second."""
+
+    rate_kbit_s: Annotated[float, Meta(ge=0.0, le=1e9)]
+    """Allowed by the rate control, for all that the robot side sends."""
+    queue_ms: Annotated[float, Meta(ge=0.0, le=1e9)]
+    """In front of the robot side's own messages."""
+    lost: Share | None
+    """Share of the packets to the owner that the kernel sent again, since the last report; None for none sent."""
+    pictures: _Words
+    """How often and how well they are made."""
+    held_back: _Words
+    """The streams that gave way since the last report, and why; empty for none."""
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+
+    def values(self) -> dict[str, float | str | None]:
+        """The same as status values."""
+        return {
+            "rate_kbit_s": self.rate_kbit_s,
+            "queue_ms": self.queue_ms,
+            "lost_percent": None if self.lost is None else 100.0 * self.lost,
+            "pictures": self.pictures,
+            "held_back": self.held_back,
+        }
 
 
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -270,4 +304,4 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
         check_limits(self)
 
 
-AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

@@ -1,7 +1,8 @@
 """What the robot side publishes to be looked at, beside Telemetry: camera frames, and the scene as it believes it is.
 
     operator ── Watch ──▶ robot                                 control: who looks at what, renewed
-    robot ── VideoFrame, SceneShapes, SceneState ──▶ whoever     view, PUB/SUB, topics `video` and `scene`
+    robot ── VideoFrame, VideoStep ──▶ whoever                  view, PUB/SUB, topic `video`
+    robot ── SceneShapes, SceneState ──▶ whoever                view, PUB/SUB, topic `scene`
 
 Arrays travel as bytes, little-endian and row by row, as their docstrings say.
 """
@@ -34,6 +35,25 @@ class VideoFrame(Message, frozen=True, tag="video"):
     width: _Pixels
     height: _Pixels
     jpeg: bytes
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+
+
+class VideoStep(Message, frozen=True, tag="step"):
+    """One picture of one camera in H.264: whole, or the changes since the picture before it."""
+
+    view: ViewName
+    captured_s: Finite
+    """As VideoFrame's"""
+    width: _Pixels
+    height: _Pixels
+    number: Annotated[int, Meta(ge=1, le=2**63 - 1)]
+    """Grows by one from picture to picture of a view"""
+    whole: bool
+    """Whether it can be shown without any other"""
+    h264: bytes
+    """An access unit in Annex B's form"""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -130,4 +150,4 @@ class SceneState(Message, frozen=True, tag="scene"):
             raise ValueError("object_poses; valid: a row for each of object_index")
 
 
-AnyViewMessage = VideoFrame | SceneShapes | SceneState
+AnyViewMessage = VideoFrame | VideoStep | SceneShapes | SceneState

@@ -4,6 +4,6 @@ Control (ROUTER and DEALER) carries small messages both ways, view (PUB and SUB)
 the operator, apart so that a frame never delays a stiffness. No call but `wait` blocks; a message that cannot
 leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
 
-Only `shell`, `authentication`, `robot` and `operator` know ZeroMQ: what both ends share, who may connect, and the
-two ends. `keys`, `allow_list`, `endpoints`, `crowd` and `admission` are what they go by.
+`turns` says how messages take turns over several connections of one peer, and `peers` whose connections are whose.
+Neither knows ZeroMQ, nor do `keys`, `allow_list`, `endpoints`, `crowd`, `descriptors` and `admission`.
 """

@@ -13,6 +13,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 from common.errors import ConfigurationError
 from common.sockets.allow_list import AllowList
+from common.sockets.descriptors import hold_little
 from common.sockets.keys import KeyFolder, read_public_key
 from common.sockets.readable import readable
 
@@ -140,7 +141,8 @@ class Authenticator:
 class HandshakeWatch:
     """Sees how the handshakes of a connecting socket end, and says in words why one failed."""
 
-    def __init__(self, part: "zmq.Socket[bytes]", keys: OperatorKeys | None) -> None:
+    def __init__(self, part: "zmq.Socket[bytes]", keys: OperatorKeys | None, unsent_bytes: int) -> None:
+        """`unsent_bytes` as for hold_little, which each connection is told."""
         self.trouble: str | None = None
         """Why the newest handshake failed, with what to do about it; None after one that succeeded."""
         self.failed = False
@@ -148,8 +150,10 @@ class HandshakeWatch:
         self.key_refused = False
         """Whether the newest ended because the robot side does not let our key in."""
         self._keys = keys
+        self._unsent_bytes = unsent_bytes
         self._events = part.get_monitor_socket(
-            zmq.EVENT_HANDSHAKE_SUCCEEDED
+            zmq.EVENT_CONNECTED
+            | zmq.EVENT_HANDSHAKE_SUCCEEDED
             | zmq.EVENT_HANDSHAKE_FAILED_AUTH
             | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
             | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
@@ -159,9 +163,13 @@ class HandshakeWatch:
         """Take note of what has happened since the last call; never blocks."""
         for _ in range(_EVENTS_PER_CALL):
             try:
-                event = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))["event"]
+                told = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))
             except zmq.Again:
                 return
+            event = told["event"]
+            if event == zmq.EVENT_CONNECTED:
+                hold_little(told["value"], self._unsent_bytes)
+                continue
             self.failed = event != zmq.EVENT_HANDSHAKE_SUCCEEDED
             self.trouble = self._reason(event) if self.failed else None
             self.key_refused = event == zmq.EVENT_HANDSHAKE_FAILED_AUTH

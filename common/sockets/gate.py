@@ -6,6 +6,7 @@ import zmq
 from zmq.utils.monitor import parse_monitor_message
 
 from common.sockets.crowd import Crowd
+from common.sockets.descriptors import hold_little
 from common.sockets.readable import readable
 
 
@@ -13,12 +14,18 @@ class Gate:
     """Watches the connections to one bound socket, to tell which are too many; before it is bound."""
 
     def __init__(
-        self, context: "zmq.Context[zmq.Socket[bytes]]", part: "zmq.Socket[bytes]", most: int, introduced_s: float
+        self,
+        context: "zmq.Context[zmq.Socket[bytes]]",
+        part: "zmq.Socket[bytes]",
+        most: int,
+        introduced_s: float,
+        unsent_bytes: int,
     ) -> None:
         """At most `most` connections, and never more than a quarter of the descriptors that this process may open.
 
-        `introduced_s` as for Crowd.
+        `introduced_s` as for Crowd, `unsent_bytes` as for hold_little.
         """
+        self._unsent_bytes = unsent_bytes
         self.crowd = Crowd(min(most, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4), introduced_s)
         address = f"inproc://gate-{id(part)}"
         part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
@@ -34,6 +41,7 @@ class Gate:
         event = parse_monitor_message(self.events.recv_multipart())
         if event["event"] == zmq.EVENT_ACCEPTED:
             self.crowd.came(event["value"], now_s)
+            hold_little(event["value"], self._unsent_bytes)
         else:
             self.crowd.went(event["value"])
         return True

@@ -3,13 +3,22 @@
 import contextlib
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import zmq
 
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
 from common.sockets.endpoints import Endpoint, following, parse_connect
 from common.sockets.inbox import Inbox
-from common.sockets.shell import CONTROL_LIMIT_BYTES, SocketShell, connect_socket
+from common.sockets.shell import (
+    CONTROL_LIMIT_BYTES,
+    CONTROL_UNSENT_BYTES,
+    VIEW_UNSENT_BYTES,
+    SocketShell,
+    check_size,
+    connect_socket,
+)
+from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH, Offered, Turns, Way, new_group, routing_id
 
 _RETRY_S = 0.5
 _ATTEMPT_LIMIT_S = 3.0
@@ -18,6 +27,14 @@ itself asks again after 1, 2, 4... 64 s: a network that is back after a minute w
 _CLOSE_LIMIT_S = 0.5
 _HANDSHAKE_LIMIT_S = 10.0
 """A CURVE handshake takes three round trips, seen from here, and the robot side may still be starting."""
+
+
+@dataclass(eq=False)
+class _Connection(Way):
+    """One of the control connections."""
+
+    part: "zmq.Socket[bytes]"
+    inbox: Inbox
 
 
 class OperatorSockets(SocketShell):
@@ -31,13 +48,16 @@ class OperatorSockets(SocketShell):
         topics: Sequence[bytes] = (b"",),
         keys: OperatorKeys | None = None,
         heartbeat_timeout_s: float = 3.0,
+        connections: int = CONNECTIONS,
     ) -> None:
-        """Connect control to `connect` and view to `view_connect`, by default the port after.
+        """Connect control to `connect`, `connections` times, and view to `view_connect`, by default the port after.
 
         `topics` are prefixes of the topics to receive; the empty one means all. The robot side need not be
         there yet. `heartbeat_timeout_s` as in RobotSockets. ConfigurationError when an address is malformed
-        or its host unknown.
+        or its host unknown; ValueError for fewer than 1 or more than 16 connections.
         """
+        if not 1 <= connections <= MOST_CONNECTIONS_EACH:
+            raise ValueError(f"connections = {connections}; valid: 1 to {MOST_CONNECTIONS_EACH}")
         control = parse_connect(connect, "--connect")
         view = (
             following(control, connect, "--view-connect")
@@ -46,20 +66,26 @@ class OperatorSockets(SocketShell):
         )
         self._closing: threading.Thread | None = None
         self._watched: list[tuple[zmq.Socket[bytes], Endpoint, HandshakeWatch]] = []
-        super().__init__(zmq.DEALER, zmq.SUB, heartbeat_timeout_s, _HANDSHAKE_LIMIT_S)
+        self._connections: list[_Connection] = []
+        self._turns: Turns[_Connection] = Turns(self._offer)
+        super().__init__(heartbeat_timeout_s, _HANDSHAKE_LIMIT_S)
+        group, self._next_look_s = new_group(), 0.0
         try:
-            # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
-            self._control.setsockopt(zmq.IMMEDIATE, 1)
+            # ZeroMQ connects a socket once to the same address, hence a socket for each connection.
+            for index in range(connections):
+                part = self._open_control(zmq.DEALER)
+                part.setsockopt(zmq.ROUTING_ID, routing_id(group, index))
+                # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
+                part.setsockopt(zmq.IMMEDIATE, 1)
+                self._connections.append(_Connection(part, Inbox(part, frames=1)))
+                self._join(part, control, "--connect", keys, CONTROL_UNSENT_BYTES)
+            self._turns.ways.extend(self._connections)
+            self._view = self._open_view(zmq.SUB)
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)
-            self._inbox, self._view_inbox = Inbox(self._control, frames=1), Inbox(self._view, frames=2)
-            self._next_look_s = 0.0
-            for part, endpoint, flag in ((self._control, control, "--connect"), (self._view, view, "--view-connect")):
-                part.setsockopt(zmq.CONNECT_TIMEOUT, round(1e3 * _ATTEMPT_LIMIT_S))
-                if keys is not None:
-                    keys.secure(part)
-                self._watched.append((part, endpoint, HandshakeWatch(part, keys)))
-                connect_socket(part, endpoint, flag)
+            self._view_inbox = Inbox(self._view, frames=2)
+            self._join(self._view, view, "--view-connect", keys, VIEW_UNSENT_BYTES)
+            self._awaited = [*(connection.inbox for connection in self._connections), self._view_inbox]
         except BaseException:
             self.close()
             raise
@@ -75,26 +101,30 @@ class OperatorSockets(SocketShell):
         return any(watch.key_refused for _, _, watch in self._watched)
 
     def receive(self) -> list[bytes]:
-        """Every control message that has arrived, oldest first."""
+        """Every control message that has arrived, the oldest of each connection first."""
         self._look_after_handshakes()
-        return [payload.bytes for (payload,) in self._whole(self._inbox.read(), 1)]
+        return [
+            payload.bytes for connection in self._connections for (payload,) in self._whole(connection.inbox.read(), 1)
+        ]
 
     def receive_view(self) -> list[tuple[bytes, bytes]]:
         """(topic, payload) of every view message that has arrived, oldest first."""
         messages = self._whole(self._view_inbox.read(), 2)
         return [(topic.bytes, payload.bytes) for topic, payload in messages]
 
-    def send(self, payload: bytes) -> bool:
+    def send(self, payload: bytes, *, everywhere: bool = False) -> bool:
         """Send to the robot side; False, and counted in `dropped`, when it is gone or does not keep up.
 
-        ValueError for more than CONTROL_LIMIT_BYTES.
+        everywhere: over each connection and not over the next one. ValueError for more than CONTROL_LIMIT_BYTES.
         """
-        self._inbox.used()
-        return self.send_frames(self._control, [payload], CONTROL_LIMIT_BYTES)
+        check_size(payload, CONTROL_LIMIT_BYTES)
+        taken = self._turns.send(payload, self._clock.now(), everywhere=everywhere)
+        self.dropped += not taken
+        return taken
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control or view message, at most `timeout_s` (None: no limit); whether there is one."""
-        return self.wait_for(timeout_s, [self._inbox, self._view_inbox])
+        return self.wait_for(timeout_s, self._awaited)
 
     def close(self) -> None:
         """Close at once, whatever has not left yet; closing twice does no harm."""
@@ -109,6 +139,19 @@ class OperatorSockets(SocketShell):
         for _, _, watch in self._watched:
             watch.close()
         super().close()
+
+    def _join(
+        self, part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str, keys: OperatorKeys | None, unsent_bytes: int
+    ) -> None:
+        part.setsockopt(zmq.CONNECT_TIMEOUT, round(1e3 * _ATTEMPT_LIMIT_S))
+        if keys is not None:
+            keys.secure(part)
+        self._watched.append((part, endpoint, HandshakeWatch(part, keys, unsent_bytes)))
+        connect_socket(part, endpoint, flag)
+
+    def _offer(self, connection: _Connection, payload: bytes) -> Offered:
+        connection.inbox.used()
+        return self.offer(connection.part, payload)
 
     def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:
         """The messages of that many frames; others are rejected and counted."""
@@ -128,8 +171,8 @@ class OperatorSockets(SocketShell):
             watch.look()
             if watch.failed:
                 watch.failed = False
-                self._inbox.used()
-                self._view_inbox.used()
+                for inbox in self._awaited:
+                    inbox.used()
                 with contextlib.suppress(zmq.ZMQError):
                     part.disconnect(endpoint.address)
                 part.connect(endpoint.address)

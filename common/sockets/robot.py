@@ -2,43 +2,40 @@
 
 import contextlib
 import select
-import socket
-from dataclasses import dataclass
 
 import zmq
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
+from common.sockets.descriptors import shut_down
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
+from common.sockets.frames import descriptor_of, user_of
 from common.sockets.gate import Gate
 from common.sockets.inbox import Inbox
+from common.sockets.peers import Connection, Peers
 from common.sockets.readable import EVENTS
-from common.sockets.shell import CONTROL_LIMIT_BYTES, VIEW_LIMIT_BYTES, SocketShell, bind_socket
+from common.sockets.shell import (
+    CONTROL_LIMIT_BYTES,
+    CONTROL_UNSENT_BYTES,
+    VIEW_LIMIT_BYTES,
+    VIEW_UNSENT_BYTES,
+    SocketShell,
+    bind_socket,
+    check_size,
+)
+from common.sockets.tcp_figures import TcpFigures, tcp_figures
+from common.sockets.turns import Offered
 
 PEER_LIMIT_PER_S = 5000
-"""A peer that sends more is cut off: 20 times what an operator sends, and twice a backlog of ten seconds."""
+"""A key, or without keys a peer, that sends more is cut off: 20 times what an operator sends, and twice a backlog of
+ten seconds."""
 HANDSHAKE_LIMIT_S = 5.0
 """A connection that has not introduced itself by then ends. A CURVE handshake takes two round trips, seen from here, of
 2 s at most in a session."""
 MOST_CONNECTIONS = 1024
 """To each port, and never more than a quarter of the descriptors that this process may open."""
-_REMEMBERED_PEERS = 1024
 _EVENTS_PER_CALL = 256
 """Events of each port, 5 us each: connections that come and go cannot hold the caller."""
-
-
-@dataclass
-class _Peer:
-    """The robot side's memory of one connection."""
-
-    key: str
-    """Whom it authenticated as; empty without keys."""
-    descriptor: int = -1
-    """The descriptor that the last message came by; -1 where it is not known."""
-    connection: int | None = None
-    """The number of that connection in the crowd; 0 for one that ended, None while unknown."""
-    received: int = 0
-    """Messages in the present second."""
 
 
 class RobotSockets(SocketShell):
@@ -72,19 +69,22 @@ class RobotSockets(SocketShell):
         self.crowded = 0
         """Connections that were ended because there were too many at once."""
         self._told: list[str] = []
-        self._peers: dict[bytes, _Peer] = {}
+        self._peers = Peers(self._offer)
         self._all_seen = False
         """Whether what the gates know of the connections was all there was to know."""
         self._second = 0
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
-        super().__init__(zmq.ROUTER, zmq.PUB, heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
-        self._inbox = Inbox(self._control, frames=2)
+        super().__init__(heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
         try:
-            self._gates = [self._watch(part) for part in (self._control, self._view)]
+            self._control, self._view = self._open_control(zmq.ROUTER), self._open_view(zmq.PUB)
+            self._inbox = Inbox(self._control, frames=2)
+            self._gates = [self._watch(self._control, CONTROL_UNSENT_BYTES), self._watch(self._view, VIEW_UNSENT_BYTES)]
             self._listen()
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
+            # A connection that breaks off may come back before its end is noticed here.
+            self._control.setsockopt(zmq.ROUTER_HANDOVER, 1)
             for part, endpoint, flag in ((self._control, control, "--bind"), (self._view, view, "--view-bind")):
                 if keys is not None:
                     keys.secure(part)
@@ -128,8 +128,9 @@ class RobotSockets(SocketShell):
         revoked = self._keys.allowed.refresh()
         if revoked:
             self._watch_connections()
-            for name in [name for name, peer in self._peers.items() if peer.key in revoked]:
-                self._hang_up(name)
+            for connection in self._peers.connections.values():
+                if connection.peer.key in revoked:
+                    self._hang_up(connection)
             self._view_outdated = True
         if self._view_outdated:
             with contextlib.suppress(zmq.ZMQError):  # while no descriptor is to be had, the next look tries again
@@ -140,46 +141,59 @@ class RobotSockets(SocketShell):
         """(peer, payload) of every control message that has arrived, oldest first."""
         if self._authenticator is not None:
             self._authenticator.serve()
-        if (second := int(self._clock.now())) != self._second:
+        now_s = self._clock.now()
+        if (second := int(now_s)) != self._second:
             self._second = second
-            for peer in self._peers.values():
-                peer.received = 0
+            self._peers.begin_second()
         self._watch_connections()
         received: list[tuple[bytes, bytes]] = []
         for name, *frames in self._inbox.read():
-            if not self._admits(name.bytes, frames[-1] if frames else name):
+            connection = self._admitted(name.bytes, frames[-1] if frames else name)
+            if connection is None:
                 continue
+            connection.peer.turns.heard(connection, now_s)
             if len(frames) == 1:
-                received.append((name.bytes, frames[0].bytes))
+                received.append((connection.peer.name, frames[0].bytes))
             else:
                 self.rejected += 1
         return received
 
-    def send(self, peer: bytes, payload: bytes) -> bool:
+    def send(self, peer: bytes, payload: bytes, *, everywhere: bool = False) -> bool:
         """Send to `peer`; False, and counted in `dropped`, when it is gone, revoked, or does not keep up.
 
-        ValueError for more than CONTROL_LIMIT_BYTES.
+        everywhere: over each of its connections and not over the next one. ValueError for more than
+        CONTROL_LIMIT_BYTES.
         """
-        if self._keys is not None and (peer not in self._peers or not self._allows(self._peers[peer].key)):
-            self.dropped += 1
-            return False
-        self._inbox.used()
-        return self.send_frames(self._control, [peer, payload], CONTROL_LIMIT_BYTES)
+        check_size(payload, CONTROL_LIMIT_BYTES)
+        known = self._peers.get(peer)
+        taken = (
+            known is not None
+            and self._allows(known.key)
+            and known.turns.send(payload, self._clock.now(), everywhere=everywhere)
+        )
+        self.dropped += not taken
+        return taken
+
+    def tcp_figures(self, peer: bytes) -> TcpFigures:
+        """The kernel's figures of the connections to `peer`, added up."""
+        known = self._peers.get(peer)
+        return tcp_figures([] if known is None else [each.descriptor for each in known.turns.ways if each.number])
 
     def publish(self, topic: bytes, payload: bytes) -> None:
         """Send to whoever subscribed to `topic`; a viewer that does not keep up loses it, alone.
 
         ValueError for more than VIEW_LIMIT_BYTES.
         """
+        check_size(payload, VIEW_LIMIT_BYTES)
         self._bind_view_again()
-        self.send_frames(self._view, [topic, payload], VIEW_LIMIT_BYTES)
+        self.dropped += self.offer(self._view, topic, payload) is not Offered.TAKEN
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
         return self.wait_for(timeout_s, [self._inbox], self._authenticator)
 
-    def _watch(self, part: "zmq.Socket[bytes]") -> Gate:
-        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S)
+    def _watch(self, part: "zmq.Socket[bytes]", unsent_bytes: int) -> Gate:
+        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes)
 
     def _listen(self) -> None:
         """Be told when there is something at the gates or the view; whatever is there already is looked at anyway."""
@@ -209,7 +223,7 @@ class RobotSockets(SocketShell):
             return
         for gate in self._gates:
             for descriptor in gate.crowd.surplus(now_s):
-                _shut_down(descriptor)
+                shut_down(descriptor)
                 self.crowded += 1
 
     def _replace_view(self, keys: RobotKeys) -> None:
@@ -217,7 +231,7 @@ class RobotSockets(SocketShell):
         view = self._open_view(zmq.PUB)
         try:
             keys.secure(view)
-            gate = self._watch(view)
+            gate = self._watch(view, VIEW_UNSENT_BYTES)
         except zmq.ZMQError:
             view.close(linger=0)
             raise
@@ -237,60 +251,47 @@ class RobotSockets(SocketShell):
     def _allows(self, key: str) -> bool:
         return self._keys is None or key in self._keys.allowed.names
 
-    def _admits(self, name: bytes, frame: zmq.Frame) -> bool:
-        """Whether one message of `name` may be looked into; who sent it stands with each frame."""
-        key = "" if self._keys is None else _property(frame, "User-Id")
-        peer = self._peers.get(name)
-        if peer is None or peer.key != key:
-            if len(self._peers) >= _REMEMBERED_PEERS:
-                del self._peers[next(iter(self._peers))]
-            peer = self._peers[name] = _Peer(key)
-        crowd, descriptor = self._gates[0].crowd, _descriptor(frame)
-        if descriptor != peer.descriptor or peer.connection is None:
+    def _offer(self, connection: Connection, payload: bytes) -> Offered:
+        self._inbox.used()
+        return self.offer(self._control, connection.name, payload)
+
+    def _admitted(self, name: bytes, frame: zmq.Frame) -> Connection | None:
+        """The connection of one message, if it may be looked into; who sent it stands with each frame."""
+        key = "" if self._keys is None else user_of(frame)
+        descriptor = descriptor_of(frame)
+        connection, crowd = self._peers.connection(name, key), self._gates[0].crowd
+        if descriptor != connection.descriptor or connection.number is None:
             self._watch_connections()
-            peer.descriptor, peer.connection = descriptor, crowd.number(descriptor) if self._all_seen else None
-        if self._allows(key):
+            # The one before, whose routing id was taken over: ZeroMQ reads no more from it, and does not end it.
+            self._hang_up(connection)
+            connection.stands_for(descriptor, crowd.number(descriptor) if self._all_seen else None)
+        peer, is_allowed = connection.peer, self._allows(key)
+        if is_allowed:
             crowd.spoke(descriptor)
-        peer.received += 1
-        if not self._allows(key):
-            self.revoked += 1
-            self._hang_up(name)
-            return False
-        if peer.received > PEER_LIMIT_PER_S:
-            self.flooding += 1
-            self._hang_up(name)
-            return False
-        return True
+        is_surplus = self._peers.count(peer) > PEER_LIMIT_PER_S
+        if is_allowed and not is_surplus:
+            return connection
+        self.flooding += is_allowed
+        self.revoked += not is_allowed
+        self._watch_connections()
+        number = crowd.number(descriptor)
+        if self._all_seen and number != connection.number and self._is_there(connection):
+            connection.stands_for(descriptor, number)
+        for each in peer.turns.ways:
+            self._hang_up(each)
+        return None
 
-    def _hang_up(self, name: bytes) -> None:
-        """End the connection of `name`, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
-        peer = self._peers[name]
+    def _is_there(self, connection: Connection) -> bool:
+        """Whether it has come back by a descriptor that it had before, or only left messages behind.
+
+        ZeroMQ sends nothing to who has left, be it nothing at all.
+        """
+        return self.offer(self._control, connection.name, b"") is not Offered.GONE
+
+    def _hang_up(self, connection: Connection) -> None:
+        """End a connection, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
         # A message may be read long after its sender left: the descriptor may stand for another connection by now.
-        if self._all_seen and peer.connection and self._gates[0].crowd.number(peer.descriptor) == peer.connection:
-            peer.connection = 0
-            _shut_down(peer.descriptor)
-
-
-def _shut_down(descriptor: int) -> None:
-    """End a connection that ZeroMQ owns and will close; without a descriptor more, as there may be none left."""
-    with contextlib.suppress(OSError):  # it may have gone this moment
-        connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=descriptor)
-        try:
-            connection.shutdown(socket.SHUT_RDWR)
-        finally:
-            connection.detach()
-
-
-def _property(frame: zmq.Frame, name: str) -> str:
-    """A property of the connection that `frame` came by; empty where ZeroMQ has none."""
-    try:
-        return str(frame.get(name))
-    except zmq.ZMQError:
-        return ""
-
-
-def _descriptor(frame: zmq.Frame) -> int:
-    try:
-        return int(frame.get(zmq.SRCFD))
-    except zmq.ZMQError:
-        return -1
+        number, now_number = connection.number, self._gates[0].crowd.number(connection.descriptor)
+        if self._all_seen and not connection.hung_up and number and number == now_number:
+            connection.hung_up = True
+            shut_down(connection.descriptor)

@@ -14,15 +14,16 @@ from common.sockets.authentication import Authenticator
 from common.sockets.endpoints import Endpoint
 from common.sockets.inbox import Inbox
 from common.sockets.readable import EVENTS
+from common.sockets.turns import Offered
 
-CONTROL_HIGH_WATER_MARK = 16
-"""Control messages that wait to leave for each peer: a burst after a hiccup of 16 ms at 1 kHz passes whole.
-
-With 2, half of a burst of five was lost, and a peer that stood still got no fewer stale ones: those wait in
-the kernel's buffers, until the heartbeat ends the connection.
-"""
+CONTROL_HIGH_WATER_MARK = 2
+"""Control messages that wait to leave by each connection: over four, a burst of eight after a hiccup passes whole."""
 VIEW_HIGH_WATER_MARK = 8
-"""View messages that wait on either side: both cameras' frames, telemetry, and as many again."""
+"""View messages that wait on either side: both cameras' pictures, the scene and telemetry of one tick. ZeroMQ counts
+what has left in steps of half the mark, so that with 4 the telemetry was lost, and with 2 the scene, too."""
+CONTROL_UNSENT_BYTES = 1024
+"""The kernel takes no more ahead of the network, by each connection: some messages."""
+VIEW_UNSENT_BYTES = 16 * 1024
 RECEIVE_HIGH_WATER_MARK = 100_000
 """Control messages that wait to be received: out of reach for whoever drains once per tick.
 
@@ -39,9 +40,9 @@ _NOBLOCK, _NOBLOCK_AND_MORE = int(zmq.NOBLOCK), int(zmq.NOBLOCK | zmq.SNDMORE)
 
 
 class SocketShell:
-    """A context with a control and a view socket; no call but `wait_for` blocks."""
+    """A context for control and view sockets; no call but `wait_for` blocks."""
 
-    def __init__(self, control_type: int, view_type: int, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
+    def __init__(self, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
         """A connection that has not introduced itself within `handshake_limit_s` ends."""
         if not 0.03 <= heartbeat_timeout_s <= 60.0:
             raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
@@ -55,8 +56,6 @@ class SocketShell:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
         self._handshake_ms = round(1e3 * handshake_limit_s)
-        self._control = self._open_control(control_type)
-        self._view = self._open_view(view_type)
 
     def _open_control(self, control_type: int) -> "zmq.Socket[bytes]":
         part = self._context.socket(control_type)
@@ -136,10 +135,8 @@ class SocketShell:
             if deadline_s is not None:
                 remaining_s = deadline_s - self._clock.now()
 
-    def send_frames(self, part: "zmq.Socket[bytes]", frames: list[bytes], limit_bytes: int) -> bool:
-        """Send without waiting; False, and counted in `dropped`, when it cannot leave; ValueError when too long."""
-        if len(frames[-1]) > limit_bytes:
-            raise ValueError(f"payload of {len(frames[-1])} bytes; valid: up to {limit_bytes} bytes")
+    def offer(self, part: "zmq.Socket[bytes]", *frames: bytes) -> Offered:
+        """Send without waiting."""
         for _ in range(2):
             try:
                 for frame in frames[:-1]:
@@ -151,11 +148,16 @@ class SocketShell:
             except zmq.ZMQError as error:
                 if error.errno != zmq.EHOSTUNREACH:
                     raise
-                break
+                return Offered.GONE
             else:
-                return True
-        self.dropped += 1
-        return False
+                return Offered.TAKEN
+        return Offered.FULL
+
+
+def check_size(payload: bytes, limit_bytes: int) -> None:
+    """Raise a ValueError when it is too long to send."""
+    if len(payload) > limit_bytes:
+        raise ValueError(f"payload of {len(payload)} bytes; valid: up to {limit_bytes} bytes")
 
 
 def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:

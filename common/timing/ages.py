@@ -29,13 +29,17 @@ class LoopAge:
         self._held_s = worst_case_s
         self._held_since_s = 0.0
 
-    def update(self, age_s: float, now_s: float) -> None:
-        """Take in a loop age measured at `now_s`; ValueError when it is negative or not finite."""
-        if not (math.isfinite(age_s) and age_s >= 0.0):
+    def update(self, age_s: float, now_s: float) -> float:
+        """Take in a loop age measured at `now_s`; the delay to reckon with from now on.
+
+        ValueError when it is negative or not finite.
+        """
+        if not 0.0 <= age_s < math.inf:
             raise ValueError(f"age_s = {age_s}; valid: a finite time of 0 s or more")
         before_s = self.value(now_s)
         self._held_s = max(before_s, self._quantile.update(age_s))
         self._held_since_s = now_s
+        return self.value(now_s)
 
     def reset(self) -> None:
         """Forget every sample: the worst case holds until there is one again."""

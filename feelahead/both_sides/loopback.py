@@ -14,6 +14,7 @@ from common.emulation.spec import Stream
 from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
 from common.realtime.stages import microseconds
+from common.silence import MOTION_PERIOD_S
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
 from operator_side.assembly import build_operator_side
@@ -22,14 +23,13 @@ from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.search import OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.following_pages import follow_pages
-from operator_side.main import MOTION_PERIOD_S
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
-from robot_side.ahead.law import Law
 from robot_side.assembly import assemble
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
+from robot_side.laws.law import Law
 from robot_side.main import TICK_PERIOD_S
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
@@ -165,8 +165,8 @@ class Loopback:
         self.connection.update(now_s)
         if (report := self.connection.read(now_s)) is not None:
             self.operator.read_report(report, now_s)
-        for payload in self.operator.motion(now_s):
-            self._to_robot.push(now_s, payload)
+        for message in self.operator.motion(now_s):
+            self._to_robot.push(now_s, message.payload)
 
     def _robot_tick(self, now_s: float) -> None:
         start_s = _WALL.now()

@@ -78,6 +78,7 @@ bench = Menu(
         "coverage": "robot,operator,experiments",
         "felt": "robot,operator,experiments",
         "link": "robot,operator",
+        "pictures": "robot,operator,video",
         "tick": "robot,operator",
     },
 )

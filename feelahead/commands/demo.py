@@ -40,7 +40,7 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_operator", "telemetry"),
 )
 """The streams between the two sides."""
-_SHARED = ("link", "link_model", "asymmetry", "seed", "realtime")
+_SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
 """Flags of both sides."""
 _ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
 

@@ -16,6 +16,7 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.limits import check_limits
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
+from feelahead.recordings.playback import require_protocol
 
 _BOTH_SIDES = "pip install 'feelahead[robot,operator,record]'"
 
@@ -96,6 +97,7 @@ def replay(arguments: Sequence[str]) -> int:
     """Show or check."""
     settings = parse_settings(ReplaySettings, "feelahead replay", arguments)
     with _recording(settings.file) as recording:
+        require_protocol(recording)
         if settings.check:
             return _check(recording)
         from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415

@@ -47,8 +47,11 @@ def processes(workers: int) -> Iterator[Executor]:
 
 
 @contextmanager
-def cluster(address: str) -> Iterator[Executor]:
-    """Yield the workers of the dask scheduler at `address`; ConfigurationError where nobody answers there."""
+def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
+    """Yield the workers of the dask scheduler at `address`; ConfigurationError where nobody answers there.
+
+    own_file: a question's file that the cluster does not have; it is sent there.
+    """
     try:
         import distributed  # noqa: PLC0415  # large, and in the extra `experiments`
         from distributed.comm.core import CommClosedError  # noqa: PLC0415
@@ -63,6 +66,8 @@ def cluster(address: str) -> Iterator[Executor]:
             f"--scheduler {address}: no dask scheduler answers there; valid: as tcp://127.0.0.1:8786"
         ) from error
     try:
+        if own_file is not None:
+            client.upload_file(own_file)
         yield cast(Executor, client.get_executor(pure=False, retries=2))
     except (CancelledError, CommClosedError, distributed.KilledWorker) as error:
         raise LostWorkersError(f"--scheduler {address}: the scheduler or its workers are gone") from error

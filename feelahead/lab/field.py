@@ -1,7 +1,8 @@
 """Look ahead at things that stand at known distances: where each strength begins."""
 
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -12,14 +13,14 @@ from common.errors import ConfigurationError
 from feelahead.lab.figures import figure
 from feelahead.lab.propagation import PosedGripper
 from feelahead.lab.table import Row, Table
-from robot_side.ahead.field import Ahead, Along
-from robot_side.ahead.find import OBSTACLE
-from robot_side.ahead.scene_table import scene_table
 from robot_side.enlargement.distance import standard_quantile
+from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.object_class import OBSTACLE
 from robot_side.settings import CameraSettings, EncoderSettings
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
+from robot_side.surroundings.scene_table import scene_table
 
 CONVEX: Final = ("wall", "plate", "ball", "post", "rod_10mm", "rod_5mm", "rod_2mm", "wall_45")
 """Frozen scenes with one convex thing ahead"""
@@ -40,8 +41,11 @@ class Facing:
     """Free ways from 0 to 150 mm in such steps"""
 
 
-def look_ahead(cell: Facing) -> Iterator[Row]:
-    """Yield a row for each free way: the ways to R2's strengths, mm.
+Look = Callable[[], Field]
+
+
+def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
+    """Yield what looks ahead along R2, for each free way.
 
     ConfigurationError for a model that cannot be used, or that has nothing ahead of its gripper.
     """
@@ -57,16 +61,24 @@ def look_ahead(cell: Facing) -> Iterator[Row]:
         )
     encoder = EncoderSettings()
     sigma_rad = Encoder(encoder.sigma_rad, encoder.resolution_rad).standard_deviation_rad()
-    ahead, standing = Ahead(np.full(len(gripper.home_rad), sigma_rad)), np.full(things, OBSTACLE, dtype=np.int64)
+    ahead, classes = Ahead(np.full(len(gripper.home_rad), sigma_rad)), np.full(things, OBSTACLE, dtype=np.int64)
     axis = np.ascontiguousarray(pose.tool_rotation[:, 2])
     r2 = Along(axis, 0.0, CameraSettings().sd_m ** 2, float(standard_quantile(_PROBABILITY)), _REACH_M)
-    for free_mm in np.arange(0.0, _MOST_MM + 0.1, cell.step_mm).tolist():
-        posed.put(gripper.home_rad, gripper.fingers, (1e-3 * free_mm - way_m) * axis)
-        found = ahead.look(pose, scene_table(posed.perceived(np.zeros((things, 3)))), standing, r2)
-        ways_mm = (1e3 * way if math.isfinite(way) else None for way in found.fast_m.tolist())
+    for free in free_mm:
+        posed.put(gripper.home_rad, gripper.fingers, (1e-3 * free - way_m) * axis)
+        seen = scene_table(posed.perceived(np.zeros((things, 3))))
+        yield functools.partial(ahead.look, pose, seen, classes, r2)
+
+
+def look_ahead(cell: Facing) -> Iterator[Row]:
+    """Yield a row for each free way: the ways to R2's strengths, mm; ConfigurationError as of `looks_before`."""
+    ways_mm = np.arange(0.0, _MOST_MM + 0.1, cell.step_mm).tolist()
+    for free_mm, look in zip(ways_mm, looks_before(cell, ways_mm), strict=True):
+        found = look()
+        found_mm = (1e3 * way if math.isfinite(way) else None for way in found.fast_m.tolist())
         yield {
             "free_mm": free_mm,
-            **{way_name(strength): way_mm for strength, way_mm in enumerate(ways_mm, 1)},
+            **{way_name(strength): way_mm for strength, way_mm in enumerate(found_mm, 1)},
             "sigma_mm": 1e3 * found.sigma_m,
         }
 

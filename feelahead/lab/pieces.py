@@ -3,6 +3,7 @@
 import functools
 import importlib
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
@@ -60,7 +61,10 @@ def results(
     left, lost = list(todo), 0
     while left:
         before = len(left)
-        pool = cluster(settings.scheduler) if settings.scheduler else processes(settings.workers or _WORKERS)
+        if settings.scheduler:
+            pool = cluster(settings.scheduler, _own_file(module))
+        else:
+            pool = processes(settings.workers or _WORKERS)
         try:
             with pool as executor:
                 futures: dict[Future[list[Row] | str], Piece] = {
@@ -92,6 +96,11 @@ def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
     # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
     plain: list[Row] = json.loads(json.dumps(rows, default=_of_numpy))
     return plain
+
+
+def _own_file(module: str) -> str | None:
+    """Return the file of a question that is in no package; None for one of the lab, which every release has."""
+    return None if "." in module else sys.modules[module].__file__
 
 
 def _of_numpy(value: Any) -> Any:

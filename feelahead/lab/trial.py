@@ -12,15 +12,15 @@ from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
-from robot_side.ahead.law import Law, Sensed, Situation
+from robot_side.laws.law import Law, Sensed, Situation
 from robot_side.main import TICK_PERIOD_S
-from robot_side.objects.perceived import Role
 from robot_side.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import TrueContact
+from robot_side.surroundings.perceived import Role
 
 Arm = Literal["off", "mechanical", "reacting"]
 """off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""

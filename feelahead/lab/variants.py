@@ -11,7 +11,6 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.messages import TriggerField
 from feelahead.lab.approaches.ticks import Recorded, with_cover
-from robot_side.ahead.scene_table import scene_table
 from robot_side.compiled.warm_up import warm_up
 from robot_side.settings import RobotSettings
 
@@ -75,7 +74,7 @@ def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Re
             for number, (law, own) in enumerate(zip(laws, ticks, strict=True)):
                 for place, tick in enumerate(own[first : first + _CHUNK], first):
                     # A new frame is taken over equally often, whatever the cover.
-                    scene_table(tick.situation.objects)
+                    law.surroundings.see(tick.situation.objects)
                     began_s = time.thread_time()
                     sensed = law.sense(tick.situation, tick.now_s)
                     took_s[number, place] = min(took_s[number, place], time.thread_time() - began_s)

@@ -28,6 +28,7 @@ _STRENGTHS: Final = 8
 _ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
 """The number of pictures in the statistics."""
+_ENLARGED_QUALITY: Final = 90
 _ACTION: Final = {
     "l2": "command.l2",
     "r2": "command.r2",
@@ -50,7 +51,6 @@ class Picture(NamedTuple):
 def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     """Write the dataset; how many frames. ConfigurationError for a recording without an arm or commands."""
     import pyarrow  # noqa: PLC0415
-    from PIL import Image  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
     joined = tables.joined(FRAMES_HZ)
@@ -71,10 +71,8 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
         stats[name] = _statistics(values.astype(np.float64))
     for view, found in seen.items():
         if found:
-            shown = _newest(found, times_s)
+            shown, (width, height) = _of_one_size(_newest(found, times_s))
             key = f"observation.images.{view}"
-            with Image.open(io.BytesIO(found[0].jpeg)) as first_picture:
-                width, height = first_picture.size
             features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
             columns[key] = pyarrow.array(
                 [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
@@ -108,6 +106,23 @@ def pictures(recording: Recording, view: str) -> list[Picture]:
     first_ns = recording.began_ns()
     messages = recording.messages([f"/camera/{view}"])
     return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
+
+
+def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
+    """Enlarge what a narrow link made smaller: the format knows one size; with that size, width and height."""
+    from PIL import Image  # noqa: PLC0415
+
+    opened = [Image.open(io.BytesIO(picture.jpeg)) for picture in shown]
+    largest = max(one.size for one in opened)
+    alike = []
+    for picture, one in zip(shown, opened, strict=True):
+        if one.size == largest:
+            alike.append(picture)
+            continue
+        enlarged = io.BytesIO()
+        one.resize(largest).save(enlarged, "JPEG", quality=_ENLARGED_QUALITY)
+        alike.append(picture._replace(jpeg=enlarged.getvalue()))
+    return alike, largest
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:

@@ -6,9 +6,10 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from common.errors import RemoteProtocolError
-from common.protocol.codec import decode_view, encode
+from common.errors import ConfigurationError, OtherVersionError, RemoteProtocolError
+from common.protocol.codec import decode, decode_view, encode
 from common.protocol.view_messages import SceneState, VideoFrame
+from common.recording.entries import Kind, split_text, unpack_block
 from common.recording.images import read_image
 from common.recording.reading import Message, Recording
 
@@ -29,6 +30,18 @@ class Seen(NamedTuple):
     name: str
     """The name: the newest of each replaces all earlier ones"""
     content: bytes
+
+
+def require_protocol(recording: Recording) -> None:
+    """Raise a ConfigurationError where the first message that a side sent is of another protocol than ours."""
+    for message in recording.messages([f"/{side}/inputs" for side in recording.headers]):
+        for entry in unpack_block(message.content).unpacked():
+            if entry.kind == Kind.SENT:
+                try:
+                    decode(split_text(split_text(entry.content)[1])[1])
+                except OtherVersionError as error:
+                    raise ConfigurationError(f"{recording.path}: recorded with {error}") from error
+                return
 
 
 def seen(recording: Recording) -> Iterator[Seen]:

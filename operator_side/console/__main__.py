@@ -2,7 +2,8 @@
 
 operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run,
                           p where in a recording we are
-here ──▶ operator side    a the address, w how many pages are open, h hands, t tuning, p playing, e why there is none
+here ──▶ operator side    a the address, w how many pages are open, h hands, t tuning, p playing, e why there is none,
+                          l which pictures in H.264 are lacking: said once where they can be shown, and at each change
 """
 
 import contextlib
@@ -23,7 +24,15 @@ from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode_view
-from common.protocol.view_messages import VIEW_NAMES, EnlargementTerms, SceneShapes, SceneState, VideoFrame
+from common.protocol.view_messages import (
+    VIEW_NAMES,
+    AnyViewMessage,
+    EnlargementTerms,
+    SceneShapes,
+    SceneState,
+    VideoFrame,
+    VideoStep,
+)
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.facts import OperatorFacts
 
@@ -49,6 +58,8 @@ class _Process:
         self._drawing: Any = None
         self._pages: Any = None
         self._drawn_s = -math.inf
+        self._steps: Any = None
+        self._lacks: tuple[int, int] | None = None
 
     def run(self, port: int) -> None:
         """Serve until the channel ends; what makes it impossible is said through it."""
@@ -83,11 +94,20 @@ class _Process:
             return
         assert server.loop is not None  # noqa: S101  # Server sees to it
         server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)
+        # Only now, as it takes up to a second: until then pictures come as JPEG, and without it for good.
+        with contextlib.suppress(ImportError, ValueError):
+            from common.video.steps import Steps  # noqa: PLC0415  # an extra
+
+            server.loop.call_soon_threadsafe(self._follow, Steps())
         self._ended.wait()
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
         loop.add_reader(self._channel.fileno(), self._receive)
+
+    def _follow(self, steps: Any) -> None:
+        self._steps = steps
+        self._say_what_lacks()
 
     def _say(self, kind: str, content: bytes) -> None:
         self._channel.send(kind.encode(), content)
@@ -129,16 +149,24 @@ class _Process:
         return None
 
     def _view(self, payload: bytes) -> SceneState | None:
-        seen = decode_view(payload)
+        seen: AnyViewMessage | None = decode_view(payload)
+        if isinstance(seen, VideoStep):
+            seen = None if self._steps is None else self._steps.follow(seen)
+            self._say_what_lacks()
         if isinstance(seen, VideoFrame):
             before = _FRAME.pack(VIEW_NAMES.index(seen.view), seen.captured_s)
             self._pages.show(seen.view, before + seen.jpeg)
         elif isinstance(seen, SceneShapes):
             self._shapes = seen
             self._drawing.shapes(seen)
-        else:
+        elif isinstance(seen, SceneState):
             return seen
         return None
+
+    def _say_what_lacks(self) -> None:
+        if self._steps is not None and self._steps.lacks != self._lacks:
+            self._lacks = self._steps.lacks
+            self._say("l", msgspec.msgpack.encode(self._lacks))
 
     def _show_scene(self, state: SceneState) -> None:
         facts, names = self._facts, () if self._shapes is None else self._shapes.objects

@@ -38,6 +38,8 @@ class Console:
         """Where its page is, with the token that lets in; None until it is ready, and when it is gone."""
         self.pages = 0
         """How many are open: with none, nothing needs to be sent or rendered."""
+        self.lacks: tuple[int, int] | None = None
+        """As in `Watch`; None until it is known that pictures in H.264 can be shown."""
         self.came = 0
         """How often one came to look."""
         self.hands: deque[PageWords] = deque(maxlen=_MOST_HEARD)
@@ -100,6 +102,8 @@ class Console:
             elif kind == b"w":
                 before, self.pages = self.pages, int(content)
                 self.came += self.pages > before
+            elif kind == b"l":
+                self.lacks = msgspec.msgpack.decode(content, type=tuple[int, int])
             elif kind == b"e":
                 self._end(f"no console: {content.decode()}")
                 return

@@ -10,6 +10,8 @@ from collections import deque
 from itertools import pairwise
 from typing import Final, NamedTuple
 
+from common.following import follow
+
 MAX_DELAY_S: Final = 2.0
 """Beyond this loop age the robot side is disarmed, so that no older command matters."""
 _MOST_COMMANDS: Final = 4096
@@ -115,7 +117,7 @@ class CommandsUnderWay:
         way_m, speed = 0.0, speed_m_s
         for number, (duration_s, travel) in enumerate(self._from_echo_on(echo_sent_s, echo_held_s, now_s)):
             target = told_m_s if number == 0 and told_m_s is not None else travel * full_speed_m_s
-            way_m, speed = _follow(way_m, speed, target, acceleration_m_s2, duration_s)
+            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, duration_s)
         return Displacement(way_m, speed)
 
     def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[tuple[float, float]]:
@@ -132,12 +134,3 @@ class CommandsUnderWay:
             (until_s - sent_s, travel)
             for (sent_s, travel), (until_s, _) in pairwise([(since_s, followed[1]), *under_way, (now_s, 0.0)])
         ]
-
-
-def _follow(way_m: float, speed: float, target: float, acceleration: float, duration_s: float) -> tuple[float, float]:
-    """Way and speed after `duration_s` towards the speed `target`, changing by at most `acceleration`."""
-    changing_s = abs(target - speed) / acceleration
-    if changing_s > duration_s:
-        after = speed + math.copysign(acceleration * duration_s, target - speed)
-        return way_m + 0.5 * (speed + after) * duration_s, after
-    return way_m + 0.5 * (speed + target) * changing_s + target * (duration_s - changing_s), target

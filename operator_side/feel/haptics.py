@@ -47,23 +47,25 @@ class Haptics:
         """Nobody knows what this controller was told: it is released first, then told anew."""
         self._written = None if self._enabled else RELEASED
 
-    def commanded(self, command: MotionCommand | None, now_s: float) -> None:
-        """Remember what was sent at `now_s`; None: nothing, so that the arm stops if it had been told to move.
+    def commanded(self, command: MotionCommand) -> None:
+        """Remember what was sent: it counts until the next one.
 
         Without the run button nothing moves. Whether the arm is armed does not matter: what is felt begins with a
         report that says so, and all that was under way then is followed.
         """
-        if command is not None:
-            self._commands.sent(command.header.sent_s, command.r2 - command.l2 if command.run else 0.0)
+        self._commands.sent(command.header.sent_s, command.r2 - command.l2 if command.run else 0.0)
+        self._commanding = True
+
+    def silent(self, now_s: float, *, owns: bool) -> None:
+        """Nothing is sent any more: the arm stops if it had been told to move.
+
+        Where we do not own it somebody else may drive, and our commands say nothing any more of what it does.
+        """
+        if not owns and len(self._commands) > 0:
+            self._commands = CommandsUnderWay()
         elif self._commanding:
             self._commands.sent(now_s, 0.0)
-        self._commanding = command is not None
-
-    def forget_commands(self) -> None:
-        """Somebody else may drive: ours say nothing any more of what the arm does."""
         self._commanding = False
-        if len(self._commands) > 0:
-            self._commands = CommandsUnderWay()
 
     def output_report(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float

@@ -82,6 +82,10 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
         asked = delay.asked and f"  asked: {delay.asked}"
         lines.append(_line(f"{name}  mean {mean}  p99 {p99}  now {newest} ms{asked}"))
+    said = facts.status
+    rate, queue, lost = (_figure(number(said.get(name))) for name in ("rate_kbit_s", "queue_ms", "lost_percent"))
+    rates = {"rate": f"{rate} kbit/s", "queue": f"{queue} ms", "lost": f"{lost} %"}
+    lines.append(_named(**rates, pictures=said.get("pictures"), held_back=said.get("held_back")))
     ages = (facts.round_trip_ms, facts.field_age_ms, number(facts.status.get("loop_age_ms")))
     round_trip, field_age, loop_age = (f"{_figure(age)} ms" for age in ages)
     target = UNKNOWN if view.has_target is None else "none"

@@ -14,6 +14,7 @@ from msgspec import Meta
 from common.arrays import FloatArray
 from common.limits import check_limits
 from common.protocol.messages import MotionCommand, Vector2
+from robot_side.compiled.kernel import NUMBER, compiled, input_array
 
 Vector3 = tuple[float, float, float]
 _Speed = Annotated[float, Meta(gt=0.0, le=5.0)]
@@ -46,8 +47,19 @@ def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[V
 
 def tool_speed_m_s(tool_jacobian: FloatArray, joint_velocities_rad_s: FloatArray) -> float:
     """How fast the tool's point moves when joints (n,) move so; tool_jacobian (6, n), linear rows first."""
-    velocity = tool_jacobian[:3] @ joint_velocities_rad_s
-    return math.sqrt(velocity @ velocity)
+    speed_m_s: float = _speed(tool_jacobian, joint_velocities_rad_s)
+    return speed_m_s
+
+
+@compiled(input_array(2), input_array(1), returns=NUMBER)
+def _speed(jacobian: FloatArray, velocities: FloatArray) -> float:
+    squared = 0.0
+    for row in range(3):
+        velocity = 0.0
+        for joint in range(velocities.size):
+            velocity += jacobian[row, joint] * velocities[joint]
+        squared += velocity * velocity
+    return math.sqrt(squared)
 
 
 def deflected(lateral: Vector2, tool_rotation: FloatArray) -> tuple[FloatArray, float]:

@@ -4,18 +4,23 @@ TROUBLE: what was wrong with the ways to render that were tried before, one each
 """
 
 import contextlib
+import importlib.util
 import os
 import select
 import sys
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
-from robot_side.cameras.exchange import Order, Picture, Refusal, Setup, decode_to_companion, encode
+from common.protocol.view_messages import ViewName
+from robot_side.cameras.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
 from robot_side.cameras.off_screen import BACKENDS, REMEDY, silenced, trouble_with
 
 if TYPE_CHECKING:
+    from robot_side.cameras.h264 import H264
     from robot_side.cameras.rendering import Renderer
 
 _LATER = 5
@@ -57,7 +62,7 @@ def _refuse(channel: Channel, reason: str) -> None:
 
 
 def _serve(channel: Channel) -> None:
-    drawing: tuple[Renderer, int] | None = None
+    drawing: _Drawing | None = None
     clock = MonotonicClock()
     while not channel.ended:
         select.select([channel], [channel] if channel.waiting else [], [])
@@ -65,10 +70,12 @@ def _serve(channel: Channel) -> None:
             began_s = clock.now()
             message = decode_to_companion(payload)
             if isinstance(message, Setup):
-                drawing = _renderer_of(message), message.quality
+                drawing = _Drawing(message)
+                channel.send(encode(drawing.ready))
             elif drawing is not None:
-                jpeg = _render(*drawing, message)
-                channel.send(encode(Picture(message.view, message.captured_s, jpeg, clock.now() - began_s)))
+                (height, width, _), content, number, whole = drawing.picture(message)
+                place = message.view, message.captured_s, width, height
+                channel.send(encode(Picture(*place, content, clock.now() - began_s, number, whole)))
 
 
 def _renderer_of(setup: Setup) -> "Renderer":
@@ -78,12 +85,44 @@ def _renderer_of(setup: Setup) -> "Renderer":
         return Renderer(setup)
 
 
-def _render(renderer: "Renderer", quality: int, order: Order) -> bytes:
-    import simplejpeg  # noqa: PLC0415  # may be missing, which `main` says
+class _Drawing:
+    def __init__(self, setup: Setup) -> None:
+        self._renderer = _renderer_of(setup)
+        self._h264: dict[ViewName, H264] = {}
+        self.ready = _tried() if setup.h264 else Ready(h264=False)
 
-    picture = renderer.picture(order.view, order.positions, order.mocap_poses)
-    jpeg: bytes = simplejpeg.encode_jpeg(picture, quality, colorspace="RGB", colorsubsampling="420")
-    return jpeg
+    def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
+        """Its shape, its bytes, its number, 0 for JPEG, and whether it is a whole one."""
+        import simplejpeg  # noqa: PLC0415  # may be missing, which `main` says
+
+        from robot_side.cameras.rendering import halved  # noqa: PLC0415  # after the choice of a way to render
+
+        picture = self._renderer.picture(order.view, order.positions, order.mocap_poses)
+        if order.halved:
+            picture = halved(picture)
+        if order.h264:
+            from robot_side.cameras.h264 import H264  # noqa: PLC0415  # an extra
+
+            # H.264 has one colour for two pixels by two: an odd last row or column is left out.
+            picture = picture[: len(picture) & ~1, : picture.shape[1] & ~1]
+            encoder = self._h264.setdefault(order.view, H264())
+            content, whole = encoder.encode(picture, order.quality, whole=order.whole)
+            return picture.shape, content, encoder.number, whole
+        jpeg: bytes = simplejpeg.encode_jpeg(picture, order.quality, colorspace="RGB", colorsubsampling="420")
+        return picture.shape, jpeg, 0, True
+
+
+def _tried() -> Ready:
+    """Whether H.264 can be made, by making some: this imports PyAV before the first order, too."""
+    if importlib.util.find_spec("av") is None:
+        return Ready(h264=False)
+    try:
+        from robot_side.cameras.h264 import H264  # noqa: PLC0415  # an extra
+
+        H264().encode(np.zeros((16, 16, 3), np.uint8), 75)
+    except Exception as error:  # of PyAV's own kind, or of its import; JPEG is there
+        return Ready(h264=False, trouble=f"{type(error).__name__}: {error}")
+    return Ready(h264=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """What the robot side and the process that renders for it say to each other.
 
 robot side ── Setup, Order ──▶ companion
-robot side ◀── Picture, Refusal ── companion
+robot side ◀── Ready, Picture, Refusal ── companion
 """
 
 from typing import Final
@@ -34,9 +34,9 @@ class Setup(msgspec.Struct, frozen=True, tag=True):
     """As MuJoCo saves it"""
     width: int
     height: int
-    quality: int
-    """Of JPEG, 1 to 100"""
     viewpoints: dict[ViewName, Viewpoint]
+    h264: bool = False
+    """Whether pictures in H.264 may be ordered"""
 
 
 class Order(msgspec.Struct, frozen=True, tag=True):
@@ -48,6 +48,22 @@ class Order(msgspec.Struct, frozen=True, tag=True):
     """qpos, float64"""
     mocap_poses: bytes
     """(b, 7) float64: positions and quaternions of bodies that are moved by hand"""
+    quality: int
+    """As JPEG's, 1 to 100"""
+    halved: bool = False
+    """Half as wide and half as high"""
+    h264: bool = False
+    """Instead of JPEG"""
+    whole: bool = False
+    """Make a whole picture: somebody lacks the picture before this one"""
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
+    """The answer to Setup: orders are served from now on."""
+
+    h264: bool
+    trouble: str = ""
+    """Why PyAV, which is installed, makes no H.264"""
 
 
 class Picture(msgspec.Struct, frozen=True, tag=True):
@@ -56,9 +72,15 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
     view: ViewName
     captured_s: float
     """The order's"""
-    jpeg: bytes
+    width: int
+    height: int
+    content: bytes
     took_s: float
     """From reading the order to the finished picture"""
+    number: int = 0
+    """Of a picture in H.264, growing by one for each of a view; 0: it is JPEG"""
+    whole: bool = True
+    """Whether it can be shown without any other"""
 
 
 class Refusal(msgspec.Struct, frozen=True, tag=True):
@@ -69,4 +91,4 @@ class Refusal(msgspec.Struct, frozen=True, tag=True):
 
 encode: Final = msgspec.msgpack.Encoder().encode
 decode_to_companion: Final = msgspec.msgpack.Decoder(Setup | Order).decode
-decode_from_companion: Final = msgspec.msgpack.Decoder(Picture | Refusal).decode
+decode_from_companion: Final = msgspec.msgpack.Decoder(Ready | Picture | Refusal).decode

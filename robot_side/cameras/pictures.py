@@ -10,8 +10,10 @@ import numpy as np
 
 from common.companion.channel import MESSAGE_LIMIT_BYTES, Channel
 from common.companion.process import Companion
-from common.protocol.view_messages import ViewName
-from robot_side.cameras.exchange import Order, Picture, Refusal, Setup, decode_from_companion, encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
+from robot_side.cameras.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
+from robot_side.cameras.giving_way import GivingWay, Step
 from robot_side.cameras.settings import CamerasSettings
 from robot_side.cameras.viewpoints import viewpoints
 from robot_side.simulation.scene import Scene
@@ -24,8 +26,19 @@ RETRY_S: Final = 5.0
 _SILENT_S: Final = 30.0
 """An order that is not answered within this: it hangs. A slow machine takes a while to start."""
 _ENDING_S: Final = 5.0
+_WHOLE_S: Final = 0.5
+"""Whole pictures in H.264 are ordered no more often, as a viewer that asks for many takes the share of others."""
+_SETUP: Final = "setup"
+"""Among the orders, as it is answered like one"""
 _NEVER_BEGAN: Final = 2
 """After so many starts in a row that came to no picture, no other one follows."""
+
+
+def saved_model(scene: Scene) -> bytes:
+    """Save the model of a scene as MuJoCo does, for `Setup`."""
+    saved = np.zeros(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
+    mujoco.mj_saveModel(scene.model, None, saved)
+    return saved.tobytes()
 
 
 class Renders(Protocol):
@@ -70,17 +83,17 @@ class Cameras:
         start: Start = start_beside,
     ) -> None:
         """note: told in one line what does not work, and what would help."""
-        model = scene.model
-        saved = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
-        mujoco.mj_saveModel(model, None, saved)
-        self._setup = encode(
-            Setup(saved.tobytes(), settings.width, settings.height, settings.quality, viewpoints(scene))
-        )
-        self.period_s = 1.0 / settings.rate_hz
-        self.size = settings.width, settings.height
+        self._h264 = settings.codec == "auto"
+        """Whether the companion makes H.264; believed until it says no"""
+        shape = settings.width, settings.height
+        self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
+        self.giving_way = GivingWay(settings.rate_hz, settings.quality)
+        """Chooses how often and how well pictures are made"""
         self.starts = 0
         self.took_s: list[float] = []
         """How long the companion was at the newest pictures, at most a thousand."""
+        self._whole: dict[ViewName, tuple[int, float]] = {}
+        """The number of the newest whole picture in H.264, and when it came"""
         self._data = scene.data
         self._note = note
         self._start = start
@@ -89,7 +102,8 @@ class Cameras:
         self._companion: Renders | None = None
         self._ended: list[tuple[Renders, float]] = []
         """Those that may take until then to end by themselves."""
-        self._ordered_s: dict[ViewName, float] = {}
+        self._ordered_s: dict[str, float] = {}
+        self._ordered_as: dict[ViewName, Step] = {}
         self._wanted_s = -math.inf
         self._not_before_s = -math.inf
         self._failures = 0
@@ -112,11 +126,24 @@ class Cameras:
         """Whether an order of `view` is under way."""
         return view in self._ordered_s
 
-    def update(self, now_s: float, captured_s: float, wanted: Collection[ViewName]) -> list[Picture]:
+    def makes_h264(self, lacks: tuple[int, int] | None) -> bool:
+        """Whether pictures are H.264 for those who lack `lacks`, as in `Watch`; None: they show JPEG alone."""
+        return self._h264 and lacks is not None
+
+    def message(self, picture: Picture, header: Header) -> VideoFrame | VideoStep:
+        """Make what is published of a picture."""
+        place = header, picture.view, picture.captured_s, picture.width, picture.height
+        if picture.number == 0:
+            return VideoFrame(*place, picture.content)
+        return VideoStep(*place, picture.number, picture.whole, picture.content)
+
+    def update(
+        self, now_s: float, captured_s: float, wanted: Collection[ViewName], lacks: tuple[int, int] | None = None
+    ) -> list[Picture]:
         """Order the `wanted` views that are not under way, of the state as it is; what has been finished.
 
-        captured_s: when that state was so. To be called in every turn while `wanted` is not empty, and now and then
-        otherwise.
+        lacks: as `makes_h264`'s, the newest of all who look. captured_s: when that state was so. To be
+        called in every turn while `wanted` is not empty, and now and then otherwise.
         """
         if wanted:
             self._wanted_s = now_s
@@ -138,7 +165,7 @@ class Cameras:
             self._end(companion, now_s)
         else:
             for view in wanted:
-                self._order(companion, view, now_s, captured_s)
+                self._order(companion, view, now_s, captured_s, lacks)
         return pictures
 
     def close(self) -> None:
@@ -161,14 +188,24 @@ class Cameras:
             return
         self._companion = started
         started.channel.send(self._setup)
+        self._ordered_s[_SETUP] = now_s
 
-    def _order(self, companion: Renders, view: ViewName, now_s: float, captured_s: float) -> None:
-        if view in self._ordered_s:
+    def _order(
+        self, companion: Renders, view: ViewName, now_s: float, captured_s: float, lacks: tuple[int, int] | None
+    ) -> None:
+        if view in self._ordered_s or _SETUP in self._ordered_s:
             return
         data = self._data
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
-        if companion.channel.send(encode(Order(view, captured_s, data.qpos.tobytes(), mocap))):
-            self._ordered_s[view] = now_s
+        step, h264 = self.giving_way.step, self.makes_h264(lacks)
+        number, came_s = self._whole.get(view, (0, -math.inf))
+        # One that was lost is newer than the newest whole one.
+        lost = lacks is not None and lacks[VIEW_NAMES.index(view)] > number
+        whole = h264 and lost and now_s - came_s >= _WHOLE_S
+        positions = data.qpos.tobytes()
+        order = Order(view, captured_s, positions, mocap, step.quality, step.halved, h264, whole)
+        if companion.channel.send(encode(order)):
+            self._ordered_s[view], self._ordered_as[view] = now_s, step
 
     def _receive(self, companion: Renders, now_s: float) -> list[Picture]:
         pictures: list[Picture] = []
@@ -178,13 +215,28 @@ class Cameras:
                 self._give_up(message.reason)
                 self._end(companion, now_s)
                 return pictures
+            if isinstance(message, Ready):
+                self._ready(message)
+                continue
             self._ordered_s.pop(message.view, None)
             self._failures, self._has_worked = 0, True
+            if message.number and message.whole:
+                # Seldom, and ten times a step: it says nothing of those that follow.
+                self._whole[message.view] = message.number, now_s
+            else:
+                step = self._ordered_as[message.view]
+                self.giving_way.made(len(message.content), step, h264=message.number > 0)
             self.took_s = [*self.took_s[-999:], message.took_s]
             pictures.append(message)
         if companion.channel.ended:
             self._died(now_s, "has ended unexpectedly")
         return pictures
+
+    def _ready(self, message: Ready) -> None:
+        self._ordered_s.pop(_SETUP, None)
+        self._h264 &= message.h264
+        if message.trouble and not self._has_worked:
+            self._note(f"cameras: pictures are JPEG, ten times the bytes: PyAV makes no H.264: {message.trouble}")
 
     def _died(self, now_s: float, how: str) -> None:
         if self._companion is not None:
@@ -208,6 +260,7 @@ class Cameras:
         self._ended.append((companion, now_s + _ENDING_S))
         self._companion = None
         self._ordered_s.clear()
+        self._whole.clear()
 
     def _follow_ends(self, now_s: float) -> None:
         """See those off that have been told to end; who does not is killed."""

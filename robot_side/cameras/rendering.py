@@ -62,6 +62,14 @@ class Renderer:
             camera.frustum_center = camera.frustum_width = 0.0
 
 
+def halved(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Take the means of two by two pixels (2h, 2w, 3) into one (h, w, 3); an odd last row or column is left out."""
+    height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
+    rows = picture[0:height:2].astype(np.uint16) + picture[1:height:2]
+    half: npt.NDArray[np.uint8] = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
+    return np.ascontiguousarray(half)
+
+
 def placed(viewpoint: Viewpoint, data: mujoco.MjData) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where a viewpoint without a camera is now, looks to, and has above: (3,) each, in the world frame."""
     rotation = data.xmat[viewpoint.body].reshape(3, 3)

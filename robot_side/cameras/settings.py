@@ -1,7 +1,7 @@
 """What a person may set about pictures."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from msgspec import Meta
@@ -23,7 +23,9 @@ class CamerasSettings:
     rate_hz: Annotated[float, Meta(ge=0.1, le=120.0)] = 30.0
     """Pictures of each view in a second."""
     quality: Annotated[int, Meta(ge=1, le=100)] = 75
-    """Of JPEG, 1 to 100: 75 is 20 kB for each picture, more than 90 three times that."""
+    """1 to 100: 75 is 20 kB for each picture as JPEG, more than 90 three times that; 1 to 2 kB as H.264."""
+    codec: Literal["auto", "jpeg"] = "auto"
+    """auto: H.264 where PyAV is installed here and with all who look, and nothing is recorded here; else JPEG."""
 
     def __post_init__(self) -> None:
         check_limits(self)

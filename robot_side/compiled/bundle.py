@@ -64,6 +64,13 @@ def indices(bundle: IntArray, place: int) -> IntArray:
 
 
 @inlined
+def bundled(bundle: IntArray, place: int) -> IntArray:
+    """The array (n, 2) of int64: another bundle."""
+    found: IntArray = _view(_pointer(bundle[place, 0]), (bundle[place, 1], 2), np.int64)
+    return found
+
+
+@inlined
 def flags(bundle: IntArray, place: int) -> BoolArray:
     """The array (n,) of bools."""
     found: BoolArray = _view(_pointer(bundle[place, 0]), (bundle[place, 1],), np.bool_)

@@ -6,20 +6,20 @@ from typing import Any, cast
 import numba
 import numba.extending
 
-from robot_side.compiled.kernel import COUNT, Compiled
+from robot_side.compiled.kernel import COUNT
 from robot_side.compiled.numba_inside import call_at
 
 
-def call_of(kernel: Compiled) -> Callable[[int, tuple[Any, ...]], Any]:
-    """The function by which kernels call `kernel`: of its `address` and a tuple of its arguments; in kernels only.
+def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, tuple[Any, ...]], Any]:
+    """Make the function by which kernels call others of these types: of an `address` and a tuple of the arguments.
 
-    Arguments of other types than the kernel's are refused as the caller is compiled.
+    In kernels only. Arguments of other types are refused as the caller is compiled.
     """
-    wanted = kernel.signature
+    wanted = returns(*arguments)
 
     def call(_typing: Any, _address: Any, given: Any) -> Any:
         if len(given) != len(wanted.args) or not all(map(_fits, given, wanted.args)):
-            raise numba.TypingError(f"{kernel.name} takes {wanted.args}, not {given}")
+            raise numba.TypingError(f"the kernel takes {wanted.args}, not {given}")
 
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             address, packed = arguments

@@ -58,6 +58,11 @@ def record_array(dtype: np.dtype) -> Any:
     return numba.types.Array(numba.from_dtype(dtype), 1, "C")
 
 
+def together(*parts: Any) -> Any:
+    """The Numba type of a tuple of these; a kernel takes a dozen arrays in one as fast as one array."""
+    return cast(Any, numba.types).Tuple(parts)
+
+
 NUMBER: Any = numba.types.float64
 """The Numba type of a float."""
 TRUTH: Any = numba.types.boolean

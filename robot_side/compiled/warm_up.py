@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from importlib.util import find_spec
 from pkgutil import walk_packages
 from typing import Final
 
@@ -57,8 +58,14 @@ def warm_up(
 def import_kernels() -> tuple[Compiled, ...]:
     """Import every module of ours, and so every kernel that some scene may need; all of them."""
     for module in walk_packages(import_module("robot_side").__path__, "robot_side."):
-        if not module.name.endswith("__main__"):
+        if module.name.endswith("__main__"):
+            continue
+        try:
             import_module(module.name)
+        except ModuleNotFoundError as error:
+            # A library of an extra that this machine lacks: no kernel needs one.
+            if error.name is None or find_spec(error.name.partition(".")[0]) is not None:
+                raise
     return tuple(kernel for kernel in imported_kernels() if kernel.is_ours)
 
 

@@ -12,6 +12,7 @@ from scipy.special import ndtri
 from common.arrays import FloatArray, require_finite
 from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
+from robot_side.compiled.kernel import compiled, inlined, input_array, output_array
 from robot_side.enlargement.prediction_errors import PredictionErrors
 
 Vector3 = tuple[float, float, float]
@@ -65,8 +66,23 @@ def enlargement_distance(
     mean = _non_negative("mean_m", mean_m)
     variance = _non_negative("variance_m2", variance_m2)
     delay = _non_negative("delay_displacement_m", delay_displacement_m)
-    distance = delay + np.maximum(0.0, mean + z * np.sqrt(variance))
+    arguments = np.broadcast_arrays(mean, variance, z)
+    distance = np.empty(arguments[0].shape)
+    _statistical_loop(*(np.ascontiguousarray(one).ravel() for one in arguments), distance.reshape(-1))
+    distance = delay + distance
     return float(distance) if np.ndim(distance) == 0 else distance
+
+
+@inlined
+def statistical_distance(mean: float, variance: float, quantile: float) -> float:
+    """D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10): what every law, and every explanation, means by it."""
+    return max(0.0, mean + quantile * math.sqrt(variance))
+
+
+@compiled(input_array(1), input_array(1), input_array(1), output_array(1))
+def _statistical_loop(mean: FloatArray, variance: FloatArray, quantile: FloatArray, distances: FloatArray) -> None:
+    for k in range(distances.size):
+        distances[k] = statistical_distance(mean[k], variance[k], quantile[k])
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from robot_side.gripper.kept_covers import kept_cover
 from robot_side.gripper.solids import Solid, convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
-from robot_side.objects.mesh_bounds import mesh_bounds, mesh_corners, placed_middles
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
@@ -32,9 +31,9 @@ _Spheres = tuple[FloatArray, FloatArray]
 class HeldCovers:
     """Covers of all objects of a scene, whose shapes do not change while they move.
 
-    Balls and boxes need no search. A mesh is covered in its own frame, once for each shape; the spheres of tetrahedra
-    are kept as shares of their vertices. What is too large to grip, has too many parts or comes after 32 others has a
-    box's spheres, or a ball around each tetrahedron.
+    Balls need no search, and boxes a short one. A mesh is covered in its own frame, once for each shape. The spheres of
+    tetrahedra are kept as shares of their vertices. What is too large to grip, has too many parts or comes after 32
+    others has a box's spheres, or a ball around each tetrahedron.
     """
 
     def __init__(
@@ -52,7 +51,7 @@ class HeldCovers:
         self._meshes: dict[int, _Spheres] = {}
         self._tetrahedra: dict[str, tuple[IntArray, FloatArray, FloatArray]] = {}
         coarse: dict[str, float] = {}
-        corners = [] if objects.mesh_library is None else mesh_corners(objects.mesh_library)
+        corners = [] if objects.mesh_library is None else objects.mesh_library.corners_m
         first = sorted(range(len(objects.names)), key=lambda index: objects.roles[index] is not Role.TARGET)
         for index in first:
             if objects.roles[index] is Role.SUPPORT or objects.names[index] in fixed:
@@ -83,8 +82,20 @@ class HeldCovers:
                     stand_outs.append(stand_out)
             if max(stand_outs) > stand_out_m * (1.0 + 1e-9):
                 coarse[name] = max(stand_outs)
+        self._plan_boxes(objects, fixed)
         self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
         """Names of what was searched for and still stands out farther, with by how much (m)."""
+
+    def _plan_boxes(self, objects: PerceivedObjects, fixed: Collection[str]) -> None:
+        """Cover a box of each size once: it is remembered, and takes several ticks the first time."""
+        names_and_roles = zip(objects.names, objects.roles, strict=True)
+        lifted = [role is not Role.SUPPORT and name not in fixed for name, role in names_and_roles]
+        for kind in KINDS:
+            if kind.in_box and kind.derive is None:
+                half_sizes_m = kind.read(objects)[2][np.array(lifted, dtype=np.bool_)[getattr(objects, kind.owner)]]
+                sizes = np.unique(half_sizes_m, axis=0)
+                for size in sizes[2.0 * sizes.min(axis=1, initial=np.inf) <= _WIDEST_M][:_MOST_SHAPES]:
+                    cover_boxes(np.zeros((1, 3)), np.eye(3)[None], size[None], self._stand_out_m)
 
     def _may_search(self, points_m: FloatArray) -> bool:
         few = len(self._meshes) + len(self._tetrahedra) < _MOST_SHAPES
@@ -94,35 +105,44 @@ class HeldCovers:
         """Centres (m, 3) in the world and radii (m,) of the object `index`, where `objects` has it."""
         balls = objects.sphere_object == index
         found = [(objects.sphere_centers_m[balls], objects.sphere_radii_m[balls])]
-        boxes = objects.box_object == index
-        found += self._boxes(
-            objects.box_centers_m[boxes], objects.box_rotations[boxes], objects.box_half_sizes_m[boxes]
-        )
-        meshes = objects.mesh_object == index
-        for row in np.flatnonzero(meshes).tolist():
+        for row in np.flatnonzero(objects.mesh_object == index).tolist():
             if (known := self._meshes.get(int(objects.mesh_index[row]))) is not None:
                 found.append((objects.mesh_positions_m[row] + known[0] @ objects.mesh_rotations[row].T, known[1]))
-        found += self._around_meshes(objects, meshes & ~np.isin(objects.mesh_index, list(self._meshes)))
+        for kind in KINDS:
+            rows = getattr(objects, kind.owner) == index
+            if kind.name == "mesh":
+                rows &= ~np.isin(objects.mesh_index, list(self._meshes))
+            if kind.in_box and rows.any():
+                centers, rotations, half_sizes, *_ = (column[rows] for column in kind.read(objects))
+                cover = cover_boxes(centers, rotations, half_sizes, self._stand_out_m)
+                spheres: _Spheres = cover.centers_m, cover.radii_m
+                found.append(
+                    _near_ellipsoids(spheres, centers, rotations, half_sizes) if kind.name == "ellipsoid" else spheres
+                )
         vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
         if (shared := self._tetrahedra.get(objects.names[index])) is not None and len(vertices):
-            rows, shares, radii = shared
-            found.append((np.einsum("mv,mvi->mi", shares, vertices[rows]), radii))
+            of, shares, radii = shared
+            found.append((np.einsum("mv,mvi->mi", shares, vertices[of]), radii))
         else:
             middles = vertices.mean(axis=1)
             found.append((middles, np.linalg.norm(vertices - middles[:, None, :], axis=2).max(axis=1, initial=0.0)))
         return np.concatenate([centers for centers, _ in found]), np.concatenate([radii for _, radii in found])
 
-    def _boxes(self, centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray) -> list[_Spheres]:
-        if not len(centers_m):
-            return []
-        cover = cover_boxes(centers_m, rotations, half_sizes_m, self._stand_out_m)
-        return [(cover.centers_m, cover.radii_m)]
 
-    def _around_meshes(self, objects: PerceivedObjects, rows: BoolArray) -> list[_Spheres]:
-        if objects.mesh_library is None or not rows.any():
-            return []
-        half_sizes = mesh_bounds(objects.mesh_library).half_sizes_m[objects.mesh_index[rows]]
-        return self._boxes(placed_middles(objects)[rows], objects.mesh_rotations[rows], half_sizes)
+def _near_ellipsoids(
+    spheres: _Spheres, middles_m: FloatArray, rotations: FloatArray, half_axes_m: FloatArray
+) -> _Spheres:
+    """Those of the spheres that may reach any of the ellipsoids (e,).
+
+    A sphere that reaches an ellipsoid has its centre in one whose half axes are longer by the radius, times the ratio
+    of the longest half axis to the shortest.
+    """
+    centers_m, radii_m = spheres
+    own = np.einsum("eij,mei->mej", rotations, centers_m[:, None] - middles_m)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        longer = half_axes_m + radii_m[:, None, None] * (half_axes_m.max(axis=1) / half_axes_m.min(axis=1))[:, None]
+        reached: BoolArray = ~(((own / longer) ** 2).sum(axis=2).min(axis=1) > 1.0)
+    return centers_m[reached], radii_m[reached]
 
 
 def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Solid:

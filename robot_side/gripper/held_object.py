@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.ahead.distances import object_distances
-from robot_side.ahead.scene_table import scene_table
 from robot_side.arm.port import GripperPose
 from robot_side.compiled.kernel import compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, load
 from robot_side.gripper.held_covers import HeldCovers
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.surroundings.distances import object_distances
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.scene_table import SceneTable
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class HeldObject:
     """Index among the perceived objects' names."""
     name: str
     centers_in_tool_m: FloatArray
-    """(k, 3)"""
+    """(k, 3) contiguous"""
     radii_m: FloatArray
     """(k,)"""
     _joined: list[tuple[FloatArray, FloatArray, BoolArray]] = field(default_factory=list, compare=False, repr=False)
@@ -37,15 +37,16 @@ class HeldObject:
         return self._joined[0][1:]
 
 
-def gripped_object(objects: PerceivedObjects, tool_position_m: FloatArray, reach_m: float) -> int | None:
+def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: float) -> int | None:
     """The object nearest to the point between the fingertips, within `reach_m`; None when there is none.
 
     Supports are never held: an arm that closes its fingers on the table does not lift it. Nor is anything with a
     half-space, which has no end to be lifted by, whatever its role.
     """
+    objects = scene.objects
     unbounded = set(objects.half_space_object.tolist())
     point_m, no_radius = np.ascontiguousarray(tool_position_m[None]), np.zeros(1)
-    distances_m = object_distances(point_m, no_radius, scene_table(objects), reach_m)
+    distances_m = object_distances(point_m, no_radius, scene, reach_m)
     within = (
         index
         for index in np.flatnonzero(np.isfinite(distances_m)).tolist()
@@ -73,18 +74,8 @@ def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
     """The gripper's spheres and after them the held object's, all moving with the tool."""
     radii_m, on_finger = held.joined(pose)
     centers_m = np.empty((len(radii_m), 3))
-    _join(
-        *(np.ascontiguousarray(pose.sphere_centers_m), np.ascontiguousarray(held.centers_in_tool_m)),
-        *(pose.tool_position_m, np.ascontiguousarray(pose.tool_rotation), centers_m),
-    )
-    return GripperPose(
-        tool_position_m=pose.tool_position_m,
-        tool_rotation=pose.tool_rotation,
-        tool_jacobian=pose.tool_jacobian,
-        sphere_centers_m=centers_m,
-        sphere_radii_m=radii_m,
-        sphere_on_finger=on_finger,
-    )
+    _join(pose.sphere_centers_m, held.centers_in_tool_m, pose.tool_position_m, pose.tool_rotation, centers_m)
+    return GripperPose(*(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, centers_m, radii_m, on_finger))
 
 
 @compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))

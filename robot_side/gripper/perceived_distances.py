@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_side.ahead.distances import object_distances
-from robot_side.ahead.scene_table import scene_table
 from robot_side.arm.port import GripperPose
-from robot_side.objects.perceived import PerceivedObjects, Role
+from robot_side.surroundings.distances import object_distances
+from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.scene_table import SceneTable
 
 _FIRST_REACH_M = 0.1
 _FARTHEST_M = 3.2
@@ -25,13 +25,12 @@ class PerceivedDistances:
 
 
 def perceived_distances(
-    pose: GripperPose, objects: PerceivedObjects, target: int | None, held: int | None
+    pose: GripperPose, scene: SceneTable, target: int | None, held: int | None
 ) -> PerceivedDistances:
-    """The distances in one frame; `target` and `held` are indices in `objects`, or None."""
+    """The distances in one frame; `target` and `held` are indices of objects, or None."""
     wanted = target if target != held else None
-    reach_m, distances_m = _FIRST_REACH_M, np.full(len(objects.names), np.inf)
+    objects, reach_m, distances_m = scene.objects, _FIRST_REACH_M, np.full(len(scene.objects.names), np.inf)
     # No object that is nearer than the reach is missed, so that the search ends as soon as both are.
-    scene = scene_table(objects)
     while reach_m <= _FARTHEST_M:
         distances_m = object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m)
         for index in np.flatnonzero(np.isfinite(distances_m)):

@@ -3,7 +3,9 @@
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
+
+import msgspec
 
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
@@ -13,16 +15,17 @@ from robot_side.operators.lease import Lease
 from robot_side.operators.participant import Participant
 from robot_side.operators.tuning import Tuning
 
-_NOTICE_PERIOD_S = 0.05
+_NOTICE_PERIOD_S = 0.1
 _ANSWER_PERIOD_S = 0.1
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """A payload for `peer`."""
 
     peer: bytes
     payload: bytes
+    everywhere: bool
+    """Over every connection: it says something new."""
 
 
 class Announcements:
@@ -36,7 +39,7 @@ class Announcements:
         self._answers: list[Answer] = []
         self._answered_stranger_s = -math.inf
         self._noticed_s = -math.inf
-        self._noticed: list[tuple[int, SessionState]] = []
+        self._noticed: list[tuple[int, SessionState, int]] = []
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
@@ -65,11 +68,11 @@ class Announcements:
         place = 0 if is_free else waiting + 1
         header, token = self.stamp(now_s), self._lease.token
         notice = LeaseNotice(header, session=session, why=why, token=token, waiting=waiting, place=place)
-        self._answers.append(Answer(peer, encode(notice)))
+        self._answers.append(Answer(peer, encode(notice), everywhere=True))
 
     def take(self, now_s: float) -> list[Answer]:
         """Answers to send now, and a notice for everyone when anything changed or the last ones are old."""
-        standing = [(one.epoch, one.session.state) for one in self._lease.present()]
+        standing = [(one.epoch, one.session.state, one.tuned) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:
             self._noticed_s, self._noticed, self._noticed_token = now_s, standing, self._lease.token
@@ -79,7 +82,7 @@ class Announcements:
         return answers
 
     def _hello(self, peer: bytes, link: LinkEnd, now_s: float) -> None:
-        self._answers.append(Answer(peer, encode(link.hello(now_s, next(self._sequence)))))
+        self._answers.append(Answer(peer, encode(link.hello(now_s, next(self._sequence))), everywhere=True))
 
     def _notice(self, participant: Participant, now_s: float) -> None:
         observers = self._lease.observers()
@@ -94,4 +97,6 @@ class Announcements:
             probability=self._tuning.probability,
             tuned=participant.tuned,
         )
-        self._answers.append(Answer(participant.peer, encode(notice)))
+        _, *said = msgspec.structs.astuple(notice)
+        self._answers.append(Answer(participant.peer, encode(notice), everywhere=said != participant.noticed))
+        participant.noticed = said

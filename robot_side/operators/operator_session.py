@@ -5,10 +5,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from common.errors import OtherVersionError, RemoteProtocolError
+from common.peer_name import key_part
 from common.protocol.codec import decode
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Header, Hello, MotionCommand, Tune, Watch
 from common.protocol.session import SessionEvent, SessionState
+from common.silence import counted_s
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
 from robot_side.operators.lease import MOST_OBSERVERS, Lease
@@ -23,6 +25,8 @@ class Receiver(NamedTuple):
 
     peer: bytes
     header: Header
+    everywhere: bool
+    """Over every connection: the state is another one than it was told last."""
 
 
 class OperatorSession:
@@ -58,7 +62,8 @@ class OperatorSession:
         self._token = 0
         self._updated_s = -math.inf
         self._began = False
-        self._echoed_s: float | None = None
+        self._loop_age_s: float | None = None
+        self._accepted_s = -math.inf
         self._sent_s: float | None = None
         self._next_target_pressed = False
 
@@ -96,7 +101,8 @@ class OperatorSession:
             self.rejected += 1
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
-        if participant is None:
+        if participant is None or key_part(participant.peer) != key_part(peer):
+            # An epoch belongs to the key that began it, whatever the connection.
             self.rejected += 1
             return
         arrival = participant.link.arrived(message, now_s)
@@ -107,8 +113,9 @@ class OperatorSession:
                 self.lease.ask(participant, now_s)
                 self._follow_owner()
         if isinstance(message, MotionCommand):
-            self.motion_received += 1
-            if participant is self.lease.owner and self.safety.state == "armed" and arrival.one_way_s is not None:
+            self.motion_received += not arrival.copy
+            driving = participant is self.lease.owner and self.safety.state == "armed" and not arrival.copy
+            if driving and arrival.one_way_s is not None:
                 self.driving_delay.add(arrival.one_way_s)
             self._judge(participant, message, arrival, now_s)
         elif arrival.fresh:
@@ -135,13 +142,13 @@ class OperatorSession:
         self.lease.expire(now_s)
         self._follow_owner()
 
-    def owner(self, now_s: float) -> Receiver | None:
-        """Where to send the owner's stiffness; None while there is no owner."""
+    def owners(self, now_s: float) -> list[Receiver]:
+        """Where to send the owner's stiffness now; none while there is no owner."""
         owner = self.lease.owner
-        return None if owner is None else self._receiver(owner, now_s)
+        return [] if owner is None else [self._receiver(owner, now_s)]
 
     def observers(self, now_s: float) -> list[Receiver]:
-        """Where to send what observers may feel."""
+        """Where to send now what observers may feel."""
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
     def shown_header(self, now_s: float) -> Header:
@@ -153,8 +160,11 @@ class OperatorSession:
         return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
-        """How old the stamp of ours is that the newest accepted command echoes; None before the first (eq. 8)."""
-        return None if self._echoed_s is None else now_s - self._echoed_s
+        """How old the stamp of ours is that the newest accepted command echoes; None before the first (eq. 8).
+
+        Of silences, the peer's and ours, what counts (common/silence.py).
+        """
+        return None if self._loop_age_s is None else self._loop_age_s + counted_s(now_s - self._accepted_s)
 
     def permission(self, now_s: float) -> Permission:
         """What may reach the arm in this tick."""
@@ -214,14 +224,14 @@ class OperatorSession:
         if not self._may_command(participant, command):
             self.not_owners += 1
             participant.session.handle(SessionEvent.WRONG_TOKEN)
-            if command.emergency_stop and participant is self.lease.owner:
-                # It counts however late it comes, under any lease of this owner.
-                self.safety.emergency_stop(now_s)
+            if participant is self.lease.owner:
+                # A stop counts under any lease of this owner.
+                self.safety.hear_stop(command, now_s)
             return
         if not self.safety.receive(command, arrival, now_s):
             return
-        # Both on our own clock, so that they age from tick to tick.
-        self._echoed_s = None if arrival.loop_age_s is None else now_s - arrival.loop_age_s
+        self._loop_age_s, self._accepted_s = arrival.loop_age_s, now_s
+        # On our own clock, so that it ages from tick to tick.
         self._sent_s = None if arrival.one_way_s is None else now_s - arrival.one_way_s
         self._next_target_pressed |= command.next_target and not participant.next_target_was_down
         participant.next_target_was_down = command.next_target
@@ -244,8 +254,11 @@ class OperatorSession:
         owner.hand_over_was_down = owner.next_target_was_down = True
         self.leases_granted += 1
         self._began = True
-        self._echoed_s = self._sent_s = None
+        self._loop_age_s = self._sent_s = None
         self._next_target_pressed = False
 
     def _receiver(self, participant: Participant, now_s: float) -> Receiver:
-        return Receiver(participant.peer, self._announcements.stamp(now_s, participant.link))
+        state = self.safety.state
+        header, changed = self._announcements.stamp(now_s, participant.link), state != participant.told_state
+        participant.told_state = state
+        return Receiver(participant.peer, header, changed)

@@ -3,6 +3,7 @@
 import math
 
 from common.protocol.link_end import LinkEnd
+from common.protocol.messages import MotionState
 from common.protocol.session import Session, SessionState
 
 
@@ -22,6 +23,10 @@ class Participant:
         """When its Hello was answered last."""
         self.next_target_was_down = True
         self.hand_over_was_down = True
+        self.told_state: MotionState | None = None
+        """The arm's, as it was told last with a stiffness."""
+        self.noticed: list[object] = []
+        """What it was told last of the lease."""
         self.tuned = 0
         """The number of its newest wish to tune."""
 

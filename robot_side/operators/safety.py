@@ -69,6 +69,8 @@ class Safety:
         self.discarded_by_age = 0
         self.settings = settings
         self._stopped = False
+        self._stop_followed = (-1, -1)
+        """Epoch and sequence number of the newest stop that was followed."""
         self._session: Session | None = None
         self._forget()
 
@@ -106,8 +108,7 @@ class Safety:
 
     def receive(self, command: MotionCommand, arrival: Arrival, now_s: float) -> bool:
         """Judge one command of the owner; True when it was accepted. An emergency stop counts however late it is."""
-        if command.emergency_stop:
-            self.emergency_stop(now_s)
+        self.hear_stop(command, now_s)
         if not arrival.fresh:
             return False
         if self._queued_too_long(arrival):
@@ -120,6 +121,17 @@ class Safety:
         self._check_loop(now_s)
         self._follow_buttons(command, now_s)
         return True
+
+    def hear_stop(self, command: MotionCommand, now_s: float) -> None:
+        """Stop if `command` says so, however late it comes; a stop that has been followed counts no second time.
+
+        A late copy of it, by another connection, must not undo an arming since.
+        """
+        order = command.header.epoch, command.header.sequence
+        followed = self._stop_followed
+        if command.emergency_stop and not (order[0] == followed[0] and order[1] <= followed[1]):
+            self._stop_followed = order
+            self.emergency_stop(now_s)
 
     def emergency_stop(self, now_s: float) -> None:
         """Stop whatever goes on; nothing happens while it stands stopped already."""

@@ -22,6 +22,19 @@ class Watchers:
         self.scene_begun += watch.scene and not looked
         self._watching[epoch] = watch, now_s
 
+    def lacks(self, now_s: float) -> tuple[int, int] | None:
+        """The newest pictures that somebody lacks, by view; None when not all who look at pictures show H.264."""
+        looking = [
+            watch.lacks
+            for watch, heard_s in self._watching.values()
+            if now_s - heard_s < WATCH_S and (watch.overview or watch.first_person)
+        ]
+        known = [lacks for lacks in looking if lacks is not None]
+        if not known or len(known) < len(looking):
+            return None
+        first, second = (max(numbers) for numbers in zip(*known, strict=True))
+        return first, second
+
     def looked_at(self, now_s: float) -> frozenset[str]:
         """What somebody looks at: of `overview`, `first_person` and `scene`, those that are."""
         if not self._watching:

@@ -1,29 +1,21 @@
 """The simulated arm: physics on a clock of its own, commands that run out, and sensors."""
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from common.clock import Clock
 from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
-from robot_side.compiled.kernel import (
-    NUMBER,
-    TRUTH,
-    compiled,
-    input_array,
-    input_indices,
-    output_array,
-    record_array,
-)
+from robot_side.compiled.bundle import addresses
 from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive, advance_gripper
+from robot_side.simulation.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.simulation.gripper_measurement import measure_gripper
-from robot_side.simulation.joint_drives import DRIVE, control, motor_acceleration
-from robot_side.simulation.joint_reference import REFERENCE, JointReference, MotionLimits, advance_references
+from robot_side.simulation.joint_reference import JointReference, MotionLimits
+from robot_side.simulation.plant import LIMITS, Plant, drive, inertia_table, sense
 from robot_side.simulation.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -32,9 +24,6 @@ LONGEST_TURN_S: Final = 0.02
 _LIMIT_MARGIN_RAD = 0.005
 # Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
-
-_INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
-"""One element of the arm's inertia matrix on or below its diagonal, by joints: its place in what MuJoCo keeps of it."""
 
 
 class MujocoArm:
@@ -80,21 +69,20 @@ class MujocoArm:
         self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         mujoco.mj_forward(model, data)
         # MuJoCo's arrays stay where they are as long as the state lives: asking for one costs more than a step's use.
-        self._positions, self._velocities = data.qpos, data.qvel
         self._unstable = data.warning.number[_UNSTABLE]
-        self._sensed = np.concatenate([robot.arm_positions, robot.finger_positions])
         gripper = self._gripper
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
-        self._tables = (
+        self._plant = Plant(
             self._reference.joints,
             robot.drives.table(model.dof_damping[robot.arm_velocities]),
-            _inertia(model, robot.arm_velocities),
+            inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
             np.zeros((0, 3)) if gripper is None else gripper.samples,
             np.zeros(0, GRIPPER_INPUT) if gripper is None else gripper.inputs(robot.gripper_controls),
-            robot.arm_positions,
-            robot.arm_velocities,
-            robot.arm_controls,
+            robot.arm_positions.astype(np.int64),
+            robot.finger_positions.astype(np.int64),
+            robot.arm_velocities.astype(np.int64),
+            robot.arm_controls.astype(np.int64),
             data.qpos,
             data.qvel,
             data.M,
@@ -104,7 +92,9 @@ class MujocoArm:
             data.actuator_length[measured:],
             data.actuator_velocity[measured:],
             data.ctrl,
+            np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
         )
+        self._addresses = addresses(*self._plant)
 
     @property
     def joint_count(self) -> int:
@@ -183,34 +173,29 @@ class MujocoArm:
         return max(due, 0)
 
     def _advance_one_step(self) -> None:
-        time_s, limits = self._time_s, self._reference.limits
-        _drive(
-            *self._tables,
-            *self._reference.follows(time_s),
-            0.0 if self._gripper is None else self._gripper.moving(time_s),
-            self._step_s,
-            limits.velocity_rad_s,
-            limits.acceleration_rad_s2,
-            limits.deceleration_rad_s2,
-        )
+        time_s = self._time_s
+        closing = 0.0 if self._gripper is None else self._gripper.moving(time_s)
+        drive(self._addresses, *self._reference.follows(time_s), closing, self._step_s)
         mujoco.mj_step(self._model, self._data)
         self._steps += 1
 
     def _measure(self) -> ArmState:
-        joints, gripper = self.joint_count, self._gripper
-        readings = self._encoder.read(self._positions.take(self._sensed))
+        plant, gripper, encoder = self._plant, self._gripper, self._encoder
+        positions, fingers = encoder.noise(plant.positions.size), encoder.noise(plant.fingers.size)
+        velocities = np.empty(plant.velocities.size)
+        sense(self._addresses, encoder.sigma_rad, encoder.resolution_rad, positions, velocities, fingers)
         return ArmState(
             time_s=self._time_s,
-            joint_positions_rad=readings[:joints],
-            joint_velocities_rad_s=self._velocities.take(self._robot.arm_velocities),
-            finger_positions=readings[joints:],
+            joint_positions_rad=positions,
+            joint_velocities_rad_s=velocities,
+            finger_positions=fingers,
             gripper_opening_m=0.0 if gripper is None else gripper.opening_m,
             gripper_holding=gripper is not None and gripper.holding,
         )
 
     def _require_stable(self) -> None:
         # MuJoCo resets an unstable simulation to its start, which must not pass for a motion of the arm.
-        if self._unstable.any():
+        if np.count_nonzero(self._unstable):
             raise FeelaheadError(
                 f"the simulation became unstable at {self._data.time:.3f} s; a smaller timestep in the model may help"
             )
@@ -218,81 +203,3 @@ class MujocoArm:
 
 def _share(steps: int, skipped: int) -> float:
     return steps / (steps + skipped) if steps + skipped else 1.0
-
-
-def _inertia(model: Any, velocities: IntArray) -> np.ndarray:
-    """The elements (k,) of _INERTIA that joints at `velocities` (n,) among the degrees of freedom share."""
-    joint_of = {int(velocity): joint for joint, velocity in enumerate(velocities)}
-    found = [
-        (place, joint, joint_of[int(model.M_colind[place])])
-        for velocity, joint in joint_of.items()
-        for place in range(model.M_rowadr[velocity], model.M_rowadr[velocity] + model.M_rownnz[velocity])
-        if int(model.M_colind[place]) in joint_of
-    ]
-    return np.array(found, _INERTIA)
-
-
-@compiled(
-    *(record_array(REFERENCE), record_array(DRIVE), record_array(_INERTIA)),
-    *(record_array(GRIPPER), input_array(2), record_array(GRIPPER_INPUT)),
-    *(input_indices(), input_indices(), input_indices()),
-    *(input_array(1), input_array(1), input_array(1), input_array(1), input_array(1), input_array(1)),
-    *(input_array(1), input_array(1), output_array(1)),
-    *(TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER),
-)
-def _drive(
-    joints: Any,
-    drives: Any,
-    inertia: Any,
-    grippers: Any,
-    samples: FloatArray,
-    inputs: Any,
-    positions: IntArray,
-    velocities: IntArray,
-    controls: IntArray,
-    qpos: FloatArray,
-    qvel: FloatArray,
-    mass: FloatArray,
-    bias: FloatArray,
-    compensated: FloatArray,
-    sprung: FloatArray,
-    gripper_length: FloatArray,
-    gripper_speed: FloatArray,
-    ctrl: FloatArray,
-    following: bool,
-    ended: bool,
-    closing: float,
-    step_s: float,
-    fastest: float,
-    acceleration: float,
-    deceleration: float,
-) -> None:
-    """Move the references on by `step_s` and turn them into the actuators' inputs `ctrl` (nu,).
-
-    positions, velocities, controls (n,): the joints' places in qpos, qvel and ctrl. mass: MuJoCo's inertia matrix, of
-    which `inertia` names the arm's elements. bias, compensated, sprung (nv,): the forces of gravity and velocity, what
-    compensates gravity, and of springs. gripper_length, gripper_speed: of the gripper's first actuator, in front.
-    """
-    for j in range(joints.size):
-        joints[j].measured_position, joints[j].measured_velocity = qpos[positions[j]], qvel[velocities[j]]
-    advance_references(joints, following, ended, step_s, fastest, acceleration, deceleration)
-    for j in range(joints.size):
-        joint, drive, place = joints[j], drives[j], velocities[j]
-        position_error = joint.position - joint.measured_position
-        velocity_error = joint.velocity - joint.measured_velocity
-        drive.acceleration = joint.acceleration + motor_acceleration(drive, position_error, velocity_error)
-        drive.load = bias[place] - compensated[place] - sprung[place] + drive.friction * joint.velocity
-    for k in range(inertia.size):
-        row, column = inertia[k].row, inertia[k].column
-        element = mass[inertia[k].place]
-        drives[row].load += element * drives[column].acceleration
-        if row != column:
-            drives[column].load += element * drives[row].acceleration
-    for j in range(joints.size):
-        joint, drive = joints[j], drives[j]
-        position_error = joint.position - joint.measured_position
-        ctrl[controls[j]] = control(drive, position_error, joint.position, joint.velocity, drive.load)
-    for g in range(grippers.size):
-        advance_gripper(grippers[g], samples, closing, step_s, gripper_length[g], gripper_speed[g])
-        for i in range(inputs.size):
-            ctrl[inputs[i].place] = inputs[i].open + grippers[g].reference * (inputs[i].closed - inputs[i].open)

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.objects.movers import Movers
-from robot_side.objects.perceived import PerceivedObjects, Role
-from robot_side.objects.velocities import ObjectVelocities
 from robot_side.simulation.object_primitives import ObjectPrimitives
 from robot_side.simulation.scene import Scene
+from robot_side.surroundings.movers import Movers
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.velocities import ObjectVelocities
 
 _FRAME_PERIOD_S = 1.0 / 30.0
 

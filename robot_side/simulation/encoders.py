@@ -1,11 +1,12 @@
 """Joint encoders: what the arm's sensors say of its true configuration (eq. 3)."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
 
 
 class Encoder:
@@ -17,25 +18,35 @@ class Encoder:
 
     def __init__(self, sigma_rad: float = 2e-4, resolution_rad: float = 2.0 * math.pi / 2**15, seed: int = 0) -> None:
         """Seed the noise; a step of 0 is none."""
-        self._sigma_rad = sigma_rad
-        self._resolution_rad = resolution_rad
+        self.sigma_rad = sigma_rad
+        self.resolution_rad = resolution_rad
         self._noise = np.random.default_rng(seed)
 
     def read(self, true_positions: FloatArray) -> FloatArray:
         """Readings (n,) of joints that stand at `true_positions` (n,), radians; metres for a prismatic joint."""
-        readings: FloatArray = self._noise.standard_normal(true_positions.shape)
-        _read(readings, true_positions, self._sigma_rad, self._resolution_rad)
+        readings = self.noise(true_positions.size)
+        _read(readings, true_positions, self.sigma_rad, self.resolution_rad)
         return readings
+
+    def noise(self, count: int) -> FloatArray:
+        """Draw what `reading` makes the next readings (n,) of: standard normal numbers."""
+        drawn: FloatArray = self._noise.standard_normal(count)
+        return drawn
 
     def standard_deviation_rad(self) -> float:
         """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
-        return float(np.hypot(self._sigma_rad, self._resolution_rad / math.sqrt(12.0)))
+        return float(np.hypot(self.sigma_rad, self.resolution_rad / math.sqrt(12.0)))
+
+
+@inlined
+def reading(noise: float, true_position: float, sigma: float, resolution: float) -> Any:
+    """One reading, of standard normal noise."""
+    read = noise * sigma + true_position
+    return np.rint(read / resolution) * resolution if resolution > 0.0 else read
 
 
 @compiled(output_array(1), input_array(1), NUMBER, NUMBER)
 def _read(readings: FloatArray, true_positions: FloatArray, sigma: float, resolution: float) -> None:
     """Make readings of standard normal noise."""
     for i in range(readings.size):
-        readings[i] = readings[i] * sigma + true_positions[i]
-        if resolution > 0.0:
-            readings[i] = np.rint(readings[i] / resolution) * resolution
+        readings[i] = reading(readings[i], true_positions[i], sigma, resolution)

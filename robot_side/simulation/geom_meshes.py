@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 # A scene that has meshes is looked at by these kernels, too, and they must be there to be warmed up.
-import robot_side.ahead.mesh_ways  # noqa: F401
+import robot_side.surroundings.placed_meshes  # noqa: F401
 from robot_side.overlap.meshes.closed_surface import signed_volume
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_library import MeshLibrary

@@ -9,9 +9,9 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.objects.perceived import Role
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.scene import Scene
+from robot_side.surroundings.perceived import Role
 
 _FARTHEST_SUPPORT_M: Final = 1.0
 _FEW: Final = 64

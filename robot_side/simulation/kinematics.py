@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.ahead.tables import BLOCK
 from robot_side.arm.forward_kinematics import JOINT, LINK, POINT, LinkTree, Records, place
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.field.scratch import CLUSTER
 from robot_side.gripper.near_order import near_order
 from robot_side.simulation.gripper_cover import cover_gripper
 from robot_side.simulation.model_enums import JointKind
@@ -39,7 +39,7 @@ class MujocoKinematics:
         self.cover = cover_gripper(model, geoms, stand_out_m, searching)
         # Spheres that are near each other follow each other: the search looks at several at once.
         on_link = np.einsum("mij,mj->mi", data.xmat[self.cover.bodies].reshape(-1, 3, 3), self.cover.centers_m)
-        order = near_order(data.xpos[self.cover.bodies] + on_link, BLOCK)
+        order = near_order(data.xpos[self.cover.bodies] + on_link, CLUSTER)
         bodies = self.cover.bodies[order]
         self._radii_m = self.cover.radii_m[order]
         self._on_finger = np.isin(bodies, model.geom_bodyid[geoms[robot.geom_on_finger]])

@@ -1,35 +1,44 @@
 """The primitives of a scene's objects: which geoms are spheres, boxes, tetrahedra, meshes, half-spaces; and where."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.objects.perceived import PerceivedObjects, Role
+from common.arrays import FloatArray, IntArray
 from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
     from robot_side.simulation.geom_meshes import GeomMesh
 
-_EXACT = {GeomKind.SPHERE: "sphere", GeomKind.BOX: "box", GeomKind.PLANE: "plane"}
-_MESHES = {GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
-"""What a mesh describes, unless it is a tetrahedron."""
-
-
-_ARRAYS: Final = {
-    "sphere": ("_radii_m",),
-    "box": ("_box_offsets_m", "_box_half_sizes_m"),
-    "tetrahedron": ("_corners_m",),
-    "mesh": ("_mesh_index",),
-    "plane": (),
+_EXACT: Final[Mapping[GeomKind, str]] = {
+    GeomKind.SPHERE: "sphere",
+    GeomKind.BOX: "box",
+    GeomKind.PLANE: "half_space",
+    GeomKind.ELLIPSOID: "ellipsoid",
 }
-"""Of each kind those with a row for each primitive, besides geoms and objects."""
+_MESHES = {GeomKind.CAPSULE, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
+"""What a mesh describes, unless it is a tetrahedron."""
+_SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] = {
+    "sphere": lambda model, geoms: (model.geom_size[geoms, 0],),
+    "box": lambda model, geoms: (model.geom_aabb[geoms, :3], model.geom_aabb[geoms, 3:]),
+    "tetrahedron": lambda model, geoms: (
+        np.array([mesh_vertices(model, geom) for geom in geoms.tolist()], dtype=np.float64).reshape(-1, 4, 3),
+    ),
+    "half_space": lambda _model, _geoms: (),
+    "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
+}
+"""By kind but meshes the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them."""
+
+
+_OfKind = tuple[IntArray, IntArray, tuple[Any, ...]]
+"""The geoms (k,) of a kind, their objects (k,), and their sizes."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class SceneObject:
 class ObjectPrimitives:
     """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
 
-    A sphere, a box, a plane, a closed mesh and a height field are exact. A cylinder, a capsule and an ellipsoid stand
+    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder and a capsule stand
     for meshes around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
     """
 
@@ -52,7 +61,7 @@ class ObjectPrimitives:
         """Read the shapes of `objects` from a compiled MuJoCo model."""
         self._names = tuple(thing.name for thing in objects)
         geoms = [(geom, index) for index, thing in enumerate(objects) for geom in thing.geoms]
-        of_kind: dict[str, list[tuple[int, int]]] = {"sphere": [], "box": [], "tetrahedron": [], "plane": []}
+        of_kind: dict[str, list[tuple[int, int]]] = {kind.name: [] for kind in KINDS}
         wanted: list[tuple[int, int]] = []
         for geom, index in geoms:
             kind = _primitive_kind(model, geom)
@@ -76,29 +85,22 @@ class ObjectPrimitives:
         self.stands_out_m: Mapping[str, float] = stands_out_m
         """And how far what is seen of it reaches beyond it, at most."""
 
-        self._sphere_geoms, self._sphere_object = _columns(of_kind["sphere"])
-        self._radii_m: FloatArray = model.geom_size[self._sphere_geoms, 0].copy()
-        self._box_geoms, self._box_object = _columns(of_kind["box"])
-        self._box_offsets_m: FloatArray = model.geom_aabb[self._box_geoms, :3].copy()
-        self._box_half_sizes_m: FloatArray = model.geom_aabb[self._box_geoms, 3:].copy()
-        self._tetrahedron_geoms, self._tetrahedron_object = _columns(of_kind["tetrahedron"])
-        self._corners_m: FloatArray = np.array(
-            [mesh_vertices(model, int(geom)) for geom in self._tetrahedron_geoms], dtype=np.float64
-        ).reshape(-1, 4, 3)
-        self._mesh_geoms, self._mesh_object = _columns(of_kind["mesh"])
-        self._mesh_index = np.array([meshes[int(geom)][0] for geom in self._mesh_geoms], dtype=np.int64)
-        self._plane_geoms, self._plane_object = _columns(of_kind["plane"])
+        self._of_kind: dict[str, _OfKind] = {}
+        for name, pairs in of_kind.items():
+            own, owners = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
+            sizes = _SIZES.get(name)
+            mesh_index = [meshes[geom][0] for geom in own.tolist()] if sizes is None else []
+            self._of_kind[name] = own, owners, sizes(model, own) if sizes else (np.array(mesh_index, dtype=np.int64),)
 
     def only(self, things: IntArray) -> "ObjectPrimitives":
         """Those of some of the objects, things (m,), rising: by their places among these."""
         part = copy(self)
         part._names = tuple(self._names[thing] for thing in things)
-        for kind, arrays in _ARRAYS.items():
-            owners = getattr(self, f"_{kind}_object")
+        part._of_kind = {}
+        for name, (geoms, owners, sizes) in self._of_kind.items():
             kept = np.isin(owners, things)
-            setattr(part, f"_{kind}_object", np.searchsorted(things, owners[kept]))
-            for name in (f"_{kind}_geoms", *arrays):
-                setattr(part, name, getattr(self, name)[kept])
+            mine = np.searchsorted(things, owners[kept])
+            part._of_kind[name] = geoms[kept], mine, tuple(values[kept] for values in sizes)
         return part
 
     def place(
@@ -115,41 +117,21 @@ class ObjectPrimitives:
         """
         seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=bool)
 
-        def placed(kind: str) -> tuple[BoolArray, IntArray, FloatArray, FloatArray]:
-            """Which of a kind are seen, their objects (p,), positions (p, 3) and rotations (p, 3, 3)."""
-            owners, geoms = getattr(self, f"_{kind}_object"), getattr(self, f"_{kind}_geoms")
+        arrays: dict[str, Any] = {}
+        for kind in KINDS:
+            geoms, owners, sizes = self._of_kind[kind.name]
             kept = seen[owners]
-            positions_m = geom_positions_m[geoms[kept]] + offsets_m[owners[kept]]
-            return kept, owners[kept], positions_m, geom_rotations[geoms[kept]].reshape(-1, 3, 3)
-
-        spheres, sphere_object, sphere_centers_m, _ = placed("sphere")
-        boxes, box_object, box_places_m, box_rotations = placed("box")
-        tetrahedra, tetrahedron_object, tetrahedron_centers_m, tetrahedron_rotations = placed("tetrahedron")
-        meshes, mesh_object, mesh_positions_m, mesh_rotations = placed("mesh")
-        _, plane_object, plane_points_m, plane_rotations = placed("plane")
-        normals = np.ascontiguousarray(plane_rotations[:, :, 2])
+            owners, geoms = owners[kept], geoms[kept]
+            positions_m, rotations = geom_positions_m[geoms] + offsets_m[owners], geom_rotations[geoms]
+            values = kind.placed(positions_m, rotations.reshape(-1, 3, 3), *(size[kept] for size in sizes))
+            arrays |= {array.name: value for array, value in zip(kind.arrays, values, strict=True)}
+            arrays[kind.owner] = owners
         return PerceivedObjects(
             time_s=time_s,
             names=self._names,
             roles=tuple(roles[name] for name in self._names),
-            sphere_centers_m=sphere_centers_m,
-            sphere_radii_m=self._radii_m[spheres],
-            sphere_object=sphere_object,
-            box_centers_m=box_places_m + np.einsum("bij,bj->bi", box_rotations, self._box_offsets_m[boxes]),
-            box_rotations=box_rotations,
-            box_half_sizes_m=self._box_half_sizes_m[boxes],
-            box_object=box_object,
-            tetrahedron_vertices_m=tetrahedron_centers_m[:, None, :]
-            + np.einsum("tij,tvj->tvi", tetrahedron_rotations, self._corners_m[tetrahedra]),
-            tetrahedron_object=tetrahedron_object,
-            half_space_normals=normals,
-            half_space_offsets_m=np.einsum("pi,pi->p", normals, plane_points_m),
-            half_space_object=plane_object,
             mesh_library=self._mesh_library,
-            mesh_index=self._mesh_index[meshes],
-            mesh_positions_m=mesh_positions_m,
-            mesh_rotations=mesh_rotations,
-            mesh_object=mesh_object,
+            **arrays,
         )
 
 
@@ -175,8 +157,3 @@ def _meshes(
     shapes = GeomMeshes(model)
     found = {geom: shape for geom in candidates if (shape := shapes.add(geom)) is not None}
     return shapes.mesh_library(), found, frozenset(geoms) - found.keys()
-
-
-def _columns(pairs: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    both = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    return both[:, 0].copy(), both[:, 1].copy()

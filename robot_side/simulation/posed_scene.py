@@ -7,10 +7,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from robot_side.objects.perceived import PerceivedObjects
 from robot_side.simulation.ground_truth import least_distance
 from robot_side.simulation.scene import Scene
 from robot_side.simulation.true_contact import free_way
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _LEAST_STEP_M = 0.001
 STANDS: Final[FloatArray] = np.zeros(3)

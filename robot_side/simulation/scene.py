@@ -14,12 +14,12 @@ import numpy as np
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
-from robot_side.objects.perceived import Role
-from robot_side.objects.roles import assign_roles
 from robot_side.simulation.built_in_scenes import SceneName, furnish
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.simulation.robot_model import RobotModel, can_touch, find_robot
+from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
 _ASSETS = Path(__file__).parent / "assets"
@@ -57,6 +57,10 @@ class Scene:
         movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
         moves = movable[model.geom_bodyid]
         return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
+
+    def step(self) -> None:
+        """Advance the state by one step, whoever drives the arm."""
+        mujoco.mj_step(self.model, self.data)
 
 
 def load_scene(

@@ -9,10 +9,10 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.objects.perceived import Role
 from robot_side.simulation.ground_truth import geom_distance, least_distance
 from robot_side.simulation.model_enums import GeomKind
 from robot_side.simulation.scene import Scene
+from robot_side.surroundings.perceived import Role
 
 _TOUCHING_M = 1e-5
 _MOST_STEPS = 200

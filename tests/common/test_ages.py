@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.silence import counted_s
 from common.timing.ages import LoopAge, QueueingAge
 
 repeatable = settings(derandomize=True, deadline=None)
@@ -12,6 +13,13 @@ delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)
 
 
 # Loop age (eq. 8)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_silence_counts_but_for_what_the_deadbands_allow(silent_s: float, longer_s: float) -> None:
+    counted = counted_s(silent_s)
+    assert counted == pytest.approx(min(silent_s, 0.004) + max(silent_s - 0.02, 0.0))
+    assert counted - 1e-12 <= counted_s(silent_s + longer_s) <= counted + longer_s + 1e-12
 
 
 def test_loop_age_is_the_worst_case_until_known_and_after_reset() -> None:

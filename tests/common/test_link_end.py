@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
+from common.silence import KEEP_ALIVE_S
 from common.timing.clock_offset import MAX_SKEW
 from feelahead.lab.link.clocks import Estimate, Scenario, Traffic, Way
 from tests.helpers.felt import felt
@@ -47,10 +48,23 @@ def test_the_loop_age_spans_both_ways_and_the_holding() -> None:
     robot.arrived(operator.hello(0.0), 0.0)
     operator.arrived(robot.hello(0.0), 0.0)
     operator.arrived(stiffness(robot.stamp(1.0)), 1.05)  # 50 ms to the operator
-    command = motion(operator.stamp(1.08))  # held for 30 ms
+    command = motion(operator.stamp(1.08))  # held for 30 ms, of which 16 need no message
     arrival = robot.arrived(command, 1.10)  # 20 ms to the robot
-    assert arrival.loop_age_s == pytest.approx(0.10)
+    assert arrival.loop_age_s == pytest.approx(0.084)
     assert robot.round_trip.maximum == pytest.approx(0.07)
+
+
+def test_the_offset_settles_within_a_second_or_so_of_messages_as_rare_as_can_be() -> None:
+    robot, operator = ends("another clock")
+    ahead_s, now_s = 1000.0, 0.0
+    robot.arrived(operator.hello(0.0), ahead_s)
+    operator.arrived(robot.hello(ahead_s), 0.0)
+    while not (robot.clock_offset.settled and operator.clock_offset.settled):
+        now_s += KEEP_ALIVE_S
+        operator.arrived(stiffness(robot.stamp(now_s + ahead_s)), now_s + 0.005)
+        robot.arrived(motion(operator.stamp(now_s + 0.005)), now_s + 0.01 + ahead_s)
+    assert now_s < 1.3
+    assert operator.clock_offset.offset_s == pytest.approx(ahead_s, abs=1e-6)
 
 
 def test_reordered_and_repeated_messages_are_measured_but_never_fresh() -> None:
@@ -59,9 +73,22 @@ def test_reordered_and_repeated_messages_are_measured_but_never_fresh() -> None:
     first, second = motion(operator.stamp(0.01)), motion(operator.stamp(0.02))
     assert robot.arrived(second, 0.05).fresh
     assert not robot.arrived(first, 0.06).fresh
-    assert not robot.arrived(second, 0.07).fresh
+    assert not robot.arrived(first, 0.07).fresh
     assert robot.stale == 2
     assert robot.delay.count == 4
+
+
+def test_a_copy_is_measured_and_neither_fresh_nor_stale() -> None:
+    robot, operator = ends()
+    opening = operator.hello(0.0)
+    for message in (opening, motion(operator.stamp(0.01)), operator.hello(0.02)):
+        assert robot.arrived(message, 0.05).fresh
+        copy = robot.arrived(message, 0.06)
+        assert not copy.fresh
+        assert copy.one_way_s == 0.06 - message.header.sent_s
+    assert (robot.stale, robot.delay.count) == (0, 6)
+    assert not robot.arrived(opening, 0.07).fresh
+    assert robot.stale == 1
 
 
 def test_each_kind_of_message_has_its_own_order() -> None:
@@ -282,3 +309,13 @@ def test_a_contradictory_echo_is_counted_and_measures_nothing() -> None:
     assert (arrival.loop_age_s, arrival.one_way_s) == (None, None)
     assert robot.offset_summary_ms()["rejected"] == 1
     assert robot.round_trip.count == 0
+
+
+def test_gaps_are_silences_of_more_than_100_ms_that_something_newer_ended() -> None:
+    robot, operator = ends()
+    robot.arrived(operator.hello(0.0), 0.0)
+    early, late = motion(operator.stamp(0.05)), motion(operator.stamp(0.1))
+    robot.arrived(late, 0.2)
+    robot.arrived(early, 0.21)
+    robot.arrived(motion(operator.stamp(0.25)), 0.29)
+    assert robot.gaps == 1

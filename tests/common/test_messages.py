@@ -6,6 +6,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import msgpack
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,13 +22,33 @@ from common.protocol.codec import (
     decode_view,
     encode,
 )
-from common.protocol.messages import AnyMessage, Header, Hello, Message, MotionCommand
+from common.protocol.compact import STEP_M, AnyOnWire, packed, unpacked
+from common.protocol.messages import (
+    AnyMessage,
+    Header,
+    Hello,
+    Message,
+    MotionCommand,
+    StiffnessUpdate,
+    Telemetry,
+    TriggerField,
+)
+from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
-from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneShapes, SceneState, Shape, VideoFrame
+from common.protocol.view_messages import (
+    AnyViewMessage,
+    EnlargementTerms,
+    SceneShapes,
+    SceneState,
+    Shape,
+    VideoFrame,
+    VideoStep,
+)
 from tests.helpers.felt import felt, field, ways
 
 repeatable = settings(derandomize=True, deadline=None)
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
+FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
 ROW = struct.pack("<7f", *POSE)
 TERMS = EnlargementTerms(0.01, 0.001, 0.002, 0.003, 0.004, 2.3, 0.1, 0.02)
@@ -40,6 +61,7 @@ VIEWS: tuple[AnyViewMessage, ...] = (
     VideoFrame(HEADER, view="overview", captured_s=3.0, width=640, height=480, jpeg=bytes(range(256)) * 100),
     SceneShapes(HEADER, 1, ("palm",), ("ball",), (SHAPE,), 2, ROW),
     SCENE,
+    VideoStep(HEADER, "first_person", 3.0, 640, 480, number=7, whole=False, h264=bytes(range(256))),
 )
 VALID: tuple[AnyMessage, ...] = (
     Hello(HEADER, side="operator", clock_domain="boot"),
@@ -65,6 +87,7 @@ BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
     **dict.fromkeys(("told_m_s",), st.none() | stick),
     **dict.fromkeys(("token",), stamps),
+    **dict.fromkeys(("lacks",), st.none() | st.tuples(stamps, stamps)),
 }
 
 
@@ -94,8 +117,18 @@ messages: st.SearchStrategy[AnyMessage] = st.one_of([made(kind) for kind in get_
 
 
 def packed_by_msgpack(message: Message) -> bytes:
-    payload: bytes = msgpack.packb([PROTOCOL_VERSION, msgspec.to_builtins(message, builtin_types=(bytes,))])
+    content = msgspec.to_builtins(packed(message), builtin_types=(bytes,))
+    payload: bytes = msgpack.packb([PROTOCOL_VERSION, content])
     return payload
+
+
+def said(message: Message) -> dict[str, Any]:
+    """Flatten the message's numbers by name."""
+    found: dict[str, Any] = {}
+    for name, value in msgspec.structs.asdict(message).items():
+        is_field = isinstance(value, TriggerField)
+        found |= {f"{name}.{key}": one for key, one in said(value).items()} if is_field else {name: value}
+    return found
 
 
 @given(messages | st.sampled_from(VIEWS))
@@ -103,11 +136,38 @@ def packed_by_msgpack(message: Message) -> bytes:
 def test_a_message_comes_back_as_it_was_and_is_messagepack(message: Any) -> None:
     payload = encode(message)
     ours, others = (decode_view, decode) if isinstance(message, get_args(AnyViewMessage)) else (decode, decode_view)
-    assert ours(payload) == message
+    back = ours(payload)
+    if isinstance(message, StiffnessUpdate | Telemetry):
+        is_told_as_it_was(message, back)
+        assert decode(encode(back)) == back  # nothing is lost twice
+        assert back.header == message.header
+    else:
+        assert back == message
     assert payload == packed_by_msgpack(message)
     with pytest.raises(RemoteProtocolError):
         others(payload)
     assert ours is decode_view or len(payload) <= MAXIMUM_BYTES
+
+
+def is_told_as_it_was(message: StiffnessUpdate | Telemetry, back: Any) -> None:
+    assert type(back) is type(message)
+    told, horizon_m = said(back), getattr(back, "horizon_m", 0.0)
+    for name, value in said(message).items():
+        if name.endswith(("fast_m", "slow_m")):
+            for sent_m, told_m in zip(value, told[name], strict=True):
+                assert told_m <= sent_m
+                known = -2.0 + STEP_M <= sent_m <= min(2.0 - 2.0 * STEP_M, horizon_m)
+                assert told_m >= sent_m - STEP_M or told_m == horizon_m <= sent_m or not known
+        elif name == "horizon_m":
+            assert value - STEP_M <= told[name] <= value
+        elif name == "rumble":
+            assert value <= told[name] <= value + 0.125
+        elif isinstance(value, float):
+            assert told[name] == np.float32(value)
+        elif isinstance(value, tuple):
+            assert told[name] == tuple(map(np.float32, value))
+        else:
+            assert told[name] == value
 
 
 @given(messages, st.data())
@@ -119,17 +179,63 @@ def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, d
         removed = data.draw(st.integers(0, 3))
         hostile[position : position + removed] = data.draw(st.binary(max_size=3))
     try:
-        expected = msgspec.convert(msgpack.unpackb(bytes(hostile))[1], AnyMessage)
-    except (ValueError, TypeError, KeyError, msgspec.ValidationError):
+        expected = unpacked(msgspec.convert(msgpack.unpackb(bytes(hostile))[1], AnyOnWire))
+    except (ValueError, TypeError, KeyError, msgspec.ValidationError, struct.error):
         expected = None
-    try:
-        decoded = decode(bytes(hostile))
-    except RemoteProtocolError:
-        decoded = None
-    if expected is not None or decoded is not None:
-        # Where msgpack gives up on more than it must (keys that cannot be hashed), ours may still be valid.
-        assert decoded is None or decode(encode(decoded)) == decoded
-        assert expected is None or decoded == expected
+    decoded = survives(bytes(hostile))
+    # Where msgpack gives up on more than it must (keys that cannot be hashed), ours may still be valid.
+    assert expected is None or decoded == expected
+
+
+@given(made(StiffnessUpdate) | made(Telemetry), st.data())
+@settings(repeatable, max_examples=500)
+def test_any_field_of_bytes_is_refused_whole_or_valid_through_and_through(
+    message: StiffnessUpdate | Telemetry, data: st.DataObject
+) -> None:
+    content = msgpack.unpackb(encode(message))
+    field_bytes = bytearray(content[1][-1])
+    for _ in range(data.draw(st.integers(1, 3))):
+        field_bytes[data.draw(st.integers(0, len(field_bytes) - 1))] = data.draw(st.integers(0, 255))
+    content[1][-1] = bytes(field_bytes[: data.draw(st.just(len(field_bytes)) | st.integers(0, len(field_bytes)))])
+    survives(msgpack.packb(content))
+
+
+EVERYDAY: tuple[AnyMessage, ...] = (
+    Hello(FULL, side="operator", clock_domain="operator-workstation-0b7f4f2e-9d3c-4d5e-8a51-6f0c2b1de9a7"),
+    MotionCommand(FULL, 0.51, 0.13, (0.1, -0.1), (0.2, -0.3), 1.0, run=True, token=70000, compensation="operator"),
+    control.Watch(FULL, overview=True, first_person=True, scene=True),
+    control.Tune(FULL, 12, 0.995, "delay 50ms 10ms distribution normal loss 1%"),
+    control.LeaseNotice(
+        FULL, SessionState.STOPPED_READY, "the operator side began a new epoch", 70000, 8, 3, True, 0.99, 12
+    ),
+    control.LinkReport(
+        FULL, 123456.7, 1234.5, 0.123, "30 Hz, quality 75, size 0.5", "pictures 12 (rate), scene 3 (queue)"
+    ),
+    felt(FULL, l2=8, r2=5, rumble=0.5),
+    Telemetry(
+        FULL,
+        "armed",
+        (0.4, 0.1, 0.3),
+        0.2,
+        "the blue cup on the shelf",
+        (0.0, 0.1, 0.2),
+        (0.0, 0.0, 1.0),
+        0.08,
+        False,
+        0.01,
+        0.1,
+        0.2,
+    ),
+)
+
+
+@pytest.mark.parametrize("message", EVERYDAY, ids=lambda message: type(message).__name__)
+def test_every_message_for_hands_and_fingers_is_at_most_200_bytes(message: AnyMessage) -> None:
+    assert len(encode(message)) <= 200
+
+
+def test_every_kind_of_them_was_measured() -> None:
+    assert {type(message) for message in EVERYDAY} == set(get_args(AnyMessage))
 
 
 def survives(hostile: bytes) -> AnyMessage | None:
@@ -296,7 +402,7 @@ def test_what_lies_outside_a_declared_range_is_refused_when_made_and_when_read(
         msgspec.structs.replace(valid, **{name: value})
     content = msgspec.to_builtins(valid, builtin_types=(bytes,))
     content[valid.__struct_fields__.index(name) + 1] = value
-    read = decode_view if isinstance(valid, VideoFrame) else decode
+    read = decode_view if isinstance(valid, VideoFrame | VideoStep) else decode
     if not (isinstance(value, int) and value > 2**63 - 1):  # more than MessagePack has bytes for
         with pytest.raises(RemoteProtocolError):
             read(msgpack.packb([PROTOCOL_VERSION, content]))

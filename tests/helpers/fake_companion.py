@@ -4,7 +4,7 @@ import socket
 from collections.abc import Callable
 
 from common.companion.channel import Channel
-from robot_side.cameras.exchange import Order, Picture, Refusal, Setup, decode_to_companion, encode
+from robot_side.cameras.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
 from robot_side.cameras.pictures import Cameras, Renders
 from robot_side.cameras.settings import CamerasSettings
 from robot_side.simulation.scene import Scene
@@ -29,17 +29,21 @@ class FakeCompanion:
     def heard(self) -> list[Setup | Order]:
         return [decode_to_companion(payload) for payload in self.other.receive()]
 
-    def answer(self, message: Picture | Refusal) -> None:
+    def answer(self, message: Ready | Picture | Refusal) -> None:
         self.other.send(encode(message))
 
-    def picture(self, order: Order, jpeg: bytes = b"\xff\xd8") -> None:
-        self.answer(Picture(order.view, order.captured_s, jpeg, 0.003))
+    def picture(self, order: Order, content: bytes = b"\xff\xd8", number: int = 0, *, whole: bool = True) -> None:
+        """As JPEG, or with a `number` as H.264."""
+        size = (320, 240) if order.halved else (640, 480)
+        self.answer(Picture(order.view, order.captured_s, *size, content, 0.003, number, whole))
 
 
 class Desk:
     """Cameras, the companions that they started, and what a person was told."""
 
     def __init__(self, scene: Scene, settings: CamerasSettings | None = None) -> None:
+        self.scene = scene
+        self.ready = Ready(h264=True)
         self.companions: list[FakeCompanion] = []
         self.notes: list[str] = []
         self.fails_to_start: str | None = None
@@ -50,6 +54,7 @@ class Desk:
             done(self.fails_to_start)
             return
         self.companions.append(FakeCompanion())
+        self.companions[-1].answer(self.ready)
         done(self.companions[-1])
 
     def orders(self) -> list[Order]:

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
-from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
+from robot_side.surroundings.perceived import PerceivedObjects, Role
 
 # A cube's corners, numbered by their bits (x, y, z), and five tetrahedra that fill it.
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
@@ -23,6 +23,7 @@ class Scene:
         self._spheres: list[tuple[npt.ArrayLike, float, int]] = []
         self._boxes: list[tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, int]] = []
         self._tetrahedra: list[tuple[npt.ArrayLike, int]] = []
+        self._ellipsoids: list[tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, int]] = []
         self._half_spaces: list[tuple[npt.ArrayLike, float, int]] = []
         self._meshes: list[tuple[int, npt.ArrayLike, npt.ArrayLike, int]] = []
         self._shapes: list[Mesh] = []
@@ -57,6 +58,13 @@ class Scene:
         self._meshes.append((*rows, len(self.roles) - 1))
         return self
 
+    def ellipsoid(
+        self, center_m: npt.ArrayLike, half_axes_m: npt.ArrayLike, rotation: FloatArray | None = None
+    ) -> "Scene":
+        turned = np.eye(3) if rotation is None else rotation
+        self._ellipsoids.append((center_m, turned, half_axes_m, len(self.roles) - 1))
+        return self
+
     def half_space(self, normal: npt.ArrayLike, offset_m: float) -> "Scene":
         self._half_spaces.append((normal, offset_m, len(self.roles) - 1))
         return self
@@ -75,6 +83,10 @@ class Scene:
             box_object=np.array([row[-1] for row in self._boxes], dtype=np.int64),
             tetrahedron_vertices_m=_stacked([row[0] for row in self._tetrahedra], (4, 3)),
             tetrahedron_object=np.array([row[-1] for row in self._tetrahedra], dtype=np.int64),
+            ellipsoid_centers_m=_stacked([row[0] for row in self._ellipsoids], (3,)),
+            ellipsoid_rotations=_stacked([row[1] for row in self._ellipsoids], (3, 3)),
+            ellipsoid_half_axes_m=_stacked([row[2] for row in self._ellipsoids], (3,)),
+            ellipsoid_object=np.array([row[-1] for row in self._ellipsoids], dtype=np.int64),
             half_space_normals=_stacked([row[0] for row in self._half_spaces], (3,)),
             half_space_offsets_m=_stacked([row[1] for row in self._half_spaces], ()),
             half_space_object=np.array([row[-1] for row in self._half_spaces], dtype=np.int64),

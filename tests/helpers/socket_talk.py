@@ -29,11 +29,18 @@ def receive_one(robot: RobotSockets) -> tuple[bytes, bytes]:
 
 
 def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
-    """Connect, and tell by what name the robot side knows `operator`."""
-    send_until_connected(operator, b"hello")
-    peer, payload = receive_one(robot)
-    assert payload == b"hello"
-    return peer
+    """Connect by every connection, and tell by what name the robot side knows `operator`."""
+    connections = len(operator._connections)
+    for _ in range(ROUNDS):
+        if not operator.send(b"hello"):
+            robot.wait(0.01)  # which answers handshakes, too
+            continue
+        name, payload = receive_one(robot)
+        assert payload == b"hello"
+        peer = robot._peers.get(name)
+        if peer is not None and len(peer.turns.ways) == connections:
+            return name
+    pytest.fail("some connections do not come up")
 
 
 def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: bytes) -> None:
@@ -46,10 +53,22 @@ def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: by
 
 
 def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], bool], last: bytes) -> list[bytes]:
+    """All that has arrived when `last` has; over several connections it may overtake others."""
     messages: list[bytes] = []
     for _ in range(ROUNDS):
         messages += received()
-        if messages and messages[-1] == last:
+        if last in messages:
             return messages
         wait(0.01)
     return pytest.fail(f"{last!r} did not arrive")
+
+
+def drain_all(received: Callable[[], list[bytes]], wait: Callable[[float], bool], expected: list[bytes]) -> None:
+    """Until each of `expected` has arrived, in whatever order, and nothing else."""
+    messages: list[bytes] = []
+    for _ in range(ROUNDS):
+        messages += received()
+        if len(messages) >= len(expected):
+            break
+        wait(0.01)
+    assert sorted(messages) == sorted(expected)

@@ -21,10 +21,12 @@ ARROWS = """
     common/emulation: common common/files
     common/link_model.py: common/emulation
     common/timing: common
-    common/protocol: common common/timing
+    common/rate: common
+    common/protocol: common common/rate common/timing
     common/realtime: common
     common/companion:
     common/recording: common common/companion common/protocol
+    common/video: common/protocol
     common/sockets: common common/files
     common/command: common common/emulation common/files common/recording
 
@@ -42,20 +44,22 @@ ARROWS = """
     robot_side/operators: common common/emulation common/protocol
     robot_side/arm: common common/protocol robot_side/compiled
     robot_side/enlargement: common common/protocol robot_side/compiled
-    robot_side/objects: common robot_side/compiled robot_side/overlap/meshes
-    robot_side/ahead/kinds: common robot_side/compiled robot_side/objects robot_side/overlap/closed_forms
+    robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/closed_forms robot_side/overlap/lanes
         robot_side/overlap/meshes
-    robot_side/ahead: common common/protocol robot_side/ahead/kinds robot_side/arm robot_side/compiled
-        robot_side/enlargement robot_side/objects robot_side/overlap/lanes robot_side/overlap/meshes
-        robot_side/overlap/precise
-    robot_side/gripper: common common/files robot_side/ahead robot_side/arm robot_side/compiled robot_side/objects
-        robot_side/overlap/meshes
-    robot_side/simulation: common common/files robot_side/ahead robot_side/arm robot_side/compiled robot_side/gripper
-        robot_side/objects robot_side/overlap/meshes
+    robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
+    robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
+        robot_side/surroundings/kinds
+    robot_side/laws: common common/protocol robot_side/arm robot_side/compiled robot_side/enlargement robot_side/field
+        robot_side/surroundings
+    robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
+        robot_side/surroundings
+    robot_side/simulation: common common/files robot_side/arm robot_side/compiled robot_side/field robot_side/gripper
+        robot_side/overlap/meshes robot_side/surroundings
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
-    robot_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
-        common/sockets common/timing robot_side/ahead robot_side/arm robot_side/cameras robot_side/compiled
-        robot_side/enlargement robot_side/gripper robot_side/objects robot_side/operators robot_side/simulation
+    robot_side: common common/command common/emulation common/files common/protocol common/rate common/realtime
+        common/recording common/sockets common/timing robot_side/arm robot_side/cameras robot_side/compiled
+        robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators robot_side/simulation
+        robot_side/surroundings
 
     operator_side/dualsense/effects:
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -74,10 +78,10 @@ ARROWS = """
         operator_side/dualsense/reports
     operator_side/page_hands: common common/protocol operator_side/dualsense/simulated operator_side/hands
         operator_side/simulated_person
-    operator_side/console: common common/command common/companion common/protocol operator_side/facts.py
+    operator_side/console: common common/command common/companion common/protocol common/video operator_side/facts.py
         operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/files common/protocol common/realtime common/recording
-        common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
+    operator_side: common common/command common/emulation common/files common/protocol common/rate common/realtime
+        common/recording common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
         operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
         operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands
         operator_side/simulated_person operator_side/terminal_view
@@ -106,6 +110,7 @@ LIBRARIES = {
     "mujoco": ("robot_side/simulation", "robot_side/cameras"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
+    "av": ("common/video", "robot_side/cameras", "feelahead/lab/questions/pictures.py"),
     "foxglove": ("common/recording",),
     "mcap": ("common/recording",),
     # A wall clock that jumps by an hour must not be there to trip over; a recording's stamps are that clock's.

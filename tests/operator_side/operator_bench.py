@@ -57,6 +57,9 @@ class Bench:
         report = build_input_report(ControllerState(pressed=frozenset(buttons), **state))
         self.side.read_report(report, self.now_s)
 
+    def payloads(self) -> list[bytes]:
+        return [message.payload for message in self.side.motion(self.now_s)]
+
     def commands(self) -> list[MotionCommand]:
-        messages = [decode(payload) for payload in self.side.motion(self.now_s)]
+        messages = [decode(payload) for payload in self.payloads()]
         return [message for message in messages if isinstance(message, MotionCommand)]

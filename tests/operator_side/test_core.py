@@ -27,7 +27,7 @@ def sent(bench: Bench, kind: type[AnyMessage], for_s: float = 0.0) -> list[Any]:
     """Messages of this kind over so many turns; the robot side says nothing."""
     found = []
     for _ in range(1 + round(for_s / 0.004)):
-        found += [message for message in map(decode, bench.side.motion(bench.now_s)) if isinstance(message, kind)]
+        found += [message for message in map(decode, bench.payloads()) if isinstance(message, kind)]
         bench.now_s += 0.004
     return found
 
@@ -116,7 +116,7 @@ def test_hello_is_repeated_until_the_robot_answers_and_while_nothing_else_is_sen
     bench.notice(SessionState.DISARMED)
     bench.feel(0)
     bench.hands()
-    assert [type(decode(payload)) for payload in bench.side.motion(bench.now_s)] == [MotionCommand]
+    assert [type(decode(payload)) for payload in bench.payloads()] == [MotionCommand]
 
 
 def epoch_of(bench: Bench) -> int:
@@ -155,12 +155,12 @@ def telemetry(robot: LinkEnd, now_s: float, speed: float) -> bytes:
 
 
 def test_the_screen_shows_the_newest_view_of_the_present_epoch(bench: Bench) -> None:
-    first, second = (telemetry(bench.robot, bench.now_s, speed) for speed in (0.1, 0.2))
+    first, second = (telemetry(bench.robot, bench.now_s, speed) for speed in (0.125, 0.25))
     stranger = telemetry(LinkEnd("robot", 9, "clock"), bench.now_s, 0.3)
     for payload in (second, first, stranger):
         bench.side.receive_view(payload, bench.now_s)
         assert bench.side.screen is not None
-        assert bench.side.screen.tool_speed_m_s == 0.2
+        assert bench.side.screen.tool_speed_m_s == 0.25
 
 
 @pytest.mark.parametrize("receive", [OperatorSide.receive, OperatorSide.receive_view, OperatorSide.read_report])
@@ -254,3 +254,18 @@ def test_what_is_no_use_is_refused_whole_in_one_line(
     assert wishes(bench, 0.2) == []
     assert says in bench.side.tuner.why
     assert (bench.side.tuner.take_link(), bench.side.summary()["tuning"]["refused"]) == (None, 1)
+
+
+def test_buttons_and_rest_go_everywhere_and_what_the_fingers_do_in_turn(bench: Bench) -> None:
+    bench.notice(SessionState.DISARMED)
+    stop = (Button.CIRCLE,)
+    for buttons, r2, everywhere in (
+        *(((), 0.0, True), ((), 0.5, False), ((), 0.0, True), ((Button.L1,), 0.0, True), ((Button.L1,), 1.0, False)),
+        *(((), 1.0, True), (stop, 1.0, True), (stop, 0.5, True), ((), 0.5, True), ((Button.CROSS,), 0.5, True)),
+    ):
+        bench.now_s += 0.004
+        bench.hands(*buttons, r2=r2)
+        sent = [one for one in bench.side.motion(bench.now_s) if isinstance(decode(one.payload), MotionCommand)]
+        assert [one.everywhere for one in sent] == [everywhere], (buttons, r2)
+    bench.notice(SessionState.DISARMED, token=2)
+    assert next(one.everywhere for one in bench.side.motion(bench.now_s + 0.004))

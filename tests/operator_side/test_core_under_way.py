@@ -31,7 +31,7 @@ class Driving(Bench):
     def send(self, r2: float, *buttons: Button) -> None:
         self.notice(SessionState.ARMED)
         self.hands(*buttons, r2=r2)
-        assert [command.compensation for command in self.commands()] == [self.compensation]
+        assert {command.compensation for command in self.commands()} <= {self.compensation}
 
     def drive(self, duration_s: float, *buttons: Button) -> None:
         for _ in range(round(duration_s / PERIOD_S)):

@@ -33,8 +33,8 @@ class Sockets:
     def receive_view(self) -> list[tuple[bytes, bytes]]:
         return []
 
-    def send(self, payload: bytes) -> None:
-        del payload
+    def send(self, payload: bytes, *, everywhere: bool = False) -> None:
+        del payload, everywhere
 
     def wait(self, timeout_s: float) -> bool:
         self._clock.advance_to(self._clock.now() + max(timeout_s, 1e-5))

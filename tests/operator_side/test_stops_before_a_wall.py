@@ -62,8 +62,8 @@ class Approach:
         if (report := self.device.read(now_s)) is not None:
             self.side.read_report(report, now_s)
         if self.tick % 2 == 0:
-            for payload in self.side.motion(now_s):
-                self.there.push(now_s, payload)
+            for message in self.side.motion(now_s):
+                self.there.push(now_s, message.payload)
 
     def _move(self, now_s: float) -> None:
         for payload in self.there.pop(now_s):

@@ -1,5 +1,6 @@
 """What people at this side are shown: facts of the core, figures of the scene, and who is fed with them."""
 
+import math
 from collections import deque
 from typing import cast
 
@@ -8,6 +9,7 @@ import pytest
 
 from common.command.status import Status
 from common.protocol.codec import decode, decode_view, encode
+from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate, TriggerField, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.reaction import HORIZON_S
@@ -72,7 +74,11 @@ def test_each_trigger_is_told_as_it_is_written_and_where_the_finger_is() -> None
     assert first > 0
     assert facts.r2.free == pytest.approx(TriggerTravel().travel(first / 10 / SENSED_TRAVEL))
     assert facts.r2.meets == facts.r2.zones[int(10 * SENSED_TRAVEL * 0.8)]
-    assert (facts.l2.stiffness, facts.r2.stiffness, facts.r2.fast_m[0]) == (0.25, 0.75, 0.04)
+    assert (facts.l2.stiffness, facts.r2.stiffness, facts.r2.fast_m[0]) == (
+        0.25,
+        0.75,
+        math.floor(0.04 / STEP_M) * STEP_M,
+    )
     assert facts.rumble == pytest.approx(0.5, abs=0.01)
     assert (facts.field_age_ms, facts.advancing) == (0.0, "R2")
 
@@ -119,6 +125,7 @@ class FakeConsole:
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
         self.told: list[str] = []
+        self.lacks: tuple[int, int] | None = None
         self.hands: deque[PageWords] = deque()
         self.tuning: deque[PageWords] = deque()
 
@@ -181,6 +188,22 @@ def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:
     before, looking.console.pages = len(looking.console.shown), 1
     looking.turns(1.0)
     assert 29 <= len(looking.console.shown) - before <= 31
+
+
+def test_a_picture_that_is_lacking_is_asked_for_at_once_and_then_four_times_a_second() -> None:
+    looking = Looking()
+    looking.console.pages = 1
+    assert {watch.lacks for watch in looking.turns(1.0)} == {None}
+    looking.console.lacks = (0, 0)
+    looking.turns(0.3)
+    looking.console.lacks = (0, 7)
+    assert [watch.lacks for watch in looking.turns(0.012)] == [(0, 7)]
+    looking.console.lacks = (0, 8)
+    assert 3 <= len(looking.turns(1.0)) <= 5
+    looking.console.lacks = (0, 0)
+    looking.turns(0.3)
+    looking.console.lacks = (9, 0)
+    assert [watch.lacks for watch in looking.turns(0.012)] == [(9, 0)]
 
 
 def test_pictures_and_scenes_go_to_the_console_and_the_rest_to_the_core() -> None:

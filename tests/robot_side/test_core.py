@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from common.protocol.messages import Header
+from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
-from robot_side.ahead.law import Law, Sensed, Situation
 from robot_side.assembly import assemble
 from robot_side.gripper.held_object import grip
-from robot_side.objects.perceived import Role
+from robot_side.laws.law import Law, Sensed, Situation
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import load_scene
+from robot_side.surroundings.perceived import Role
 
 
 @pytest.fixture
@@ -146,6 +147,16 @@ def listening(bench: Bench) -> Listening:
     return law
 
 
+def test_a_tick_knows_the_frame_that_was_taken_in_before_it_began(bench: Bench, listening: Listening) -> None:
+    for after_s in (0.0, 0.1, 0.2):
+        bench.robot.tick(bench.now_s + after_s)
+    bench.robot.observe(bench.now_s + 0.2)
+    bench.robot.tick(bench.now_s + 0.201)
+    first, late, latest, following = (situation.objects for situation in listening.heard[-4:])
+    assert first is late is latest
+    assert following.time_s == bench.now_s + 0.2 > first.time_s
+
+
 def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) -> None:
     operator = bench.join(2)
     bench.drive(0.3, operator)
@@ -198,9 +209,9 @@ def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
     here, ends = bench.arm.state(bench.now_s).joint_positions_rad, limits.lower_rad.copy()
     ends[2] = here[2]  # The elbow, which stretches as the tool advances.
     bench.robot._limits = replace(limits, lower_rad=ends)
-    bench.drive(0.01, operator, r2=0.4)
+    bench.drive(KEEP_ALIVE_S, operator, r2=0.4)
     assert told_m_s(operator) < 0.9 * free
-    bench.drive(0.01, operator, l2=0.4)
+    bench.drive(KEEP_ALIVE_S, operator, l2=0.4)
     assert told_m_s(operator) == pytest.approx(-free, rel=0.01)
 
 

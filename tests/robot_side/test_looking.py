@@ -2,122 +2,26 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from common.emulation.delay_line import DelayLine
 from common.emulation.spec import LinkSpec
-from common.protocol.codec import decode, decode_view, encode
-from common.protocol.link_end import LinkEnd
-from common.protocol.messages import StiffnessUpdate, Watch
-from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame
-from robot_side.assembly import Assembled, assemble
-from robot_side.cameras.shapes import SceneModel
-from robot_side.looking import Looking
-from robot_side.outgoing_messages import Outgoing, OutgoingStream
-from robot_side.scene_view import SceneView
+from robot_side.assembly import assemble
 from robot_side.settings import CameraSettings, RobotSettings
-from tests.helpers.fake_companion import Desk
+from tests.robot_side.cameras.looking_table import TABLES, Table
 
-TICK_S = 0.001
 ALL = {"overview": True, "first_person": True, "scene": True}
-
-
-_tables: list["Table"] = []
 
 
 @pytest.fixture(autouse=True)
 def _cleared_away() -> Iterator[None]:
     yield
-    while _tables:
-        _tables.pop().desk.close()
-
-
-@dataclass
-class Table:
-    """A robot side with an operator who looks, as the loop drives it; a companion answers after 4 ms."""
-
-    settings: RobotSettings = field(default_factory=RobotSettings)
-    link: LinkSpec = field(default_factory=LinkSpec)
-    always: tuple[str, ...] = ()
-    jpeg_bytes: int = 18_000
-
-    def __post_init__(self) -> None:
-        self.robot: Assembled = assemble(self.settings, 1, "clock")
-        self.desk = Desk(self.robot.scene)
-        self.lines: dict[str, DelayLine[Outgoing]] = {
-            stream: DelayLine(self.link.profile("to_operator", stream))
-            for stream in ("haptics", "telemetry", "video", "scene")
-        }
-        view = SceneView(SceneModel(self.robot.scene), self.robot.kinematics, self.robot.law)
-        self.looking = Looking(self.robot.core, view, self.desk.cameras, self._backlog_s, always=self.always)
-        self.end = LinkEnd("operator", 5, "clock")
-        self.watching: dict[str, bool] = {}
-        self.ticks = 0
-        self.ages_s: dict[str, list[float]] = {stream: [] for stream in self.lines}
-        self.seen: list[VideoFrame | SceneShapes | SceneState] = []
-        self._sent_s: dict[int, float] = {}
-        self._orders: list[tuple[float, object]] = []
-        self.hear(encode(self.end.hello(0.0)))
-
-        _tables.append(self)
-
-    def _backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
-        return self.lines[stream].backlog_s(now_s)
-
-    @property
-    def now_s(self) -> float:
-        return self.ticks * TICK_S
-
-    def hear(self, payload: bytes) -> None:
-        self.robot.core.receive(b"peer", payload, self.now_s)
-
-    def watch(self, **what: bool) -> None:
-        self.watching = what
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / TICK_S)):
-            self.ticks += 1
-            if self.watching and self.ticks % 250 == 1:
-                self.hear(encode(Watch(self.end.stamp(self.now_s), **self.watching)))
-            if self.ticks % 100 == 0:
-                self.hear(encode(self.end.hello(self.now_s)))
-            self._push(self.robot.core.tick(self.now_s))
-            self._push(self.looking.idle(self.now_s, self.now_s))
-            self._render()
-            for stream, line in self.lines.items():
-                for message in line.pop(self.now_s):
-                    self.ages_s[stream].append(self.now_s - self._sent_s.pop(id(message)))
-                    if stream in ("video", "scene"):
-                        self.seen.append(decode_view(message.payload))
-
-    def _push(self, messages: list[Outgoing]) -> None:
-        for message in messages:
-            if message.stream == "haptics" and not isinstance(decode(message.payload), StiffnessUpdate):
-                continue
-            self._sent_s[id(message)] = self.now_s
-            self.lines[message.stream].push(self.now_s, message, len(message.payload))
-
-    def _render(self) -> None:
-        for companion in self.desk.companions:
-            if companion.running:
-                self._orders += [(self.now_s + 0.004, order) for order in self.desk.orders()]
-        while self._orders and self._orders[0][0] <= self.now_s:
-            order = self._orders.pop(0)[1]
-            self.desk.companions[-1].picture(order, bytes(self.jpeg_bytes))  # type: ignore[arg-type]
-
-    def frames(self) -> list[VideoFrame]:
-        return [message for message in self.seen if isinstance(message, VideoFrame)]
-
-    def states(self) -> list[SceneState]:
-        return [message for message in self.seen if isinstance(message, SceneState)]
-
-    def shapes(self) -> list[SceneShapes]:
-        return [message for message in self.seen if isinstance(message, SceneShapes)]
+    while TABLES:
+        TABLES.pop().desk.close()
 
 
 def rows(values: bytes, width: int) -> FloatArray:
@@ -195,6 +99,41 @@ def test_a_slow_video_link_delays_frames_and_never_a_stiffness() -> None:
     assert 10 * 4 <= len(slow.frames()) <= 14 * 4
     assert {frame.view for frame in slow.frames()[-4:]} == {"overview", "first_person"}
     assert slow.looking.summary()["overview"]["behind"] > 50
+
+
+def test_pictures_give_way_to_a_narrow_link_and_come_back() -> None:
+    table = Table(left_bit_s=150e3)
+    table.watch(overview=True, first_person=True)
+    table.run(4.0)
+    assert table.looking.pictures == {"rate_hz": 5.0, "quality": 30, "size": 0.5}
+    assert 2 * 4 * 4 <= len(table.frames()) <= 2 * 5 * 4 + 4
+    assert {(frame.width, frame.height) for frame in table.frames()[4:]} == {(320, 240)}
+    table.left_bit_s, table.begins = 1e9, True
+    table.run(4.0)
+    assert table.looking.pictures == {"rate_hz": 30.0, "quality": 75, "size": 1.0}
+    last = table.frames()[-50:]
+    assert {(frame.width, frame.height) for frame in last} == {(640, 480)}
+
+
+def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_its_bytes_say() -> None:
+    table = Table(left_bit_s=150e3, link=LinkSpec.parse("video: rate 150kbit"))
+    table.watch(overview=True, first_person=True, lacks=(0, 0))
+    table.run(8.0)
+    seen = table.looking.pictures
+    assert seen is not None
+    assert (seen["quality"], seen["size"]) == (75, 1.0)
+    for view in ("overview", "first_person"):
+        steps = [step for step in table.steps() if step.view == view]
+        assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+        assert [step.number for step in steps if step.whole] == [1]
+        assert len(steps) >= 5 * 6
+    assert table.frames() == []
+    # Whole ones of both views are under way for 1.2 s; then no step waits long.
+    assert max(table.ages_s["video"][10:]) < 0.25
+    # One who shows JPEG alone begins to look.
+    table.watch(overview=True, first_person=True)
+    table.run(1.0)
+    assert table.looking.pictures == {"rate_hz": 5.0, "quality": 30, "size": 0.5}
 
 
 @pytest.mark.parametrize("law", ["swept", "paper"])

@@ -7,6 +7,7 @@ import pytest
 from common.command.status import Status
 from common.emulation.spec import LinkSpec
 from common.realtime.stages import Stages
+from common.sockets.tcp_figures import TcpFigures
 from robot_side import main
 from robot_side.assembly import assemble
 from robot_side.cameras.settings import CamerasSettings
@@ -38,6 +39,9 @@ class SuspendedSockets:
         return True
 
     publish = wait = send
+
+    def tcp_figures(self, _: bytes) -> TcpFigures:
+        return TcpFigures()
 
 
 class Once:

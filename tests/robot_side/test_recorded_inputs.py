@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_side.arm.port import ArmState
-from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.recorded_inputs import ARRAYS, FramePacker, FrameUnpacker, pack_state, unpack_state
+from robot_side.surroundings.perceived import PerceivedObjects, Role
 
 ANY_FLOAT = st.floats(width=64)
 NAMES = ("table", "target", "post")

@@ -10,10 +10,10 @@ from common.errors import ConfigurationError
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.assembly import assemble
 from robot_side.cameras.settings import CamerasSettings
-from robot_side.objects.perceived import Role
 from robot_side.operators.safety import SafetySettings
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
 from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.surroundings.perceived import Role
 
 NAN, INFINITY = math.nan, math.inf
 

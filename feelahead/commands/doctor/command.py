@@ -21,6 +21,7 @@ from feelahead.commands.doctor.controllers import ControllerSeen
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
 from feelahead.commands.doctor.link_facts import Way, look_along
 from feelahead.commands.doctor.link_judgement import LinkFacts, judge, reached, told
+from feelahead.commands.doctor.path import PathFacts, measure_path_along, path_line, path_told
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 _WIDTH_WITHOUT_TERMINAL: Final = 120
@@ -33,9 +34,10 @@ class DoctorSettings:
     Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
     without, "missing" is what does not work as it is.
 
-    With --connect: look at the way from here to a robot side instead, and say one line. Code 1: the first thing that
-    is wrong with it and what mends it. Code 0: how long a round trip takes, and whether somebody has the arm. The
-    person who drives notices nothing of it. The wall clocks are no matter, and not looked at.
+    With --connect: look at the way from here to a robot side instead. Code 1: the first thing that is wrong with it
+    and what mends it. Code 0: how long a round trip takes, and whether somebody has the arm. Then the path is measured
+    for five seconds: delay, queue, losses, and what will work on it (the arm, one view, both). For that the doctor
+    observes, or holds a free arm, disarmed. The person who drives notices nothing. Wall clocks do not matter.
 
     With --compile: compile all that any scene may need, for this machine's processor, instead of at the first start:
     about half a minute on two processors. It is kept in $NUMBA_CACHE_DIR, else ~/.cache/feelahead/kernels; what is
@@ -48,6 +50,8 @@ class DoctorSettings:
     """Compile the robot side's kernels now."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Look at the way to a robot side that should listen there."""
+    path: bool = True
+    """With --connect: measure the path for five seconds, too."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """The robot side's view port; the port after the control port unless given."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
@@ -70,7 +74,10 @@ def doctor(arguments: Sequence[str]) -> int:
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
     if settings.connect is not None:
         keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
-        return _tell_of_link(look_along(Way(settings.connect, settings.view_connect, keys)), as_json=settings.json)
+        way = Way(settings.connect, settings.view_connect, keys)
+        link = look_along(way)
+        path = measure_path_along(way) if settings.path and judge(link) is None else None
+        return _tell_of_link(link, path, as_json=settings.json)
     if settings.compile:
         return machine.compile_kernels(as_json=settings.json)
     seen = controllers.controllers_seen()
@@ -88,14 +95,14 @@ def doctor(arguments: Sequence[str]) -> int:
     return 0 if fit else 1
 
 
-def _tell_of_link(link: LinkFacts, *, as_json: bool) -> int:
+def _tell_of_link(link: LinkFacts, path: PathFacts | None, *, as_json: bool) -> int:
     fault = judge(link)
     if as_json:
-        said = json.dumps(told(link), indent=2)
+        said = json.dumps(told(link) | ({} if path is None else {"path": path_told(path)}), indent=2)
     elif fault is not None:
         said = f"{fault.wrong}: {fault.said}; to mend it: {fault.remedy}"
     else:
-        said = reached(link)
+        said = "\n".join([reached(link), *([] if path is None else [path_line(path)])])
     sys.stdout.write(said + "\n")
     return 0 if fault is None else 1
 

@@ -49,15 +49,17 @@ class Way:
     view_connect: str | None = None
     keys: OperatorKeys | None = None
 
+    def ports(self) -> tuple[Endpoint, Endpoint]:
+        """Control and view; ConfigurationError for what is no address."""
+        control = Endpoint(*split_connect(self.connect, "--connect"), ipv6=False)
+        if self.view_connect is None:
+            return control, following(control, self.connect, "--view-connect")
+        return control, Endpoint(*split_connect(self.view_connect, "--view-connect"), ipv6=False)
+
 
 def look_along(way: Way) -> LinkFacts:
     """Everything up to the first thing that is wrong; ConfigurationError for what is no address."""
-    host, port = split_connect(way.connect, "--connect")
-    control = Endpoint(host, port, ipv6=False)
-    if way.view_connect is None:
-        view = following(control, way.connect, "--view-connect")
-    else:
-        view = Endpoint(*split_connect(way.view_connect, "--view-connect"), ipv6=False)
+    control, view = way.ports()
     ours = None if way.keys is None else public_part(way.keys.secret)
     facts = LinkFacts(_place(control), _place(view), keys=ours)
     with contextlib.closing(_looks(way, facts, control, view)) as looks:

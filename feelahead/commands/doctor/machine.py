@@ -20,6 +20,7 @@ OLDEST_PYTHON: Final = (3, 11)
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
     "robot": ("mujoco", "numba", "simplejpeg"),
     "operator": ("hidapi", "viser", "trimesh"),
+    "video": ("av",),
     "record": ("foxglove", "mcap"),
     "experiments": ("matplotlib", "pyarrow", "distributed"),
 }
@@ -29,6 +30,7 @@ _PACKAGES: Final = {"mujoco": "mujoco-core", "hidraw": "hidapi", "hid": "hidapi"
 _PURPOSES: Final = {
     "robot": "the simulated arm: the demo and feelahead-robot",
     "operator": "a real controller and the browser console",
+    "video": "pictures in H.264, a tenth of JPEG's bytes",
     "record": "recording runs",
     "experiments": "sweeps over many runs",
 }

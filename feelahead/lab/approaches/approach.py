@@ -46,6 +46,8 @@ class Approach:
     turn: Vector2 = (0.0, 0.0)
     """The right stick, as it counts."""
     assist: Assist = "none"
+    full_rate: bool = False
+    """Both sides send everything (RunOptions.full_rate)."""
     camera_sd_m: float | None = None
     """σ_c; None for the settings' own."""
 
@@ -66,6 +68,7 @@ class PullRun:
             seed=approach.seed,
             haptics=approach.law != "none",
             compensation=compensation_of(approach.law),
+            full_rate=approach.full_rate,
         )
         scene = load_scene(robot.model, robot.site, robot.roles)
         self.truth = TrueContact(scene)
@@ -140,6 +143,7 @@ def robot_settings(approach: Approach) -> RobotSettings:
         probability=approach.probability,
         law=law_of_robot(approach.law),
         assist=approach.assist,
+        full_rate=approach.full_rate,
         camera=CameraSettings() if approach.camera_sd_m is None else CameraSettings(sd_m=approach.camera_sd_m),
     )
 

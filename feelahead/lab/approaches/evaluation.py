@@ -85,6 +85,8 @@ class Pulls:
     probabilities: tuple[float, ...]
     laws: tuple[Law, ...]
     spoil: Spoil = "nothing"
+    full_rate: bool = True
+    """Of the stiffness, as record_approach's."""
 
 
 @dataclass
@@ -131,7 +133,9 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
     """Make a row for each cell, law and P; the same seed gives the same rows."""
     approaches, places = pulls.sizes
     records = [
-        record_approach(pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home)
+        record_approach(
+            pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home, full_rate=pulls.full_rate
+        )
         for number in range(approaches)
     ]
     for cell in pulls.cells:

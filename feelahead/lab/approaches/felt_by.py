@@ -17,14 +17,14 @@ from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from robot_side.ahead.law import Law as RobotLaw
-from robot_side.ahead.law import Sensed, Situation
-from robot_side.ahead.paper_law import PaperLaw
-from robot_side.ahead.swept_law import SweptLaw
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.objects.perceived import PerceivedObjects
+from robot_side.laws.law import Law as RobotLaw
+from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.paper import PaperLaw
+from robot_side.laws.swept import SweptLaw
 from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _TRAVEL: Final = TriggerTravel()
 _FRAME_S: Final = 1.0 / 30.0
@@ -60,6 +60,7 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
         tetrahedron_vertices_m=objects.tetrahedron_vertices_m + way_m,
         half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ way_m,
         mesh_positions_m=objects.mesh_positions_m + way_m,
+        ellipsoid_centers_m=objects.ellipsoid_centers_m + way_m,
         velocities_m_s=np.tile(velocity_m_s, (len(objects.names), 1)),
     )
 

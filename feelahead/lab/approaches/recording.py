@@ -1,6 +1,7 @@
 """A pull in free space, open loop and without haptics, recorded once: it serves every law, P, scene and camera draw.
 
-The whole loopback runs, so that jitter, loss and the arm's own limits are in it.
+The whole loopback runs, so that jitter, loss and the arm's own limits are in it. Commands leave at full rate: where a
+finger lets go is asked later, at any time, and a command that says so would leave at once.
 """
 
 import math
@@ -11,12 +12,12 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
+from common.silence import MOTION_PERIOD_S
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.main import MOTION_PERIOD_S
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import PullingHands
 from robot_side.settings import RobotSettings
@@ -77,14 +78,21 @@ class RecordedApproach:
 
 
 def record_approach(
-    pull: PullKind, link: str, seed: int, duration_s: float = 4.0, scene_name: str = "empty"
+    pull: PullKind,
+    link: str,
+    seed: int,
+    duration_s: float = 4.0,
+    scene_name: str = "empty",
+    *,
+    full_rate: bool = True,
 ) -> RecordedApproach:
     """Record the pull of this kind and seed from the home pose of a frozen scene, whose objects let it through.
 
+    full_rate: of the stiffness. Without it as little leaves as in the free: near things it is more.
     FeelaheadError where the robot is not armed in time, or its arm is stopped on the way.
     """
-    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed)
-    operator = OperatorSettings(link=link, seed=seed, haptics=False)
+    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=full_rate)
+    operator = OperatorSettings(link=link, seed=seed, haptics=False, full_rate=True)
     scene = load_scene(robot.model, robot.site, robot.roles)
     let_through(scene)
     device = SimulatedDualSense()

@@ -5,18 +5,19 @@ from typing import Any, Final
 
 import numpy as np
 
+from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.arming import wait_for_pull
-from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
-from robot_side.ahead.law import Law, Sensed, Situation
-from robot_side.ahead.swept_law import SweptLaw
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.assembly import assemble
 from robot_side.core import RobotSide
+from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
@@ -24,6 +25,7 @@ from robot_side.simulation.scene import Scene, load_scene
 DEMO: Final = "demo"
 FORCE_N: Final = 2.0
 _STRONGEST_N: Final = 2.0
+_STRAIGHT: Final[tuple[Vector2, Vector2]] = (0.0, 0.0), (0.0, 0.0)
 _BEFORE_S: Final = 0.5
 """This much before the pull of an approach is kept, too."""
 
@@ -78,10 +80,13 @@ class _Noting:
         return self._law.summary()
 
 
-def record(name: str, duration_s: float, seed: int = 0) -> Recorded:
-    """Run the demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same for the same seed."""
+def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, Vector2] | None = None) -> Recorded:
+    """Run the demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same for the same seed.
+
+    sticks: how far those that move across and turn are deflected in a pull; None: as the scene wants it.
+    """
     model = None if name == DEMO else frozen_scene(name)
-    robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed)
+    robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed, full_rate=True)
     noting: list[_Noting] = []
 
     def noted(arm: Any, kinematics: Any, camera: Any, law: Law, *others: Any, **named: Any) -> RobotSide:
@@ -89,9 +94,10 @@ def record(name: str, duration_s: float, seed: int = 0) -> Recorded:
         return RobotSide(arm, noting[0], camera, noting[0], *others, **named)
 
     device = SimulatedDualSense(strength_step_n=_STRONGEST_N / MAX_STRENGTH)
-    hands = PullingHands(device, constant_force(FORCE_N))
+    across, turning = ASIDE.get(name, _STRAIGHT) if sticks is None else sticks
+    hands = PullingHands(device, constant_force(FORCE_N, across, turning), grip=name in GRIPPED)
     run = Loopback(
-        LoopbackSettings(robot, OperatorSettings(seed=seed)),
+        LoopbackSettings(robot, OperatorSettings(seed=seed, full_rate=True)),
         scene=scene_of(name),
         device=device,
         person=None if model is None else lambda _: hands,

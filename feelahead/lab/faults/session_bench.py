@@ -8,7 +8,17 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Header, Hello, LeaseNotice, MotionCommand, StiffnessUpdate, Telemetry, Tune, Watch
+from common.protocol.messages import (
+    Header,
+    Hello,
+    LeaseNotice,
+    LinkReport,
+    MotionCommand,
+    StiffnessUpdate,
+    Telemetry,
+    Tune,
+    Watch,
+)
 from common.protocol.session import SessionState
 from robot_side.arm.port import Arm, ArmState
 from robot_side.assembly import assemble
@@ -188,7 +198,7 @@ class Bench:
                 if isinstance(message, Telemetry):
                     self.views.append(message)
                 elif (operator := self.operators.get(outgoing.peer)) is not None and not isinstance(
-                    message, MotionCommand | Watch | Tune
+                    message, MotionCommand | Watch | Tune | LinkReport
                 ):
                     self._under_way.append((self.now_s + self.answer_delay_s, operator, message))
             while self._under_way and self._under_way[0][0] <= self.now_s:

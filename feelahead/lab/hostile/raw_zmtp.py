@@ -1,5 +1,6 @@
 """ZMTP 3.0 by hand over a plain TCP connection (rfc.zeromq.org/spec/23), so that it can be spoken wrongly."""
 
+import contextlib
 import socket
 import struct
 
@@ -11,10 +12,11 @@ _MORE, _LONG, _COMMAND = 1, 2, 4
 _TIMEOUT_S = 5.0
 
 
-def ready(socket_type: bytes) -> bytes:
-    """The command that ends the handshake of the NULL mechanism."""
-    name, value = b"Socket-Type", socket_type
-    body = b"\x05READY" + bytes([len(name)]) + name + struct.pack(">I", len(value)) + value
+def ready(socket_type: bytes, name: bytes = b"") -> bytes:
+    """The command that ends the handshake of the NULL mechanism; `name` is the routing id, empty for any."""
+    body = b"\x05READY"
+    for field, value in ((b"Socket-Type", socket_type), (b"Identity", name)):
+        body += bytes([len(field)]) + field + struct.pack(">I", len(value)) + value
     return bytes([_COMMAND, len(body)]) + body
 
 
@@ -52,9 +54,11 @@ class RawConnection:
         self._socket.sendall(sends)
 
     @classmethod
-    def introduced(cls, port: int, socket_type: bytes = b"DEALER", buffer_bytes: int | None = None) -> "RawConnection":
+    def introduced(
+        cls, port: int, socket_type: bytes = b"DEALER", buffer_bytes: int | None = None, name: bytes = b""
+    ) -> "RawConnection":
         """One that has gone through the handshake as a well-behaved peer would; OSError when it is refused."""
-        connection = cls(port, GREETING + ready(socket_type), buffer_bytes)
+        connection = cls(port, GREETING + ready(socket_type, name), buffer_bytes)
         connection._await(b"\x05READY")
         return connection
 
@@ -67,6 +71,15 @@ class RawConnection:
             self._read_away()
         except OSError:
             self.close()
+
+    def read_all(self, silence_s: float = 0.3) -> bytes:
+        """All that comes until nothing does for `silence_s`."""
+        self._socket.settimeout(silence_s)
+        received = b""
+        with contextlib.suppress(TimeoutError):
+            while content := self._socket.recv(65536):
+                received += content
+        return received
 
     def ended(self) -> bool:
         """Whether the other side has ended it by now; waits up to a few seconds for that."""

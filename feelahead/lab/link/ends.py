@@ -18,16 +18,17 @@ from common.sockets.admission import Admission
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
+from operator_side.commanding import ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
-from robot_side.ahead.law import Sensed
+from robot_side.laws.law import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.outgoing_messages import Outgoing, stiffness_message
 
-BYTES: Final = (460, 138)
-"""Sizes of a stiffness update and of a motion command: what bare ends send, the robot's first."""
+BYTES: Final = (169, 138)
+"""Sizes of a stiffness update and of a motion command: bare ends send as much, the robot's first. All leave."""
 _REPORT_PERIOD_S: Final = 0.05
 """A controller that rests is read this often: commands are made of what was read last."""
 
@@ -97,14 +98,13 @@ class RobotEnd(_Side):
             self._loop_age.update(age_s, now_s)
         self._loop_age.value(now_s)
         state = session.permission(now_s).state
-        outgoing = [Outgoing("haptics", answer.peer, answer.payload) for answer in session.take_answers(now_s)]
-        if (owner := session.owner(now_s)) is not None:
-            outgoing.append(stiffness_message(owner, self._sensed, 0.0, state))
+        outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
+        outgoing += [stiffness_message(owner, self._sensed, 0.0, state) for owner in session.owners(now_s)]
         for message in outgoing:
             self._line.push(now_s, message, len(message.payload))
 
     def _send(self, message: Outgoing) -> bool:
-        return self._sockets.send(message.peer, message.payload)
+        return self._sockets.send(message.peer, message.payload, everywhere=message.everywhere)
 
 
 class OperatorEnd(_Side):
@@ -113,7 +113,7 @@ class OperatorEnd(_Side):
     def __init__(self, sockets: OperatorSockets) -> None:
         super().__init__(sockets, "to_robot")
         self._sockets, self._report_s = sockets, 0.0
-        self._core = OperatorSide(secrets.randbits(53), clock_domain())
+        self._core = OperatorSide(secrets.randbits(53), clock_domain(), full_rate=True)
         self._report = build_input_report(ControllerState())
 
     def _received(self) -> Any:
@@ -129,8 +129,8 @@ class OperatorEnd(_Side):
         if now_s - self._report_s >= _REPORT_PERIOD_S:
             self._report_s = now_s
             self._core.read_report(self._report, now_s)
-        for payload in self._core.motion(now_s):
-            self._line.push(now_s, payload)
+        for message in self._core.motion(now_s):
+            self._line.push(now_s, message, len(message.payload))
 
-    def _send(self, message: bytes) -> bool:
-        return self._sockets.send(message)
+    def _send(self, message: ToRobot) -> bool:
+        return self._sockets.send(message.payload, everywhere=message.everywhere)

@@ -82,6 +82,8 @@ class ApproachSettings(Sweep):
     """Deflection, at most 1 long, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
     assist: Assist = "none"
     """speed: the robot side caps the speed along the triggers itself."""
+    full_rate: bool = False
+    """Both sides send everything, whatever can be felt of it."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
     """Standard deviation of the camera's error, which the law knows."""
     spoil: Spoil = "nothing"
@@ -134,6 +136,7 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
             stick=stick,
             turn=turn,
             assist=settings.assist,
+            full_rate=settings.full_rate,
             camera_sd_m=1e-3 * settings.camera_mm,
         )
 

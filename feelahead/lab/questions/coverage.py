@@ -58,6 +58,8 @@ class CoverageSettings(Sweep):
     """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
     spoil: Spoil = "nothing"
     """Spoil the laws on purpose, to see that the figures notice: 100 ms late, or on the other trigger."""
+    full_rate: bool = True
+    """Each stiffness leaves. --no-full-rate: as few as a deadband ever lets go, 50 a second."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -77,7 +79,8 @@ class CoverageSettings(Sweep):
         probabilities = (0.5, 0.9) if self.quick else (0.5, 0.9, 0.99, 0.999)
         chosen = tuple(sorted(set(self.probabilities))) or probabilities
         motions = [
-            Pulls(*motion, tuple(cells), sizes, chosen, self.laws, self.spoil) for motion, cells in found.items()
+            Pulls(*motion, tuple(cells), sizes, chosen, self.laws, self.spoil, self.full_rate)
+            for motion, cells in found.items()
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
 

@@ -197,18 +197,12 @@ def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
 def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
     """Time queries of a torus of 10 000 triangles by spheres around its surface."""
     clock, radius, rng = MonotonicClock(), float(cell.case), np.random.default_rng([seed, 5])
-    mesh = _torus()
-    spheres = around_torus(rng, cell.count, radius), radius
+    mesh, spheres = Mesh(*torus(100, 50)), (around_torus(rng, cell.count, radius), radius)
     query = functools.partial(mesh.overlap, *spheres)
-    calls = {"ns": query, "gradient_ns": functools.partial(query, gradient=True)}
-    turns = {name: functools.partial(least_ns, [call], clock) for name, call in calls.items()}
+    calls = (("ns", query), ("gradient_ns", functools.partial(query, gradient=True)))
+    turns = {name: functools.partial(least_ns, [call], clock) for name, call in calls}
     times = {name: time_ns / cell.count for name, time_ns in in_turns(turns, cell.turns).items()}
     yield {"method": "ours", "triangles": float(mesh.counts(*spheres).mean()), **times}
-
-
-@functools.cache
-def _torus() -> Mesh:
-    return Mesh(*torus(100, 50))
 
 
 def show(_: OverlapSweep, table: Table) -> Iterator[Shown | str]:

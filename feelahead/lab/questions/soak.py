@@ -176,8 +176,8 @@ class _Running:
                     core.receive(payload, now_s)
                 for _, payload in sockets.receive_view():
                     core.receive_view(payload, now_s)
-                for payload in core.motion(now_s):
-                    sockets.send(payload)
+                for message in core.motion(now_s):
+                    sockets.send(message.payload, everywhere=message.everywhere)
             self._owner.check()
             self._owner.events()
             self._robot.check()

@@ -1,79 +1,269 @@
-"""The ways of §4.2 straight from their definition: the overlaps on a fine grid of ways, and nothing clever."""
+"""The ways of a look straight from their definition (§4.2), with exact overlaps on fine grids of ways.
 
-from collections.abc import Sequence
+    W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
+    s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
+
+Takes nothing of the compiled field but what it is asked and its constants. Passes over a sphere and an object only
+where their distance alone says that they shorten no way.
+"""
+
 from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray
-from feelahead.lab.reference.plain_ways import primitives
-from robot_side.objects.perceived import PerceivedObjects
+from common.arrays import BoolArray, FloatArray, IntArray
+from feelahead.lab.reference.solids import Solids
+from robot_side.arm.port import GripperPose
+from robot_side.field.field import Along
+from robot_side.field.look import LEAST_DEPTH_M, MARGIN_M
+from robot_side.field.object_class import PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
+from robot_side.surroundings.perceived import PerceivedObjects
 
-STEP_M = 5e-5
-_NOTHING = 1e-9
+SLACK: Final = 0.02
+"""The band of a way reaches over strengths so much weaker and stronger, of 1."""
+GRAZE_M: Final = 2e-3
+"""Where the band is wider, a millimetre aside decides on the way: any way in the band is right."""
+_DUE: Final = (np.arange(STRENGTHS) + 0.5) / STRENGTHS + np.array([[0.0], [-SLACK], [SLACK]])
+"""(3, 8) the shares of full strength at which strengths begin: as defined, early and late in the band."""
+_STEP_M: Final = MARGIN_M / 20
+_FINEST_M: Final = 5e-6
+_HALVINGS: Final = int(np.ceil(np.log2(_STEP_M / _FINEST_M)))
+_NOTHING: Final = 1e-9
+"""So much of the sphere's volume is rounding where it rises from an overlap;"""
+_LEAST: Final = 1e-14
+"""and so much where it rises from none: a splinter's tip enters long before a larger share does."""
+_FIRST_M: Final = 3.0 * MARGIN_M
+"""So far a pair is followed at first."""
+_TOGETHER_M: Final = 0.5 * MARGIN_M
+_BESIDE_M: Final = 1e-3
+"""So far beyond the reach ways are known, too, so that one knows how far off a way is that only one side finds."""
 
 
 @dataclass(frozen=True)
-class Definition:
-    """The numbers that the ways are defined by."""
+class Defined:
+    """What a look should find."""
 
-    objects: PerceivedObjects
-    direction: FloatArray
-    reach_m: float
-    margin_m: float = 0.012
-    least_depth_m: float = 0.0005
+    ways_m: FloatArray
+    """(3, 2, 8) fast and slow: as defined, and early and late in the band; a millimetre beyond the reach, too"""
+    sigma_m: float
+    """The largest D_σ"""
+    things: IntArray
+    """(2, 8) the object that binds; -1 for none"""
 
-    def ways(
-        self,
-        centers_m: FloatArray,
-        radii_m: FloatArray,
-        inflated_m: FloatArray,
-        slacks: Sequence[float] = (0.0,),
-    ) -> FloatArray:
-        """Find the eight ways (k, 8) of spheres (m,) that are inflated by `inflated_m` (m,); infinite beyond the reach.
-
-        slacks (k,): each strength must be exceeded by this much, of 1.
-        """
-        ways = np.full((len(slacks), 8), np.inf)
-        for center, radius, inflated in zip(centers_m, radii_m, inflated_m, strict=True):
-            for thing in range(len(self.objects.names)):
-                found, touching = self._pair(center, radius + inflated, thing, slacks)
-                ways = np.minimum(ways, found)
-                if touching:
-                    bare, _ = self._pair(center, radius, thing, slacks)
-                    ways = np.minimum(ways, bare - inflated)
-        return np.where(ways <= self.reach_m, ways, np.inf)
-
-    def _pair(self, center: FloatArray, radius: float, thing: int, slacks: Sequence[float]) -> tuple[FloatArray, bool]:
-        """Find the ways of one sphere and one object, and whether they overlap at the start."""
-        along = np.arange(0.0, self.reach_m + self.margin_m + STEP_M, STEP_M)
-        overlap, leaning = overlap_of(center + along[:, None] * self.direction, radius, self.objects, thing)
-        ways = np.full((len(slacks), 8), np.inf)
-        grown = np.maximum.accumulate(np.maximum(overlap - overlap[0], 0.0))
-        rises = grown > _NOTHING * overlap.max()
-        if rises.any():
-            free = max(int(np.argmax(rises)) - 1, 0)
-            full = min(free + round(self.margin_m / STEP_M), len(along) - 1)
-            least = min(np.pi * radius * self.least_depth_m**2, 0.5 * volume_of(self.objects, thing))
-            strengths = grown / max(grown[full], self.margin_m * leaning, least)
-            for row, slack in enumerate(slacks):
-                for level in range(8):
-                    there = strengths >= (level + 0.5) / 8 + slack
-                    if there.any():
-                        ways[row, level] = along[int(np.argmax(there))] - self.margin_m
-        return ways, bool(overlap[0] > 0.0)
+    def judge(self, found_m: FloatArray, reach_m: float) -> "Judged":
+        """Judge ways (2, 8) that were found with this reach; what lies beyond counts as at the reach."""
+        found_m, (ways_m, early_m, late_m) = np.minimum(found_m, reach_m), np.minimum(self.ways_m, reach_m)
+        grazes = late_m - early_m > GRAZE_M
+        outside_m = np.maximum(found_m - late_m, 0.0) - np.maximum(early_m - found_m, 0.0)
+        off_m = np.where(grazes, outside_m, found_m - ways_m)
+        known = ~(np.minimum(found_m, ways_m) >= reach_m)
+        return Judged(np.where(np.isnan(off_m), np.inf, off_m)[known], grazes[known])
 
 
-def overlap_of(path_m: FloatArray, radius_m: float, objects: PerceivedObjects, thing: int) -> tuple[FloatArray, float]:
-    """Return V (k,) of a sphere at each point of `path_m` (k, 3) with the object `thing`, and |∇V| at the first."""
-    total, push, radii = np.zeros(len(path_m)), np.zeros(3), np.full(len(path_m), radius_m)
-    for part in primitives(objects):
-        if part.thing == thing:
-            volumes, gradients = part.overlap(path_m, radii)
-            total, push = total + volumes, push + gradients[0]
-    return total, float(np.linalg.norm(push))
+class Judged(NamedTuple):
+    """How far off the ways (n,) within the reach are."""
+
+    off_m: FloatArray
+    """Later above 0, earlier below: than the way, or in a graze than its band"""
+    grazes: BoolArray
 
 
-def volume_of(objects: PerceivedObjects, thing: int) -> float:
-    """Return V_J in m³."""
-    return sum(part.volume_m3 for part in primitives(objects) if part.thing == thing)
+class _Pairs(NamedTuple):
+    """Spheres and objects, a row each."""
+
+    centers_m: FloatArray
+    radii_m: FloatArray
+    thing: IntArray
+    sooner_m: FloatArray
+    """The ways are shorter by this: as the object comes nearer, and by D_σ for a bare sphere."""
+    later_m: FloatArray
+    """They are longer by this in the slow list, where the object is to be touched."""
+    touchable: BoolArray
+    bound_m: FloatArray
+    """Before this way nothing overlaps that does not at first."""
+    before_m3: FloatArray
+    """V(0)"""
+    lean_m2: FloatArray
+    """|∇V(0)|"""
+
+    def rows(self, which: IntArray | BoolArray) -> "_Pairs":
+        """Take some of them."""
+        return _Pairs._make(column[which] for column in self)
+
+    def and_also(self, others: "_Pairs") -> "_Pairs":
+        """Put others behind."""
+        return _Pairs._make(np.concatenate(both) for both in zip(self, others, strict=True))
+
+    @property
+    def first_m(self) -> FloatArray:
+        """Return the least way that each may have."""
+        return self.bound_m - MARGIN_M - self.sooner_m
+
+
+def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray) -> tuple[FloatArray, float]:
+    """Return D_σ of each sphere (m,) along û, and where it is expected (P = 0.5): eq. 5, 9 and 10."""
+    leaning = np.einsum("a,man->mn", along.direction, pose.sphere_jacobians)
+    spread = np.sqrt(leaning**2 @ encoder_sigma_rad**2 + along.variance_m2)
+    sigma_m: FloatArray = np.maximum(0.0, along.mean_m + along.quantile * spread)
+    return sigma_m, max(0.0, along.mean_m)
+
+
+def defined_ways(
+    pose: GripperPose,
+    objects: PerceivedObjects,
+    classes: IntArray,
+    along: Along,
+    widest_m: float,
+    encoder_sigma_rad: FloatArray,
+) -> Defined:
+    """Find what `Ahead.look` should; the arguments are its own."""
+    sigma_m, expected_m = statistical_m(pose, along, encoder_sigma_rad)
+    solids = Solids(objects)
+    sphere, thing = np.nonzero(np.broadcast_to(classes != PASSED_OVER, (len(sigma_m), len(classes))))
+    held_back = pose.sphere_on_finger[sphere] & (classes[thing] == TARGET)
+    inflated_m = np.where(held_back, np.minimum(sigma_m[sphere], widest_m), sigma_m[sphere])
+    early_m = np.zeros(len(thing)) if along.early_m is None else along.early_m[thing]
+    swollen = _Pairs(
+        centers_m=pose.sphere_centers_m[sphere],
+        radii_m=pose.sphere_radii_m[sphere] + inflated_m,
+        thing=thing,
+        sooner_m=early_m,
+        later_m=inflated_m - np.minimum(expected_m, inflated_m),
+        touchable=np.isin(classes[thing], (TOUCHABLE, TARGET)),
+        bound_m=np.zeros(len(thing)),
+        before_m3=np.zeros(len(thing)),
+        lean_m2=np.zeros(len(thing)),
+    )
+    look = _Look(solids, along.direction, along.reach_m + _BESIDE_M)
+    near, kept = look.bounded(swollen)
+    # What overlaps already may have swallowed what is ahead of it, and counts uninflated, too.
+    inside, inflated_m = near.before_m3 > 0.0, inflated_m[kept]
+    bare = near.rows(inside)
+    bare = bare._replace(radii_m=bare.radii_m - inflated_m[inside], sooner_m=bare.sooner_m + inflated_m[inside])
+    bare, _ = look.bounded(bare)
+    look.follow(near.and_also(bare))
+    return Defined(look.ways_m, float(sigma_m.max(initial=0.0)), look.things)
+
+
+class _Look:
+    """The ways so far, (3, 2, 8), and what binds them."""
+
+    def __init__(self, solids: Solids, direction: FloatArray, reach_m: float) -> None:
+        self.ways_m: FloatArray = np.full((len(_DUE), 2, STRENGTHS), np.inf)
+        self.things: IntArray = np.full((2, STRENGTHS), -1, dtype=np.int64)
+        self._solids, self._direction, self._reach_m = solids, direction, reach_m
+
+    def bounded(self, pairs: _Pairs) -> tuple[_Pairs, IntArray]:
+        """Bound where each pair begins to overlap and find V(0); which are within the reach."""
+        end_m = self._reach_m + MARGIN_M + pairs.sooner_m
+        bound_m = self._solids.first_touch_m(pairs.centers_m, pairs.radii_m, pairs.thing, self._direction, end_m)
+        kept = np.flatnonzero(bound_m <= end_m)
+        near = pairs.rows(kept)._replace(bound_m=bound_m[kept])
+        before_m3, lean_m2 = np.zeros(len(kept)), np.zeros(len(kept))
+        inside = np.flatnonzero(near.bound_m == 0.0)
+        before_m3[inside], gradients = self._solids.overlap(
+            near.centers_m[inside], near.radii_m[inside], near.thing[inside]
+        )
+        lean_m2[inside] = np.linalg.norm(gradients, axis=1)
+        return near._replace(before_m3=before_m3, lean_m2=lean_m2), kept
+
+    def follow(self, pairs: _Pairs) -> None:
+        """Follow all pairs that may shorten a way, the nearest first."""
+        pairs = pairs.rows(np.argsort(pairs.first_m, kind="stable"))
+        while (left := self._may_shorten(pairs, pairs.bound_m)).any():
+            pairs = pairs.rows(left)
+            nearest = pairs.first_m <= pairs.first_m[0] + _TOGETHER_M
+            now, pairs = pairs.rows(nearest), pairs.rows(~nearest)
+            known = self._shorten(now, np.minimum(now.bound_m + _FIRST_M, self._end_m(now)))
+            again = now.rows(self._may_shorten(now, now.bound_m + _FIRST_M - MARGIN_M, known))
+            if len(again.thing):
+                self._shorten(again, self._end_m(again))
+
+    def _end_m(self, pairs: _Pairs) -> FloatArray:
+        """Return where pairs need to be known no farther: W(d + m) of what begins at the reach."""
+        return self._reach_m + 2.0 * MARGIN_M + pairs.sooner_m
+
+    def _may_shorten(self, pairs: _Pairs, from_m: FloatArray, known: BoolArray | bool = False) -> BoolArray:
+        """Ask which pairs may shorten a way by what comes after `from_m` (p,), but where it is known (p, 3, 8)."""
+        least_m = (from_m - MARGIN_M - pairs.sooner_m)[:, None, None]
+        fast = least_m < self.ways_m[:, 0]
+        later_m = np.where(pairs.touchable, pairs.later_m, 0.0)[:, None, None]
+        slow = least_m + later_m < self.ways_m[:, 1]
+        slow[pairs.touchable, :, TOUCH_STRENGTH:] = False
+        within = least_m <= self._reach_m
+        shorter: BoolArray = np.any((fast | slow) & within & np.logical_not(known), axis=(1, 2))
+        return shorter
+
+    def _overlap(self, pairs: _Pairs, ways_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """V and dV/dE at ways (p, k) of pairs."""
+        moved = pairs.centers_m[:, None] + ways_m[..., None] * self._direction
+        size = ways_m.shape[1]
+        volumes, gradients = self._solids.overlap(
+            moved.reshape(-1, 3), np.repeat(pairs.radii_m, size), np.repeat(pairs.thing, size)
+        )
+        return volumes.reshape(ways_m.shape), (gradients @ self._direction).reshape(ways_m.shape)
+
+    def _shorten(self, pairs: _Pairs, until_m: FloatArray) -> BoolArray:
+        """Shorten the ways by what pairs overlap until then (p,); which strengths (p, 3, 8) they have by then."""
+        places = np.arange(len(pairs.thing))
+        nothing_m3 = np.where(pairs.before_m3 > 0.0, _NOTHING, _LEAST) * 4.0 / 3.0 * np.pi * pairs.radii_m**3
+        nodes_m, volumes = self._nodes(pairs, until_m)
+        risen = np.maximum.accumulate(np.maximum(volumes - pairs.before_m3[:, None], 0.0), axis=1)
+        rises = risen[:, -1] > nothing_m3
+        free = np.maximum(np.argmax(risen > nothing_m3[:, None], axis=1), 1)
+        free_m = self._halve(pairs, nodes_m[places, free - 1], nodes_m[places, free], pairs.before_m3 + nothing_m3)
+        full_m = free_m + MARGIN_M
+        by_then = np.where(nodes_m <= full_m[:, None], risen, 0.0).max(axis=1)
+        at_full, _ = self._overlap(pairs, full_m[:, None])
+        by_then = np.maximum(by_then, at_full[:, 0] - pairs.before_m3)
+        least_m3 = np.minimum(np.pi * pairs.radii_m * LEAST_DEPTH_M**2, 0.5 * self._solids.volumes_m3[pairs.thing])
+        reference_m3 = np.maximum(np.maximum(by_then, MARGIN_M * pairs.lean_m2), least_m3)
+        due_m3 = reference_m3[:, None, None] * _DUE
+        # What is not known until d + m is not known at all yet.
+        whole = rises & (full_m <= until_m + 1e-12)
+        known: BoolArray = (risen[:, -1][:, None, None] >= due_m3) & whole[:, None, None]
+        after = np.stack([(risen[:, :, None] < due_m3[:, None, row]).sum(axis=1) for row in range(len(_DUE))], axis=1)
+        after = np.clip(after, 1, nodes_m.shape[1] - 1)
+        low_m, high_m = (nodes_m[places[:, None, None], after - back] for back in (1, 0))
+        less_m = (MARGIN_M + pairs.sooner_m)[:, None, None]
+        more_m = np.where(pairs.touchable, pairs.later_m, 0.0)[:, None, None]
+        for slow in (False, True):
+            allowed = known.copy()
+            if slow:
+                allowed[pairs.touchable, :, TOUCH_STRENGTH:] = False
+            shift_m = np.where(slow, more_m, 0.0) - less_m
+            most_m = np.minimum(np.where(allowed, high_m + shift_m, np.inf).min(axis=0), self.ways_m[:, int(slow)])
+            which = np.nonzero(allowed & (low_m + shift_m < most_m))
+            pair, row, level = which
+            there_m = self._halve(pairs.rows(pair), low_m[which], high_m[which], pairs.before_m3[pair] + due_m3[which])
+            for found_m, k, r, j in zip(there_m + shift_m[pair, 0, 0], pair, row, level, strict=True):
+                if found_m < self.ways_m[r, int(slow), j]:
+                    self.ways_m[r, int(slow), j] = found_m
+                    if r == 0:
+                        self.things[int(slow), j] = pairs.thing[k]
+        return known
+
+    def _nodes(self, pairs: _Pairs, until_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ways (p, 2k + 1) and V there: evenly, and in between where V peaks, or in the middle."""
+        steps = int(np.ceil((until_m - pairs.bound_m).max() / _STEP_M))
+        even_m = pairs.bound_m[:, None] + np.linspace(0.0, 1.0, steps + 1) * (until_m - pairs.bound_m)[:, None]
+        even, slopes = self._overlap(pairs, even_m)
+        rising, falling = slopes[:, :-1], slopes[:, 1:]
+        peaks = (rising > 0.0) & (falling < 0.0)
+        share = np.where(peaks, rising / np.where(peaks, rising - falling, 1.0), 0.5)
+        between_m = even_m[:, :-1] + share * np.diff(even_m, axis=1)
+        between, _ = self._overlap(pairs, between_m)
+        nodes_m, volumes = np.empty((len(even), 2 * steps + 1)), np.empty((len(even), 2 * steps + 1))
+        nodes_m[:, ::2], nodes_m[:, 1::2], volumes[:, ::2], volumes[:, 1::2] = even_m, between_m, even, between
+        return nodes_m, volumes
+
+    def _halve(self, pairs: _Pairs, low_m: FloatArray, high_m: FloatArray, volume_m3: FloatArray) -> FloatArray:
+        """Find where V reaches `volume_m3` (p,) to 5 µm, which it does at `high_m` and not at `low_m`."""
+        for _ in range(_HALVINGS):
+            middle_m = 0.5 * (low_m + high_m)
+            volumes, _ = self._overlap(pairs, middle_m[:, None])
+            there = volumes[:, 0] >= volume_m3
+            low_m, high_m = np.where(there, low_m, middle_m), np.where(there, middle_m, high_m)
+        return 0.5 * (low_m + high_m)

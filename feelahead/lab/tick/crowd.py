@@ -5,8 +5,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from robot_side.objects.movers import OF_OBJECTS, Movers
-from robot_side.objects.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
+from robot_side.surroundings.movers import OF_OBJECTS, Movers
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """The middle of the built-in table's things."""
@@ -87,16 +87,16 @@ class CrowdedCamera:
 def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:
     """Join the objects of both in a frame of `one`'s time, speeds unknown, with the meshes of `one` alone."""
     arrays: dict[str, Any] = {}
-    for kind in KINDS[:-1]:
+    for kind in KINDS:
         arrays[kind.owner] = np.concatenate([getattr(one, kind.owner), len(one.names) + getattr(other, kind.owner)])
-        for name in kind.fields:
+        for name, *_ in kind.arrays:
             arrays[name] = np.concatenate([getattr(one, name), getattr(other, name)])
     unknown: dict[str, Any] = dict.fromkeys(OF_OBJECTS)
     return replace(one, names=one.names + other.names, roles=one.roles + other.roles, **(arrays | unknown))
 
 
 def _without_objects(own: PerceivedObjects) -> PerceivedObjects:
-    none: dict[str, Any] = dict.fromkeys(OF_OBJECTS) | {"mesh_index": own.mesh_index[:0]}
+    none: dict[str, Any] = dict.fromkeys(OF_OBJECTS)
     for kind in KINDS:
-        none |= {name: getattr(own, name)[:0] for name in (kind.owner, *kind.fields)}
+        none |= {name: getattr(own, name)[:0] for name in (kind.owner, *(array.name for array in kind.arrays))}
     return replace(own, names=(), roles=(), **none)

@@ -103,6 +103,7 @@ function showFacts(message) {
   text("lease", status.owner);
   text("whose", facts.hands === "person" ? "scripted person" : facts.hands);
   text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
+  showLink(status);
   text("target", status.target ?? "none");
   text("holding", status.holding);
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
@@ -112,6 +113,15 @@ function showFacts(message) {
   charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
   charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
+}
+
+// The link's rate and queue by the robot side's own measure, the packets that were lost, and what was held back.
+function showLink(status) {
+  const figure = (value, digits = 0) => (value == null ? "?" : value.toFixed(digits));
+  const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
+  text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
+  const held = status.held_back ? `; held back: ${status.held_back}` : "";
+  text("pictures", `${status.pictures ?? "?"}${held}`);
 }
 
 // What the border says: no words of the status line are read but those that it is made of.

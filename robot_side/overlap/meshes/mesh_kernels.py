@@ -36,7 +36,7 @@ _ON_SURFACE = 1e-12
 
 
 @inlined
-def _to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
+def to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
     """A centre in the mesh's frame; a float would be too coarse for a ball on the far end of a large mesh."""
     away = (
         two_sum(center[0], -positions[pair, 0]),
@@ -57,7 +57,8 @@ def _product(a: Vector, b: PreciseVector) -> DoubleDouble:
 
 
 @inlined
-def _to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
+def to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
+    """Turn a vector from the frame of a placed mesh to the world's."""
     rotation = rotations[pair]
     return dot(load(rotation, 0), vector), dot(load(rotation, 1), vector), dot(load(rotation, 2), vector)
 
@@ -102,9 +103,9 @@ def overlap_loop(
             volumes[pair], areas[pair], touched[pair] = 0.0, 0.0, 0
             gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = 0.0, 0.0, 0.0
             continue
-        center = _to_mesh(load(centers, pair), positions, rotations, place)
+        center = to_mesh(load(centers, pair), positions, rotations, place)
         overlap, count = mesh_overlap(center, radius, tables, mesh, near, scratch)
-        gradient = _to_world(rotations, place, overlap[1])
+        gradient = to_world(rotations, place, overlap[1])
         volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
         gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient
 
@@ -150,7 +151,7 @@ def nearest_loop(
     """Fill signed distances (m) and directions (in the world's frame)."""
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     for pair in range(mesh_index.size):
-        point = _to_mesh(load(centers, pair), positions, rotations, pair)
+        point = to_mesh(load(centers, pair), positions, rotations, pair)
         distance, direction = _signed_distance(tables, mesh_index[pair], highs(point))
         distances[pair] = distance
-        directions[pair, 0], directions[pair, 1], directions[pair, 2] = _to_world(rotations, pair, direction)
+        directions[pair, 0], directions[pair, 1], directions[pair, 2] = to_world(rotations, pair, direction)

@@ -1,6 +1,8 @@
 """Several meshes in one set of arrays, so that one kernel call handles all pairs of a sphere and a placed mesh."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,6 +11,18 @@ from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
 from robot_side.overlap.meshes.mesh_tables import joined
+
+
+@dataclass(frozen=True)
+class MeshBounds:
+    """What contains each of m meshes, in its own frame: a box along the axes, and a sphere about the same middle."""
+
+    middles_m: FloatArray
+    """(m, 3)"""
+    half_sizes_m: FloatArray
+    """(m, 3)"""
+    radii_m: FloatArray
+    """(m,)"""
 
 
 class MeshLibrary:
@@ -24,6 +38,31 @@ class MeshLibrary:
 
     def __len__(self) -> int:
         return len(self.tables.volumes)
+
+    @cached_property
+    def bounds(self) -> MeshBounds:
+        """What contains each mesh."""
+        tables = self.tables
+        roots = tables.roots[:-1]
+        lowest, highest = tables.boxes[roots, :3], tables.boxes[roots, 3:]
+        middles = 0.5 * (lowest + highest)
+        first_triangles = tables.links.reshape(-1, 3)[roots, 1]
+        corners = tables.triangles[:, :9].reshape(-1, 3, 3)
+        counts = np.diff(first_triangles, append=len(corners))
+        apart = np.linalg.norm(corners - np.repeat(middles, counts, axis=0)[:, None, :], axis=2).max(axis=1)
+        return MeshBounds(middles, 0.5 * (highest - lowest), np.maximum.reduceat(apart, first_triangles))
+
+    @property
+    def corners_m(self) -> list[FloatArray]:
+        """Each mesh's triangles (t, 3, 3) in its own frame."""
+        first_triangles = self.tables.links.reshape(-1, 3)[self.tables.roots[:-1], 1]
+        return np.split(self.tables.triangles[:, :9].reshape(-1, 3, 3), first_triangles[1:])
+
+    def placed_middles_m(self, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+        """The middles (q, 3) of the bounds of placed meshes in the world frame; arguments as for `mesh_pairs`."""
+        middles = self.bounds.middles_m.take(mesh_index, axis=0)
+        placed: FloatArray = positions + np.einsum("qij,qj->qi", rotations, middles)
+        return placed
 
 
 def mesh_pairs(

@@ -24,7 +24,9 @@ LINK = (
 
 @pytest.fixture(scope="module")
 def summary() -> dict[str, Any]:
-    both = Loopback(LoopbackSettings(RobotSettings(link=LINK), OperatorSettings(link=LINK)))
+    both = Loopback(
+        LoopbackSettings(RobotSettings(link=LINK, full_rate=True), OperatorSettings(link=LINK, full_rate=True))
+    )
     both.run_until(3.0)
     return both.summary()
 

@@ -1,6 +1,7 @@
 """Peers that speak, flood, leave and are revoked: a state machine over the robot side's end, and a crowd's limits."""
 
 from collections import Counter
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,31 +14,56 @@ from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from common.sockets import robot as robot_sockets
 from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
 from common.sockets.crowd import Crowd
+from common.sockets.peers import peer_name_of
 from common.sockets.robot import RobotSockets
+from common.sockets.turns import SILENCE_S, Offered, new_group, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
 
 LIMIT = 8
-"""Messages of a peer in a second, in the machine, so that floods are short."""
+"""Messages of a key in a second, in the machine, so that floods are short."""
 KEYS = ("anna's", "ben's")
-DESCRIPTORS = (10_000, 10_001)
+GROUP = new_group()
+NAMES = (routing_id(GROUP, 0), routing_id(GROUP, 1), b"raw")
+DESCRIPTORS = (10_000, 10_001, 10_002)
+
+
+@dataclass(eq=False)
+class Line:
+    """A connection, open or not."""
+
+    name: bytes
+    key: str
+    descriptor: int
+    heard_s: float = 0.0
+    seen: bool = False
+    """Whether a message of it was read while the gates had told everything."""
+    by_another: bool = True
+    """Whether it came by another descriptor than the one before by its routing id."""
+    known: bool = False
+    """Whether it was told then from the one before by its routing id."""
+
+    @property
+    def peer(self) -> bytes:
+        return peer_name_of(self.name, self.key)
 
 
 class Connections(RuleBasedStateMachine):
     """Peers that come, speak, flood, leave and are revoked; a message may be read long after its sender left.
 
-    `unseen` is what ZeroMQ has told and the gates have not heard yet; when they are `late` they hear nothing.
+    Who comes by a routing id that is in use takes it over, be it with another key. `unseen` is what ZeroMQ has told
+    and the gates have not heard yet; when they are `late` they hear nothing.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.allowed = dict.fromkeys(KEYS, "")
         self.second = 0
-        self.owners: dict[int, bytes] = {}
-        self.peers: dict[bytes, tuple[str, int]] = {}
+        self.open: dict[int, Line] = {}
+        self.newest: dict[bytes, Line] = {}
+        self.heard: dict[bytes, Line] = {}
         self.unseen: list[tuple[str, int]] = []
         self.late = False
-        self.spoken: Counter[tuple[bytes, int]] = Counter()
-        self.heard: set[bytes] = set()
+        self.spoken: Counter[tuple[str, int]] = Counter()
         self.ended: list[int] = []
         self.told: list[bytes] = []
         self.arriving: list[Any] = []
@@ -47,20 +73,21 @@ class Connections(RuleBasedStateMachine):
             ("_clock", SimpleNamespace(now=lambda: float(self.second))),
             ("_keys", SimpleNamespace(allowed=SimpleNamespace(names=self.allowed))),
             ("_watch_connections", self.watch),
-            ("send_frames", self.take),
+            ("offer", self.take),
         ):
             self.patch.setattr(self.robot, name, stand_in)
         self.patch.setattr(self.robot._inbox, "read", lambda: self.arriving)
-        self.patch.setattr(robot_sockets, "_shut_down", self.ended.append)
+        self.patch.setattr(robot_sockets, "shut_down", self.ended.append)
         self.patch.setattr(robot_sockets, "PEER_LIMIT_PER_S", LIMIT)
 
     def teardown(self) -> None:
         self.patch.undo()
         self.robot.close()
 
-    def take(self, _: object, frames: list[bytes], limit_bytes: int) -> bool:
-        self.told.append(frames[0])
-        return limit_bytes > 0
+    def take(self, _: object, name: bytes, payload: bytes) -> Offered:
+        if payload == b"stiffness":
+            self.told.append(name)
+        return Offered.TAKEN if self.is_open(self.newest[name]) or payload else Offered.GONE
 
     def watch(self) -> None:
         crowd = self.robot._gates[0].crowd
@@ -70,17 +97,21 @@ class Connections(RuleBasedStateMachine):
         self.robot._all_seen = not self.unseen
 
     def leave(self, descriptor: int) -> None:
-        del self.owners[descriptor]
+        del self.open[descriptor]
         self.unseen.append(("went", descriptor))
 
-    @rule(descriptor=st.sampled_from(DESCRIPTORS), key=st.sampled_from(KEYS), comes=st.booleans())
-    def leave_or_come(self, descriptor: int, key: str, comes: bool) -> None:
+    @rule(
+        descriptor=st.sampled_from(DESCRIPTORS),
+        name=st.sampled_from(NAMES),
+        key=st.sampled_from(KEYS),
+        comes=st.booleans(),
+    )
+    def leave_or_come(self, descriptor: int, name: bytes, key: str, comes: bool) -> None:
         """The owner of the descriptor leaves; the next one may have it at once."""
-        if descriptor in self.owners:
+        if descriptor in self.open:
             self.leave(descriptor)
         if comes:
-            name = b"peer%d" % len(self.peers)
-            self.owners[descriptor], self.peers[name] = name, (key, descriptor)
+            self.open[descriptor] = self.newest[name] = Line(name, key, descriptor)
             self.unseen.append(("came", descriptor))
 
     @rule(key=st.sampled_from(KEYS))
@@ -92,40 +123,60 @@ class Connections(RuleBasedStateMachine):
     def a_second_passes(self) -> None:
         self.second += 1
 
-    @precondition(lambda self: self.owners or self.heard)
+    def speakers(self) -> list[Line]:
+        """ZeroMQ reads from the newest by each routing id, also what it said before it left."""
+        return [line for line in self.newest.values() if self.is_open(line) or line.seen]
+
+    def is_open(self, line: Line) -> bool:
+        return self.open.get(line.descriptor) is line
+
+    @precondition(lambda self: self.speakers())
     @rule(data=st.data(), count=st.sampled_from([LIMIT + 1, 3, 1]), late=st.booleans())
     def speak(self, data: st.DataObject, count: int, late: bool) -> None:
-        """Messages of one peer are read, which is there or has been heard before it left."""
+        """Messages of one connection are read."""
         self.late = late
-        gone = [name for name in self.peers if name in self.heard][-2:]
-        name = data.draw(st.sampled_from(sorted({*self.owners.values(), *gone})))
-        key, descriptor = self.peers[name]
-        spoken = self.spoken[name, self.second]
-        properties = {"User-Id": key, zmq.SRCFD: descriptor}
+        line = data.draw(st.sampled_from(self.speakers()))
+        properties = {"User-Id": line.key, int(zmq.SRCFD): line.descriptor}
         frame = SimpleNamespace(get=properties.__getitem__, bytes=b"payload")
-        self.arriving = [[SimpleNamespace(bytes=name), frame]] * count
+        self.arriving = [[SimpleNamespace(bytes=line.name), frame]] * count
         self.ended.clear()
         received = self.robot.receive()
-        admitted = min(count, max(0, LIMIT - spoken)) if key in self.allowed else 0
-        assert received == [(name, b"payload")] * admitted
-        self.spoken[name, self.second] += count
-        if not self.late:
-            self.heard.add(name)
-        is_there = self.owners.get(descriptor) == name
-        assert set(self.ended) <= ({descriptor} if is_there else set()), "somebody else's connection was ended"
-        if is_there and not self.late and admitted < count:
-            assert self.ended, "who floods or was revoked keeps the connection"
-        if self.ended:
+        spoken = self.spoken[line.key, self.second]
+        admitted = min(count, max(0, LIMIT - spoken)) if line.key in self.allowed else 0
+        assert received == [(line.peer, b"payload")] * admitted
+        self.spoken[line.key, self.second] += count
+        before, self.heard[line.name] = self.heard.get(line.name, line), line
+        line.seen |= self.robot._all_seen
+        # Who comes back by the same descriptor is not told from who left messages behind, until they are too many.
+        line.by_another &= before is line or before.descriptor != line.descriptor
+        line.known |= self.robot._all_seen and line.by_another
+        line.heard_s = float(self.second) if admitted else before.heard_s if before.key == line.key else 0.0
+        taken_over = {each.descriptor for each in self.open.values() if each.name == line.name and each is not line}
+        of_peer = {each.descriptor for each in self.open.values() if each.peer == line.peer}
+        assert set(self.ended) <= taken_over | (of_peer if admitted < count else set()), "somebody else's was ended"
+        if self.robot._all_seen:
+            known = {each.descriptor for each in (*self.heard.values(), before) if each.known and self.is_open(each)}
+            own = {line.descriptor} if self.is_open(line) else set()
+            assert before is line or known & taken_over <= set(self.ended)
+            assert admitted == count or own | (known & of_peer) <= set(self.ended), "who floods or was revoked stays"
+        for descriptor in set(self.ended):
             self.leave(descriptor)
-        for one in (name, *self.owners.values(), b"nobody"):
-            self.tell(one)
+        for name in {line.peer, *(peer_name_of(name, key) for name in NAMES for key in KEYS), b"nobody"}:
+            self.tell(name)
 
-    def tell(self, name: bytes) -> None:
-        may = name in self.robot._peers and self.peers[name][0] in self.allowed
-        self.told.clear()
-        dropped = self.robot.dropped
-        assert (self.robot.send(name, b"stiffness"), self.told) == ((True, [name]) if may else (False, []))
-        assert self.robot.dropped == dropped + (not may)
+    def tell(self, peer: bytes) -> None:
+        """It gets its messages by the routing ids that it was heard by last: all of them, or the next one."""
+        lines = [line for line in self.heard.values() if line.peer == peer and line.key in self.allowed]
+        everywhere = {line.name for line in lines}
+        newest_s = max((line.heard_s for line in lines), default=0.0)
+        in_turn = {line.name for line in lines if line.heard_s >= newest_s - SILENCE_S}
+        for is_everywhere, rounds, names in ((True, 1, everywhere), (False, len(in_turn) or 1, in_turn)):
+            self.told.clear()
+            dropped = self.robot.dropped
+            for _ in range(rounds):
+                assert self.robot.send(peer, b"stiffness", everywhere=is_everywhere) == bool(names)
+            assert sorted(self.told) == sorted(names)
+            assert self.robot.dropped == dropped + (not names)
 
 
 TestConnections = Connections.TestCase
@@ -136,6 +187,19 @@ TestConnections.settings = settings(
     stateful_step_count=30,
     phases=[Phase.explicit, Phase.generate],  # shrinking opens sockets by the thousand
 )
+
+
+def test_who_has_the_descriptor_of_a_sender_that_was_gone_before_it_was_read_stays(
+    robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may be anybody's: of a viewer, say, whom the control port knows nothing of."""
+    ended: list[int] = []
+    monkeypatch.setattr(robot_sockets, "shut_down", ended.append)
+    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 0)
+    frame = SimpleNamespace(get={int(zmq.SRCFD): DESCRIPTORS[0]}.__getitem__, bytes=b"payload")
+    monkeypatch.setattr(robot._inbox, "read", lambda: [[SimpleNamespace(bytes=b"gone"), frame]] * 2)
+    assert robot.receive() == []
+    assert (robot._all_seen, robot.flooding, ended) == (True, 2, [])
 
 
 def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_strangers() -> None:

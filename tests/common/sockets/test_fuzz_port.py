@@ -10,9 +10,11 @@ import pytest
 import zmq
 
 from common.clock import MonotonicClock
+from common.silence import MOTION_PERIOD_S
 from common.sockets import robot as robot_sockets
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.descriptors import shut_down
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
@@ -167,7 +169,7 @@ def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypa
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
     hung_up: list[int] = []
-    monkeypatch.setattr(robot_sockets, "_shut_down", hung_up.append)
+    monkeypatch.setattr(robot_sockets, "shut_down", hung_up.append)
     with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
         come_and_go(robot, robot.view_endpoint, 100)
         with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
@@ -180,11 +182,11 @@ def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypa
 
 def test_what_is_no_connection_any_more_is_left_alone() -> None:
     reading, writing = os.pipe()
-    robot_sockets._shut_down(reading)
+    shut_down(reading)
     os.close(writing)
     assert os.read(reading, 1) == b""
     os.close(reading)
-    robot_sockets._shut_down(reading)
+    shut_down(reading)
 
 
 def test_who_comes_back_by_the_same_name_is_no_stranger(robot: RobotSockets) -> None:
@@ -196,7 +198,7 @@ def test_who_comes_back_by_the_same_name_is_no_stranger(robot: RobotSockets) -> 
             dealer.connect(robot.control_endpoint)
             dealer.send(b"here")
             assert drain(robot, PATIENT_S) == [b"here"]
-            assert robot._peers[b"same"].descriptor in robot._gates[0].crowd._known
+            assert robot._peers.connections[b"same"].descriptor in robot._gates[0].crowd._known
         assert until_descriptors_are(before, robot)
 
 
@@ -254,6 +256,20 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     assert robot.flooding > 0
     assert received <= 200
     assert is_heard(robot, operator)
+
+
+def test_who_sends_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot, "_second", 0)
+    monkeypatch.setattr(robot, "_clock", StandingClock())
+    most = round(20 / MOTION_PERIOD_S)
+    with contextlib.closing(stranger(robot)) as connection:
+        connection.send(message(b"x") * (most + 1))
+        received: list[bytes] = []
+        while not robot.flooding:
+            assert robot.wait(PATIENT_S)
+            received += [payload for _, payload in robot.receive()]
+        assert received == [b"x"] * most
+        assert connection.ended()
 
 
 def test_a_flood_by_the_descriptor_of_a_peer_that_has_left_is_cut_off(

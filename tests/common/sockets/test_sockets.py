@@ -1,8 +1,11 @@
 """Real sockets on loopback. Nothing here sleeps: every wait is for a message, or for a bounded time at most."""
 
+import os
+
 import pytest
 import zmq
 
+from common.clock import VirtualClock
 from common.sockets import inbox
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
@@ -11,6 +14,7 @@ from tests.helpers.socket_talk import (
     EPHEMERAL,
     PATIENT_S,
     ROUNDS,
+    drain_all,
     drain_until,
     greet,
     publish_until_seen,
@@ -62,16 +66,14 @@ def test_a_flood_never_blocks_and_what_was_taken_arrives(robot: RobotSockets, op
     taken = [number for number in range(20_000) if robot.send(peer, b"%d" % number)]
     assert len(taken) + robot.dropped == 20_000
     assert robot.dropped > 0
-    received = drain_until(operator.receive, operator.wait, b"%d" % taken[-1])
-    assert received == [b"%d" % number for number in taken]
+    drain_all(operator.receive, operator.wait, [b"%d" % number for number in taken])
 
 
 def test_a_short_burst_passes_whole(robot: RobotSockets, operator: OperatorSockets) -> None:
     peer = greet(robot, operator)
-    for number in range(10):
-        assert robot.send(peer, b"%d" % number)
-    received = drain_until(operator.receive, operator.wait, b"9")
-    assert received == [b"%d" % number for number in range(10)]
+    burst = [b"%d" % number for number in range(10)]
+    assert all(robot.send(peer, payload) for payload in burst)
+    drain_all(operator.receive, operator.wait, burst)
 
 
 def test_one_call_receives_a_bounded_number(
@@ -79,15 +81,16 @@ def test_one_call_receives_a_bounded_number(
 ) -> None:
     greet(robot, operator)
     monkeypatch.setattr(inbox, "MESSAGES_PER_RECEIVE", 3)
-    for number in range(8):
-        send_until_connected(operator, b"%d" % number)
+    sent = [b"%d" % number for number in range(8)]
+    for payload in sent:
+        send_until_connected(operator, payload)
     batches: list[list[bytes]] = []
 
     def receive() -> list[bytes]:
         batches.append([payload for _, payload in robot.receive()])
         return batches[-1]
 
-    assert drain_until(receive, robot.wait, b"7") == [b"%d" % number for number in range(8)]
+    drain_all(receive, robot.wait, sent)
     assert max(len(batch) for batch in batches) <= 3
 
 
@@ -172,6 +175,27 @@ def test_no_wake_is_lost_between_sends_and_receives(robot: RobotSockets, operato
         assert operator.receive() == [b"%d" % number]
         assert operator.send(b"%d" % number)
         assert receive_one(robot) == (peer, b"%d" % number)
+
+
+def test_signals_that_bring_nothing_prolong_no_wait(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strangers who knock and knock must not keep the robot side from its next tick."""
+    clock, (reading, writing) = VirtualClock(), os.pipe()
+    os.write(writing, b"nobody reads it")
+
+    def looked() -> bool:
+        clock.advance_to(clock.now() + 0.01)
+        assert clock.now() < 2.0
+        return False
+
+    for owner, name, stand_in in (
+        (robot, "_clock", clock),
+        *((robot._inbox, "descriptor", reading), (robot._inbox, "has_some", looked)),
+    ):
+        monkeypatch.setattr(owner, name, stand_in)
+    assert not robot.wait(1.0)
+    assert clock.now() == pytest.approx(1.0, abs=0.03)
+    for descriptor in (reading, writing):
+        os.close(descriptor)
 
 
 @pytest.mark.parametrize("timeout_s", [-0.001, float("nan")])

@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 LOOK_S = 0.05
+ARRIVED = {"to_robot": "motion_received", "to_operator": "stiffness_received"}
 Strengths = tuple[int, ...]
 
 
@@ -119,7 +121,10 @@ def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
     assert all(moment.held for moment in lifting)
     assert max(max(moment.l2) for moment in lifting) == 0
     # The table lies ahead of a gripper that points down, within what a full pull would need to stop.
-    assert lifting[0].r2[:5] == (0,) * 5
+    # The encoders' noise is in it: one reading in a hundred brings it nearer, and that holds for 0.1 s.
+    free = [moment for moment in lifting if moment.r2[:5] == (0,) * 5]
+    assert len(free) >= 0.9 * len(lifting)
+    assert all(moment.r2[:2] == (0,) * 2 for moment in lifting)
     assert lifting[0].r2[-1] == 8
 
 
@@ -137,8 +142,14 @@ def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> 
     summary = episode(delay_ms).summary
     spread_ms = 10.0 if delay_ms else 0.0
     for direction in ("to_robot", "to_operator"):
-        assert summary["delay_ms"][direction]["mean"] == pytest.approx(delay_ms, abs=0.6)
-        assert summary["delay_ms"][direction]["sd"] == pytest.approx(spread_ms, abs=0.6)
+        measured = summary["delay_ms"][direction]
+        # The few hundred messages were delayed by so much; what is measured of it is exact, but for a tick's waiting.
+        achieved = summary["link"][direction]["achieved"]["delay_ms"]
+        within = 4.0 * spread_ms / math.sqrt(summary["messages"][ARRIVED[direction]])
+        assert achieved["mean"] == pytest.approx(delay_ms, abs=within)
+        assert achieved["sd"] == pytest.approx(spread_ms, abs=within)
+        assert measured["mean"] == pytest.approx(achieved["mean"], abs=0.1)
+        assert measured["sd"] == pytest.approx(achieved["sd"], abs=0.1)
     # Latest wins: what is applied is the quicker part of what arrives.
     if delay_ms:
         assert summary["applied_age_ms"]["to_operator"]["mean"] < summary["delay_ms"]["to_operator"]["mean"]

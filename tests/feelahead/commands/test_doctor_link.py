@@ -160,7 +160,7 @@ class Doctor:
         self._capsys = capsys
 
     def line(self, *arguments: str, code: int = 1) -> str:
-        assert command(["doctor", *arguments]) == code
+        assert command(["doctor", "--no-path", *arguments]) == code
         [line] = self._capsys.readouterr().out.splitlines()
         return str(line)
 
@@ -261,7 +261,7 @@ def test_whoever_has_the_arm_keeps_it(doctor: Doctor) -> None:
 
 def test_one_object_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
     with ServingRobot() as robot:
-        assert command(["doctor", "--connect", robot.control, "--view-connect", robot.view, "--json"]) == 0
+        assert command(["doctor", "--connect", robot.control, "--view-connect", robot.view, "--json", "--no-path"]) == 0
         told = json.loads(capsys.readouterr().out)
         assert (told["reached"], told["wrong"], told["arm"], told["waiting"]) == (True, None, "free", 0)
         assert (told["protocol"], told["round_trips"]) == (PROTOCOL_VERSION, 3)

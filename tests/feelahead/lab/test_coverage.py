@@ -192,7 +192,7 @@ def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
 @pytest.mark.parametrize("law", ["swept", "swept_robot", "paper"])
 def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     link = LINKS["200 ms"]
-    approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=link, law=law, seed=SEED)
+    approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=link, law=law, seed=SEED, full_rate=True)
     run = PullRun(approach, make_pull("steady", SEED))
     began_s = run.arm()
     for _ in run.go_on(began_s + 2.0):
@@ -253,7 +253,8 @@ def test_a_cell_has_what_it_takes_to_judge_it() -> None:
 @pytest.mark.parametrize("around_s", [-0.02, 0.02])
 def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_s: float) -> None:
     draw, touch_s, last_s = approaching(link)
-    approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=LINKS[link], law="none", seed=SEED)
+    wall, delays = frozen_scene("wall"), LINKS[link]
+    approach = Approach(wall, 0.0, strongest_n=0.0, link=delays, law="none", seed=SEED, full_rate=True)
     began_s, pulls = draw.replay.record.began_s, make_pull("steady", SEED)
     run = PullRun(approach, lambda since_s: Hands() if began_s + since_s >= last_s + around_s else pulls(since_s))
     assert run.arm() == began_s

@@ -8,32 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import feelahead.main
 from common.errors import ConfigurationError
 from feelahead.lab import cover
 from feelahead.lab.approaches.frozen import frozen_hash
-from feelahead.lab.approaches.ticks import DEMO, Recorded, record, with_cover
+from feelahead.lab.approaches.ticks import DEMO, record, with_cover
 from feelahead.lab.cover import STANDS_OUT, Gripper
 from feelahead.lab.field import way_name
 from feelahead.lab.questions.felt import Run, run
-from feelahead.lab.reference import plain_feel, plain_ramp, plain_ways
-from feelahead.lab.reference.beside import Differences, compare_ticks
 from feelahead.lab.table import Table
 from feelahead.lab.variants import COVER_M, COVERS_M, WAYS, Replayed, errors_mm, replay
-from robot_side.ahead.field import Ahead, Along
-from robot_side.ahead.find import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
-from robot_side.ahead.scene_table import scene_table
-from robot_side.objects.perceived import PerceivedObjects
-from robot_side.overlap import Mesh
-from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.simulation.gripper_cover import GripperCover, cover_gripper
-from tests.helpers.ahead.fields import along, ball_pose
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.gripper_poses import free_pose
-from tests.helpers.perceived_scenes import Scene, random_rotation
 from tests.helpers.repository import DATA
 
 LIMIT = 1e-12
@@ -42,98 +29,6 @@ ENCODER_SIGMA_RAD = np.full(6, 2e-3)
 HORIZON_M = 0.5
 WALL = str(DATA / "wall.xml")
 COVER_MM, RAMP_MM = 3.0, 12.0
-
-
-def any_scene(rng: np.random.Generator) -> PerceivedObjects:
-    """Up to four objects of up to three primitives, some about the gripper and some ahead of it."""
-    scene = Scene()
-    for _ in range(rng.integers(1, 5)):
-        scene.add()
-        for kind in rng.choice(4, rng.integers(1, 4), p=(0.25, 0.35, 0.3, 0.1)):
-            center = rng.uniform((-0.08, -0.08, -0.08), (0.08, 0.08, 0.28))
-            size = float(rng.uniform(0.002, 0.05))
-            if kind == 0:
-                scene.sphere(center, size)
-            elif kind == 1:
-                scene.box(center, size * rng.uniform(0.1, 2.0, 3), random_rotation(rng))
-            elif kind == 2:
-                scene.tetrahedron(center + size * rng.normal(size=(4, 3)))
-            else:
-                normal = rng.normal(size=3)
-                normal /= np.linalg.norm(normal)
-                scene.half_space(normal, float(normal @ center) - 0.1)
-    return scene.objects()
-
-
-@settings(derandomize=True, deadline=None, max_examples=100)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_any_look_has_the_ways_of_the_plain_formulation(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    objects, count = any_scene(rng), int(rng.integers(1, 10))
-    pose = free_pose(rng.uniform(-0.03, 0.03, (count, 3)), rng.uniform(0.004, 0.025, count))
-    pose = replace(pose, sphere_on_finger=rng.random(count) < 0.5)
-    direction = np.array([0.0, 0.0, 1.0]) + 0.4 * rng.normal(size=3)
-    direction /= np.linalg.norm(direction)
-    things = len(objects.names)
-    early_m = rng.uniform(0.0, 0.03, things) if rng.random() < 0.5 else None
-    ahead = Along(direction, float(rng.uniform(-0.004, 0.006)), 0.002**2, 2.326, REACH_M, early_m)
-    standing = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET, PASSED_OVER], things).astype(np.int64)
-    widest_m = float(rng.choice([0.002, 0.01, np.inf]))
-    found = Ahead(ENCODER_SIGMA_RAD).look(pose, scene_table(objects), standing, ahead, widest_m).ways_m
-    expected = plain_ways.plain_ways(pose, objects, standing, ahead, widest_m, ENCODER_SIGMA_RAD)
-    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=LIMIT)
-
-
-def test_meshes_are_refused() -> None:
-    objects = Scene().add().mesh(Mesh(*capsule_mesh(0.01, 0.02, 8)[:2]), [0.0, 0.0, 0.1]).objects()
-    standing = np.full(1, OBSTACLE, dtype=np.int64)
-    with pytest.raises(ValueError, match="1 meshes; valid"):
-        plain_ways.plain_ways(ball_pose(), objects, standing, along(), np.inf, ENCODER_SIGMA_RAD)
-
-
-def test_what_only_one_knows_is_infinitely_far_apart() -> None:
-    found = Differences()
-    found.take("same", [np.inf, 1.0], [np.inf, 1.0])
-    found.take("apart", [0.25, 1.0], [0.25, 1.5])
-    found.take("one", [np.inf], [1.0])
-    found.take("none", [np.nan], [np.nan])
-    assert found.largest == {"same": 0.0, "apart": 0.5, "one": np.inf, "none": np.inf}
-
-
-@pytest.fixture(scope="module")
-def grasping() -> Recorded:
-    """Those of the demo's ticks in which the target is gripped, among objects of all kinds but meshes."""
-    recorded = record(DEMO, 6.2)
-    return replace(recorded, ticks=recorded.ticks[5940:])
-
-
-@pytest.mark.long
-def test_recorded_ticks_are_those_of_the_plain_formulation(grasping: Recorded) -> None:
-    found = compare_ticks(grasping.new_law(), grasping.ticks, grasping.settings.motion)
-    assert {len(tick.situation.pose.sphere_radii_m) for tick in grasping.ticks} == {246, 383}
-    assert found.ticks == 261
-    assert found.looks > 50
-    assert found.ways > 500
-    assert max(found.largest.values()) <= LIMIT
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("module", "name", "value", "noticed"),
-    [
-        (plain_ramp, "NODES_PER_MARGIN", 5, "ways of a look, m"),
-        (plain_ways, "MARGIN_M", 0.0121, "ways, m"),
-        (plain_feel, "STEADY_S", 0.01, "ways, m"),
-        (plain_feel, "HORIZON_S", 0.31, "horizon_m"),
-    ],
-)
-def test_another_formulation_is_noticed(
-    grasping: Recorded, module: object, name: str, value: float, noticed: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, name, value)
-    found = compare_ticks(grasping.new_law(), grasping.ticks[:60], grasping.settings.motion)
-    assert found.largest[noticed] > LIMIT
 
 
 def replayed(*rows_m: float) -> Replayed:
@@ -172,12 +67,16 @@ def test_recorded_ticks_go_through_the_law_with_other_covers() -> None:
 
 
 @pytest.mark.long
-def test_equality_is_a_table_a_goal_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ways_are_a_table_goals_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "out.csv"
-    assert feelahead.main.command(["bench", "felt", "--equality", "--quick", f"--csv={written}"]) == 0
-    assert "met largest difference of compiled and plain" in " ".join(capsys.readouterr().out.split())
+    assert feelahead.main.command(["bench", "felt", "--ways", "--quick", f"--csv={written}"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "met ways later than 0.1 mm: 0" in shown
+    assert "met ways of grazes out of their band: 0" in shown
     with written.open(newline="", encoding="utf-8") as file:
-        assert all(float(row["largest"]) <= LIMIT for row in csv.DictReader(file))
+        rows = list(csv.DictReader(file))
+    assert [row["scene"] for row in rows] == [DEMO, "mug"]
+    assert all(int(row["ways"]) > 100 for row in rows)
 
 
 def test_the_cover_of_a_gripper_is_a_row_for_each_part_and_a_picture(
@@ -232,7 +131,7 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         assert rows.values("free_mm") == [0.0, 50.0, 100.0, 150.0]
         far = rows.rows[1:]
         before_mm = np.array([[row["free_mm"] - row[way_name(strength)] for strength in range(1, 9)] for row in far])
-        np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=1e-6)
+        np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
         assert (np.diff(before_mm, axis=1) <= 0.0).all()
         # The eighth at D_σ and what the spheres stand out, or a little earlier, as strengths are rounded; the first on
         # the ramp before.
@@ -244,8 +143,8 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["--equality", "--picture", "out.png"], "--equality has no figure"),
-        (["--equality", "--field"], "--equality and --field exclude each other; valid: one of them"),
+        (["--ways", "--picture", "out.png"], "--ways has no figure"),
+        (["--ways", "--field"], "--ways and --field exclude each other; valid: one of them"),
         (["--model", WALL], "--model and --site are for --cover and --field"),
         (["--cover", "--site", "tcp"], "--cover takes --model and --site together"),
         (["--field", "--step-mm", "nan"], "--step-mm = nan; valid: 1 to 150"),

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from feelahead.lab.questions.tick import Case, rows, run
+from feelahead.lab.questions.tick import Case, Concave, rows, run
 from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera, crowd
 from feelahead.lab.tick.timed_robot import COLUMNS
-from robot_side.objects.perceived import Role
-from robot_side.objects.validity import require_valid
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import load_scene
+from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.validity import require_valid
 
 
 def test_a_crowd_is_valid_and_out_of_the_way() -> None:
@@ -49,19 +49,32 @@ def test_alone_a_crowd_is_all_there_is() -> None:
         assert frame.names == tuple(f"crowd {k}" for k in range(30))
 
 
-def test_look_to_message_leaves_out_physics_and_frames() -> None:
-    tick = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 100e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
-    ticks = np.array([[tick[column] for column in COLUMNS]] * 3)
-    ticks[:, 0], ticks[:, COLUMNS.index("thread_s")] = (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)
-    found = {row["part"]: row for row in rows(ticks, stages=True, overruns=0)}
+def test_look_to_message_leaves_out_physics_and_frames_and_stands_beside_mixed() -> None:
+    tick = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 80e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
+    turns = np.array([[tick[column] for column in COLUMNS]] * 4)
+    turns[:, COLUMNS.index("run")] = 0, 0, 0, 1
+    turns[:, 0], turns[:, COLUMNS.index("thread_s")] = (0.0, 1.0, 2.0, 3.0), (0.0, 0.5, 1.0, 2.0)
+    turns[1, COLUMNS.index("looks")], turns[1, COLUMNS.index("law")] = 1, 60e-6
+    turns[3, COLUMNS.index("tick_s")] = 200e-6
+    found = {row["stage"]: row for row in rows(turns, stages=True, overruns=0)}
     assert found["look to message"]["p50_us"] == pytest.approx(50.0)
-    assert found["tick without physics"]["p50_us"] == pytest.approx(70.0)
+    assert found["look to message"]["p50_of_mixed"] == pytest.approx(0.25)
+    assert found["without physics"]["p50_us"] == pytest.approx(70.0)
     assert found["the rest"]["p50_us"] == pytest.approx(10.0)
+    assert found["whole look"]["p50_us"] == pytest.approx(60.0)
     assert found["tick"]["share"] == pytest.approx(0.5)
+    assert found["mixed"]["p99_of_mixed"] == 1.0
 
 
 @pytest.mark.processes
 def test_a_real_robot_side_is_timed() -> None:
-    found = {row["part"]: row for row in run(Case("10 objects", 1.5, stages=True, objects=10), 0)}
+    found = {row["stage"]: row for row in run(Case("10 objects", 1.5, stages=True, objects=10), 0)}
     assert found["tick"]["p50_us"] > found["look to message"]["p50_us"] > 0.0
     assert found["law"]["p50_us"] > 0.0
+    assert found["mixed"]["p50_us"] > 0.0
+
+
+def test_looks_at_what_is_concave_take_turns_with_mixed() -> None:
+    found = {row["stage"]: row for row in run(Concave("u_mesh", 0.01), 0)}
+    assert found["field of u_mesh"].keys() == found["mixed"].keys()
+    assert all(row["p50_us"] > 0.0 for row in found.values())

@@ -1,6 +1,7 @@
 """Exports hold what the recording holds, in the layouts that other programs ask for."""
 
 import csv
+import io
 import json
 import shutil
 from pathlib import Path
@@ -13,7 +14,7 @@ from PIL import Image
 from common.protocol.codec import decode_view
 from common.recording.reading import Recording
 from feelahead.commands.recordings import export, plot
-from feelahead.recordings.lerobot import pictures
+from feelahead.recordings.lerobot import Picture, _of_one_size, pictures
 from feelahead.recordings.playback import Seen, seen
 from feelahead.recordings.tables import read_tables
 
@@ -110,6 +111,21 @@ def test_lerobot_takes_pictures_as_they_are(with_pictures: tuple[Recording, list
     assert hints["observation.images.overview"] == {"_type": "Image"}
     stats = json.loads((folder / "meta/stats.json").read_text())["observation.images.overview"]
     assert np.array(stats["mean"]).shape == (3, 1, 1)
+
+
+def test_pictures_that_a_narrow_link_made_smaller_are_enlarged() -> None:
+    made = []
+    for size in ((64, 48), (32, 24), (64, 48)):
+        content = io.BytesIO()
+        Image.new("RGB", size, (10, 200, 30)).save(content, "JPEG")
+        made.append(Picture(0.0, content.getvalue()))
+
+    alike, size = _of_one_size(made)
+
+    assert size == (64, 48)
+    assert alike[::2] == made[::2]
+    with Image.open(io.BytesIO(alike[1].jpeg)) as enlarged:
+        assert enlarged.size == size
 
 
 @pytest.mark.parametrize("ending", [".png", ".svg"])

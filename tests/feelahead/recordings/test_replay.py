@@ -1,36 +1,44 @@
 """A recording once more: the cores give the same bits, and each moment looks the same however one came to it."""
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
+from mcap.reader import make_reader
 
-from common.protocol.codec import decode, encode
+from common.errors import ConfigurationError
+from common.protocol import codec
+from common.protocol.codec import PROTOCOL_VERSION, decode, encode
+from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Kind, split_text
 from common.recording.reading import Recording, open_recording
+from common.silence import KEEP_ALIVE_S
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
 from robot_side.assembly import assemble
+from robot_side.compiled.warm_up import kernel_digests
+from tests.feelahead.recordings.conftest import DURATION_S
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
 
 def test_the_robot_side_makes_the_same_stiffness_bit_for_bit(run: Recording) -> None:
     compared = replay_robot(run)
-    assert compared.made == compared.equal > 5000
+    assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
     assert compared.others == compared.others_equal > 0
     assert (compared.worst_eighths, compared.worst_m, compared.notes) == (0.0, 0.0, [])
 
 
 def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     compared = replay_operator(run)
-    assert compared.made == compared.equal > 1000
+    assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
     assert compared.within
     written = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.WRITTEN]
     assert len(written) > 10  # the person felt something, or nothing was compared
@@ -54,8 +62,12 @@ def test_the_command_says_so_and_another_setting_makes_other_stiffness(
 
 
 def test_other_kernels_are_named(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(replaying, "kernel_digests", dict)
+    others = dict.fromkeys(kernel_digests(), "other")
+    monkeypatch.setattr(replaying, "kernel_digests", lambda: others)
     assert [note for note in replay_robot(run).notes if "kernels" in note and "bits may differ" in note]
+    monkeypatch.setattr(replaying, "kernel_digests", dict)
+    with pytest.raises(ConfigurationError, match=r"older version.*valid: feelahead replay without --check, export"):
+        replay_robot(run)
 
 
 def test_damage_is_said_and_what_comes_before_is_compared(
@@ -63,7 +75,11 @@ def test_damage_is_said_and_what_comes_before_is_compared(
 ) -> None:
     damaged = tmp_path / "damaged.mcap"
     content = bytearray(run.path.read_bytes())
-    content[len(content) // 3] ^= 4
+    with run.path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[len(summary.chunk_indexes) // 2]
+    content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 4
     damaged.write_bytes(content)
     assert replay([str(damaged), "--check"]) == 0
     said = capsys.readouterr()
@@ -78,11 +94,23 @@ def test_a_cut_file_is_compared_up_to_its_last_complete_second_where_there_is_on
     cut, content = tmp_path / "cut.mcap", run.path.read_bytes()
     cut.write_bytes(content[: len(content) // 2])
     compared = replay_robot(open_recording(cut))
-    assert compared.made == compared.equal > 1000
+    assert compared.made == compared.equal > 0.4 * DURATION_S / KEEP_ALIVE_S
     assert compared.notes == ["the file was cut off: compared up to its last complete second"]
-    cut.write_bytes(content[: content.index(b"feelahead.robot") + 5000])
+    # Beyond the header, in which every kernel that was imported by then has a digest, and before a second is complete.
+    cut.write_bytes(content[: content.index(b"feelahead.robot") + len(repr(kernel_digests())) + 3000])
     assert replay([str(cut), "--check"]) == 1
     assert "nothing was compared" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("arguments", [[], ["--check"]])
+def test_a_recording_of_another_protocol_is_refused_in_one_line(
+    run: Recording, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(codec, "PROTOCOL_VERSION", PROTOCOL_VERSION + 1)
+    with pytest.raises(ConfigurationError) as caught:
+        replay([str(run.path), *arguments])
+    ours, theirs = PROTOCOL_VERSION + 1, PROTOCOL_VERSION
+    assert str(caught.value) == f"{run.path}: recorded with protocol version {theirs}; valid: {ours}"
 
 
 def some_stiffness(run: Recording) -> bytes:
@@ -98,14 +126,15 @@ def test_differences_are_measured(run: Recording) -> None:
     payload = some_stiffness(run)
     message: Any = decode(payload)
     field = message.r2
-    ways = (field.fast_m[0] - 1e-13, *field.fast_m[1:])
+    ways = (field.fast_m[0] - STEP_M, *field.fast_m[1:])
     closer = msgspec.structs.replace(message, r2=msgspec.structs.replace(field, fast_m=ways))
     compared = Comparison("robot", "messages")
     compared.take(payload, encode(closer))
     assert (compared.made, compared.equal) == (1, 0)
-    assert 0.0 < compared.worst_m < 2e-13
-    assert compared.within
+    assert compared.worst_m == STEP_M
+    assert compared.worst_eighths == 0.0
     compared.take(payload, None)
+    assert compared.worst_eighths == math.inf
     assert not compared.within
 
 

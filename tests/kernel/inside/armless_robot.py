@@ -39,8 +39,9 @@ class ArmlessRobot(ServingRobot):
         permission = self.session.permission(now_s)
         self.state = permission.state
         self.moving = permission.command is not None and permission.command.r2 > 0.0
-        if now_s < self._next_s or (owner := self.session.owner(now_s)) is None:
+        if now_s < self._next_s or not (owners := self.session.owners(now_s)):
             return
+        [owner] = owners
         self._next_s = now_s + _FIELD_PERIOD_S
         felt = StiffnessUpdate(
             owner.header,
@@ -51,4 +52,4 @@ class ArmlessRobot(ServingRobot):
             rumble=0.0,
             state=permission.state,
         )
-        self.sockets.send(owner.peer, encode(felt))
+        self.sockets.send(owner.peer, encode(felt), everywhere=owner.everywhere)

@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import msgspec
+import numpy as np
 import pytest
 import viser
 from websockets.asyncio.client import ClientConnection, connect
@@ -20,7 +21,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin, Subprotocol
 
 from common.clock import MonotonicClock
-from common.protocol.view_messages import VIEW_NAMES
+from common.protocol.codec import encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import VIEW_NAMES, VideoStep
 from operator_side.console.console import Console
 from operator_side.console.pages import MOST_PAGES, ROUND_ENDS
 from tests.helpers.repository import ROOT
@@ -80,6 +83,45 @@ async def fed(console: Console, feed: Feed | None, ends: asyncio.Event) -> None:
         else:
             feed.step(CLOCK.now())
         await asyncio.sleep(0.002)
+
+
+def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
+    pytest.importorskip("av", reason="needs the extra `video`")
+    from robot_side.cameras.h264 import H264  # noqa: PLC0415  # only now it is known to be there
+
+    encoder, gray = H264(), np.full((48, 64, 3), 128, np.uint8)
+
+    def step(*, whole: bool = False) -> bytes:
+        content, is_whole = encoder.encode(gray, 75, whole=whole)
+        place = Header(1, 2, 3.0), "first_person", 1.5, 64, 48
+        return encode(VideoStep(*place, encoder.number, is_whole, content))  # type: ignore[arg-type]
+
+    async def story() -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, None, ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as opened:
+            while console.pages == 0 or console.lacks is None:
+                await asyncio.sleep(0.002)
+            assert console.lacks == (0, 0)
+            for lost, whole, lacks in ((False, False, 0), (True, False, 0), (False, False, 3), (False, True, 0)):
+                payload = step(whole=whole)
+                if lost:
+                    continue
+                console.view(payload, video=True)
+                while console.lacks != (0, lacks):
+                    await asyncio.sleep(0.002)
+                while lacks == 0:
+                    message = await opened.recv()
+                    if message == ROUND_ENDS:
+                        await opened.send('{"taken":true}')
+                    elif isinstance(message, bytes):
+                        assert struct.unpack_from("<Bd", message) == (1, 1.5)
+                        assert message[9:11] == b"\xff\xd8"
+                        break
+        ends.set()
+        await feeding
+
+    asyncio.run(story())
 
 
 def test_the_gate_keeps_out_who_is_not_ours(console: Console) -> None:

@@ -94,7 +94,7 @@ class Plugs(RuleBasedStateMachine):
         if (report := self.connection.read(now_s)) is not None:
             self.report_s = now_s
             self.core.read_report(report, now_s)
-        for command in map(decode, self.core.motion(now_s)):
+        for command in (decode(message.payload) for message in self.core.motion(now_s)):
             if isinstance(command, MotionCommand):
                 assert not self.must_stop, "commanded before the arm was known to stand"
                 assert self.connection.state is ConnectionState.CONNECTED

@@ -13,8 +13,17 @@ import simplejpeg
 from common.arrays import FloatArray
 from common.companion.process import Companion
 from common.protocol.view_messages import ViewName
-from robot_side.cameras.exchange import Order, Picture, Refusal, Setup, Viewpoint, decode_from_companion, encode
-from robot_side.cameras.pictures import MODULE
+from robot_side.cameras.exchange import (
+    Order,
+    Picture,
+    Ready,
+    Refusal,
+    Setup,
+    Viewpoint,
+    decode_from_companion,
+    encode,
+)
+from robot_side.cameras.pictures import MODULE, saved_model
 from robot_side.cameras.rendering import placed
 from robot_side.cameras.viewpoints import viewpoints
 from robot_side.simulation.scene import Scene
@@ -31,27 +40,37 @@ class PictureTaker:
         self.viewpoints = viewpoints_of
         self.newest: Picture | None = None
         self._companion = companion
-        saved = np.zeros(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
-        mujoco.mj_saveModel(scene.model, None, saved)
-        companion.channel.send(encode(Setup(saved.tobytes(), WIDTH, HEIGHT, 95, viewpoints_of)))
+        companion.channel.send(encode(Setup(saved_model(scene), WIDTH, HEIGHT, viewpoints_of, h264=True)))
+        self.ready = self._answer()
 
-    def take(self, view: ViewName, captured_s: float = 1.5) -> Image:
-        """RGB (HEIGHT, WIDTH, 3) of the scene as it is."""
+    def take(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False) -> Image:
+        """RGB (HEIGHT, WIDTH, 3) of the scene as it is, or half of each."""
+        image: Image = simplejpeg.decode_jpeg(self.picture(view, captured_s, halved=halved).content)
+        return image
+
+    def picture(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False, h264: bool = False) -> Picture:
+        """The companion's answer to one order."""
         mujoco.mj_forward(self.scene.model, self.scene.data)
         data, channel = self.scene.data, self._companion.channel
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1)
-        channel.send(encode(Order(view, captured_s, data.qpos.tobytes(), mocap.tobytes())))
+        order = Order(view, captured_s, data.qpos.tobytes(), mocap.tobytes(), 95, halved, h264)
+        channel.send(encode(order))
+        picture = self._answer()
+        assert isinstance(picture, Picture)
+        self.newest = picture
+        return picture
+
+    def _answer(self) -> Ready | Picture:
+        channel = self._companion.channel
         arrived: list[bytes] = []
         while not arrived and not channel.ended:
             select.select([channel], [channel] if channel.waiting else [], [], 60.0)
             arrived = channel.receive()
         assert arrived, "the companion has ended"
-        message = decode_from_companion(arrived[0])
+        message: Ready | Picture | Refusal = decode_from_companion(arrived[0])
         if isinstance(message, Refusal):
             pytest.skip(f"nothing can be rendered here: {message.reason}")
-        self.newest = message
-        image: Image = simplejpeg.decode_jpeg(message.jpeg)
-        return image
+        return message
 
     def pixel(self, view: ViewName, point_m: FloatArray) -> tuple[int, int]:
         """Row and column at which a point (3,) of the world is seen; it has to be in the picture."""

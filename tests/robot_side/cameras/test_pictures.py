@@ -1,15 +1,19 @@
 """The robot side's end of rendering in virtual time, with a companion that does as the test says."""
 
 from collections.abc import Iterator
+from typing import Literal
 
 import pytest
 
-from common.protocol.view_messages import ViewName
-from robot_side.cameras.exchange import Order, Refusal, Setup
+from common.protocol.messages import Header
+from common.protocol.view_messages import VideoStep, ViewName
+from robot_side.cameras.exchange import Order, Ready, Refusal, Setup
 from robot_side.cameras.pictures import IDLE_S, RETRY_S
+from robot_side.cameras.settings import CamerasSettings
 from robot_side.simulation.scene import Scene, load_scene
 from tests.helpers.fake_companion import Desk
 
+HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 BOTH: tuple[ViewName, ViewName] = ("overview", "first_person")
 
 
@@ -134,3 +138,67 @@ def test_who_cannot_start_a_process_is_told_so(desk: Desk) -> None:
     desk.fails_to_start = "no process can be started: Cannot allocate memory"
     desk.cameras.update(0.0, 0.0, BOTH)
     assert "Cannot allocate memory" in desk.notes[0]
+
+
+@pytest.mark.parametrize(("codec", "lacks"), [("jpeg", (0, 0)), ("auto", None), ("auto", (0, 0))])
+def test_steps_are_ordered_only_where_all_can_show_them(
+    scene: Scene, codec: Literal["auto", "jpeg"], lacks: tuple[int, int] | None
+) -> None:
+    desk = Desk(scene, CamerasSettings(codec=codec))
+    desk.started()
+    desk.cameras.update(0.1, 0.0, BOTH, lacks)
+    assert [order.h264 for order in desk.orders()] == 2 * [(codec, lacks) == ("auto", (0, 0))]
+    desk.close()
+
+
+def test_a_whole_picture_is_ordered_once_for_each_that_is_lacking_and_not_too_often(desk: Desk) -> None:
+    companion = desk.started()
+    began: list[int] = []
+
+    def turn(now_s: float, number: int, lacks: int) -> None:
+        desk.cameras.update(now_s, 0.0, BOTH[:1], (lacks, 0))
+        [order] = desk.orders()
+        began.extend([number] if order.whole else [])
+        companion.picture(order, b"step", number, whole=number == 1 or order.whole)
+        [picture] = desk.cameras.update(now_s, 0.0, ())
+        assert isinstance(desk.cameras.message(picture, HEADER), VideoStep)
+
+    for number in range(1, 100):
+        # The tenth is lost; that is known two pictures later, and said until the whole one is there, and longer.
+        turn(0.1 * number, number, 10 if 12 <= number < 40 else 0)
+    assert began == [12]
+    for number in range(100, 130):
+        turn(10.0 + 0.01 * number, number, number - 1)
+    # Whoever always lacks the newest is answered twice a second.
+    assert began == [12, 100]
+
+
+def test_nothing_is_ordered_before_the_companion_is_ready_so_that_no_picture_is_as_old_as_its_start(desk: Desk) -> None:
+    companion = desk.started()
+    companion.channel.receive()
+    for turn in range(1, 100):
+        desk.cameras.update(0.1 * turn, 0.1 * turn, BOTH)
+    assert desk.orders() == []
+    companion.answer(Ready(h264=True))
+    desk.cameras.update(10.0, 10.0, BOTH)
+    assert [order.captured_s for order in desk.orders()] == [10.0, 10.0]
+    hangs = Desk(desk.scene)
+    silent = hangs.started()
+    silent.channel.receive()
+    for turn in range(1, 4000):
+        hangs.cameras.update(0.01 * turn, 0.0, BOTH)
+    assert silent.closed == [0.0]
+    hangs.close()
+
+
+@pytest.mark.parametrize("trouble", ["", "UnknownCodecError: libx264"])
+def test_a_companion_without_h264_makes_jpeg_and_says_once_what_is_wrong_with_pyav(scene: Scene, trouble: str) -> None:
+    desk = Desk(scene)
+    desk.ready = Ready(h264=False, trouble=trouble)
+    desk.started()
+    for turn in range(10):
+        desk.cameras.update(0.1 * turn, 0.0, BOTH, (0, 0))
+    orders = desk.orders()
+    assert [order.h264 for order in orders] == [False, False]
+    assert [trouble in note for note in desk.notes] == ([True] if trouble else [])
+    desk.close()

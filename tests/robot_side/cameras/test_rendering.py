@@ -50,6 +50,17 @@ def test_the_target_is_seen_where_projection_says_wherever_it_stands() -> None:
                 assert 0.001 < green_share(image) < 0.1
 
 
+def test_a_picture_of_half_the_size_shows_the_same() -> None:
+    scene = load_scene()
+    with picture_taker(scene) as taker:
+        whole, half = (taker.take("overview", halved=halved).astype(float) for halved in (False, True))
+        assert taker.newest is not None
+        assert (taker.newest.width, taker.newest.height) == (WIDTH // 2, HEIGHT // 2)
+        means = whole.reshape(HEIGHT // 2, 2, WIDTH // 2, 2, 3).mean(axis=(1, 3))
+        assert np.abs(half - means).mean() < 3.0
+        assert whole.shape == (HEIGHT, WIDTH, 3)
+
+
 def test_a_camera_that_looks_elsewhere_does_not_see_it() -> None:
     # So that the tests above can fail.
     scene = load_scene()

@@ -10,9 +10,9 @@ from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from robot_side import scene_view
-from robot_side.ahead.law import Sensed, Situation
 from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.shapes import SceneModel
+from robot_side.laws.law import Sensed, Situation
 from robot_side.scene_view import SceneView, TickFigures
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene, load_scene

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from common.clock import MonotonicClock, clock_domain
-from common.protocol.codec import decode, decode_view, encode
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode, decode_view, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Hello, StiffnessUpdate, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, AnyViewMessage
+from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
 
 _WATCH_PERIOD_S = 0.25
@@ -33,9 +34,10 @@ class Viewer:
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
+        self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
         self._end = LinkEnd("operator", epoch, clock_domain())
 
-    def say(self, now_s: float, what: Mapping[str, bool]) -> None:
+    def say(self, now_s: float, what: Mapping[str, Any]) -> None:
         """Ask for some of overview, first_person and scene, and for the others no more."""
         self._sockets.send(encode(self._end.hello(now_s)))
         self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
@@ -48,8 +50,11 @@ class Viewer:
                 seen.stiffness_ages_s.append(now_s - message.header.sent_s)
             elif isinstance(message, Hello):
                 self._end.arrived(message, now_s)
-        for _, payload in self._sockets.receive_view():
-            seen.views.append((now_s, decode_view(payload)))
+        for topic, payload in self._sockets.receive_view():
+            of, is_piece, _ = topic.partition(PIECE)
+            whole = self._joining[of].take(payload) if is_piece else payload
+            if whole is not None:
+                seen.views.append((now_s, decode_view(whole)))
 
     def wait(self, seconds: float) -> None:
         """Wait until something comes."""
@@ -60,7 +65,7 @@ class Viewer:
         self._sockets.close()
 
 
-def look(viewers: Sequence[Viewer], seconds: float, **what: bool) -> Seen:
+def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
     """Let all of them look for a while; return what the first one sees."""
     clock = MonotonicClock()
     next_s = began_s = clock.now()

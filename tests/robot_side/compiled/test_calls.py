@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.compiled.calls import call_of
+from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_array
 
 
@@ -18,7 +18,7 @@ def _row_sums(rows: FloatArray, sums: FloatArray, factor: float) -> int:
     return len(rows)
 
 
-_call = call_of(_row_sums)
+_call = call_at_address(COUNT, (input_array(2), output_array(1), NUMBER))
 
 
 @compiled(COUNT, input_array(2), output_array(1), returns=COUNT)
@@ -53,5 +53,5 @@ def test_arguments_of_other_types_are_refused_as_the_caller_is_compiled() -> Non
         return _call(address, (rows,))
 
     for caller in (with_too_few_dimensions, with_too_few_arguments):
-        with pytest.raises(numba.TypingError, match="_row_sums takes"):
+        with pytest.raises(numba.TypingError, match="the kernel takes"):
             numba.njit(caller)(_row_sums.address, np.ones(3), np.ones(3))

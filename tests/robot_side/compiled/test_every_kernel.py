@@ -1,13 +1,14 @@
 """The pipeline's kernels: all ready before the first tick."""
 
+import sys
 from typing import get_args
 
 import pytest
 
-from robot_side.ahead.law import LawName
 from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled, imported_kernels
-from robot_side.compiled.warm_up import warm_up
+from robot_side.compiled.warm_up import import_kernels, warm_up
+from robot_side.laws.law import LawName
 from robot_side.settings import RobotSettings
 
 
@@ -16,14 +17,13 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     assert all(kernel.ready for kernel in imported_kernels())
     modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
     assert {
-        "robot_side.ahead.distances",
-        "robot_side.ahead.felt",
-        "robot_side.ahead.find",
-        "robot_side.ahead.looks",
-        "robot_side.ahead.kinds.next_frame",
-        "robot_side.ahead.rounds",
-        "robot_side.ahead.sideways",
-        "robot_side.ahead.total_overlap",
+        "robot_side.surroundings.distances",
+        "robot_side.laws.felt",
+        "robot_side.field.look",
+        "robot_side.laws.recent_looks",
+        "robot_side.surroundings.placing",
+        "robot_side.laws.sideways",
+        "robot_side.field.total_overlap",
         "robot_side.arm.ability",
         "robot_side.arm.commanded",
         "robot_side.arm.forward_kinematics",
@@ -31,7 +31,7 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
         "robot_side.gripper.held_object",
         "robot_side.arm.resolved_rate",
         "robot_side.enlargement.kinematic_error",
-        "robot_side.objects.validity",
+        "robot_side.surroundings.validity",
         "robot_side.overlap.lanes.box_batch",
         "robot_side.overlap.lanes.tetrahedron_batch",
         "robot_side.overlap.precise.kernels",
@@ -49,3 +49,10 @@ def test_nothing_is_compiled_within_a_tick(law: LawName, monkeypatch: pytest.Mon
     monkeypatch.setattr(Compiled, "prepare", late)
     for tick in range(20):
         robot.tick(0.001 * tick)
+
+
+def test_they_are_found_on_a_robot_machine_without_the_extra_for_video(monkeypatch: pytest.MonkeyPatch) -> None:
+    everything = import_kernels()
+    monkeypatch.setitem(sys.modules, "av", None)
+    monkeypatch.delitem(sys.modules, "robot_side.cameras.h264", raising=False)
+    assert import_kernels() == everything

@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
+from robot_side.gripper import spheres
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import grip, gripped_object, with_held
-from robot_side.objects.perceived import PerceivedObjects, Role
 from robot_side.overlap import Mesh
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
@@ -91,23 +93,23 @@ def test_the_object_nearest_to_the_tool_point_is_the_gripped_one() -> None:
     scene = Scene().add().sphere([0.06, 0.0, 0.0], 0.03)
     scene.add(Role.TARGET).box([0.0, 0.03, 0.0], [0.02, 0.02, 0.02])
     objects = scene.add().sphere([0.0, 0.0, 0.5], 0.4).objects()
-    assert gripped_object(objects, ORIGIN, REACH_M) == 1
-    assert gripped_object(objects, np.array([0.03, 0.0, 0.0]), REACH_M) == 0
+    assert gripped_object(scene_table(objects), ORIGIN, REACH_M) == 1
+    assert gripped_object(scene_table(objects), np.array([0.03, 0.0, 0.0]), REACH_M) == 0
 
 
 def test_supports_and_what_is_ignored_are_never_gripped() -> None:
     scene = Scene().add(Role.SUPPORT).box([0.0, 0.0, 0.0], [1.0, 1.0, 0.01])
     objects = scene.add(Role.IGNORED).add().sphere([0.0, 0.0, 0.06], 0.03).objects()
-    assert gripped_object(objects, ORIGIN, REACH_M) == 2
-    assert gripped_object(objects, ORIGIN, 0.01) is None
+    assert gripped_object(scene_table(objects), ORIGIN, REACH_M) == 2
+    assert gripped_object(scene_table(objects), ORIGIN, 0.01) is None
 
 
 def test_what_has_no_end_is_never_gripped() -> None:
     """A wall or a floor that no name tells as a support: it cannot move with the tool, and stays a danger."""
     scene = Scene().add().half_space([0.0, 0.0, 1.0], -0.01)
-    assert gripped_object(scene.objects(), ORIGIN, REACH_M) is None
+    assert gripped_object(scene_table(scene.objects()), ORIGIN, REACH_M) is None
     objects = scene.add(Role.TARGET).sphere([0.0, 0.0, 0.04], 0.02).objects()
-    assert gripped_object(objects, ORIGIN, REACH_M) == 1
+    assert gripped_object(scene_table(objects), ORIGIN, REACH_M) == 1
 
 
 @settings(derandomize=True, deadline=None, max_examples=6)
@@ -201,3 +203,10 @@ def test_a_scene_unknown_before_is_held_without_a_search() -> None:
     vertices = objects.tetrahedron_vertices_m[0]
     around_m = np.linalg.norm(vertices - vertices.mean(axis=0), axis=1).max()
     assert held.radii_m[-1] == pytest.approx(around_m)
+
+
+def test_the_spheres_of_a_box_are_planned_before_it_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    objects = Scene().add().box(ORIGIN, [0.011, 0.022, 0.033]).objects()
+    covers = HeldCovers(objects)
+    monkeypatch.setattr(spheres, "_fewest", None)
+    assert len(grip(objects, 0, free_pose([ORIGIN], [0.01]), covers).radii_m) > 8

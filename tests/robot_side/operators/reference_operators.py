@@ -40,7 +40,10 @@ class ReferenceOperators:
         self.stops: list[tuple[float, str]] = []
         """(when, how the reason begins)"""
         self.stopped = self.next_target = self.owner_changed = False
+        self.followed: dict[int, int] = {}
+        """The epoch and the number of the newest stop that was followed."""
         self.loop_began_s: float | None = None
+        self.loop_heard_s = 0.0
         """When the stamp was sent that the newest accepted command of this lease echoes."""
         self._listen()
 
@@ -79,7 +82,7 @@ class ReferenceOperators:
     def _hear(self, message: Hello | MotionCommand, peer: bytes, arrival: Arrival, now_s: float) -> None:
         epoch, sequence = message.header.epoch, message.header.sequence
         party = self.parties.get(epoch) or self._admit(message, peer, now_s)
-        if party is None:
+        if party is None or party.peer[:16] != peer[:16]:
             self.rejected += 1
             return
         fresh = sequence > party.newest.get(type(message), 0)
@@ -92,11 +95,10 @@ class ReferenceOperators:
             return
         if party is not self.owner or message.token != self.token:
             self.not_owners += 1
-            if message.emergency_stop and party is self.owner:
-                self._stop(now_s)
+            if party is self.owner:
+                self._hear_stop(message, now_s)
             return
-        if message.emergency_stop:
-            self._stop(now_s)
+        self._hear_stop(message, now_s)
         if fresh and arrival.queueing_age_s > self.settings.age_s + self.settings.jitter_s:
             self.discarded += 1
         elif fresh:
@@ -105,7 +107,7 @@ class ReferenceOperators:
     def _accept(self, owner: Party, command: MotionCommand, loop_age_s: float | None, now_s: float) -> None:
         self.check(now_s)
         self.command, self.accepted_s = command, now_s
-        self.loop_began_s = None if loop_age_s is None else now_s - loop_age_s
+        self.loop_began_s, self.loop_heard_s = None if loop_age_s is None else now_s - loop_age_s, now_s
         if self.loop_began_s is not None:
             self.echo_s = self.loop_began_s
         pressed, self.arm_down = command.arm and not self.arm_down, command.arm
@@ -140,6 +142,13 @@ class ReferenceOperators:
             if self.owner.state is State.ARMED:
                 self.stops.append((now_s, why))
             self.owner.state = State.STOPPED if self.stopped else State.DISARMED
+
+    def _hear_stop(self, command: MotionCommand, now_s: float) -> None:
+        """A stop counts however late it comes, but a copy of one that was followed, or an older one, does not."""
+        epoch, sequence = command.header.epoch, command.header.sequence
+        if command.emergency_stop and sequence > self.followed.get(epoch, 0):
+            self.followed = {epoch: sequence}
+            self._stop(now_s)
 
     def _stop(self, now_s: float) -> None:
         if self.owner is not None and self.owner.state is not State.STOPPED:

@@ -1,11 +1,13 @@
 """One owner, many observers: who gets the lease when, with virtual operators on a real robot side."""
 
 import msgspec
+import numpy as np
 import pytest
 
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
-from common.protocol.messages import StiffnessUpdate
+from common.protocol.messages import AnyMessage, Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
+from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
 from robot_side.core import OBSERVER_PERIOD_S
 from robot_side.operators.lease import MOST_OBSERVERS
@@ -33,9 +35,45 @@ def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench)
     owner.inbox.clear()
     observer.inbox.clear()
     bench.drive(0.5, owner)
-    assert len(owner.felt) == 500
+    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # nothing changes
     assert len(observer.felt) == pytest.approx(0.5 / OBSERVER_PERIOD_S, abs=1)
     assert observer.felt[-1].state == "armed"
+
+
+def to_owner(bench: Bench, ticks: int) -> list[tuple[float, bool, AnyMessage]]:
+    """When each message left, and if everywhere."""
+    found = []
+    for _ in range(ticks):
+        bench.ticks += 1
+        sent = [one for one in bench.robot.tick(bench.now_s) if one.stream == "haptics"]
+        found += [(bench.now_s, one.everywhere, decode(one.payload)) for one in sent]
+    return found
+
+
+def test_what_is_new_goes_everywhere_and_what_is_repeated_in_turn(bench: Bench) -> None:
+    owner = bench.operator(2)
+    bench.say_hello(owner)
+    first = to_owner(bench, 500)
+    for kind in (Hello, LeaseNotice, StiffnessUpdate):
+        assert next(everywhere for _, everywhere, one in first if isinstance(one, kind))
+    notices_s = [now_s for now_s, _, one in first if isinstance(one, LeaseNotice)][1:]
+    assert np.diff(notices_s) == pytest.approx(0.1, abs=0.0011)
+    assert sum(everywhere for _, everywhere, _ in first) == 3
+    bench.send(owner, emergency_stop=True)
+    after = to_owner(bench, 100)
+    for kind in (LeaseNotice, StiffnessUpdate):
+        (now_s, everywhere, one), *later = [sent for sent in after if isinstance(sent[2], kind)]
+        assert (now_s, everywhere) == (after[0][0], True)
+        assert "stopped" in (getattr(one, "session", None), getattr(one, "state", None))
+        assert not any(everywhere for _, everywhere, _ in later)
+
+
+def test_a_refusal_goes_everywhere(bench: Bench) -> None:
+    bench.send(bench.operator(2))
+    assert [(everywhere, type(one)) for _, everywhere, one in to_owner(bench, 1)] == [
+        (True, Hello),
+        (True, LeaseNotice),
+    ]
 
 
 def test_there_is_room_for_so_many_observers_and_the_next_is_told_so(bench: Bench) -> None:

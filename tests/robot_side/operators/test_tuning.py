@@ -7,8 +7,8 @@ import pytest
 from common.protocol.codec import encode
 from common.protocol.messages import Header, Tune
 from feelahead.lab.faults.session_bench import QUICK, Bench, Operator
-from robot_side.ahead.law import LawName
 from robot_side.enlargement.distance import standard_quantile
+from robot_side.laws.law import LawName
 from robot_side.operators.tuning import Tuning
 
 
@@ -52,7 +52,7 @@ def test_notices_say_what_is_permitted_what_holds_and_what_was_heard(bench: Benc
     assert owner.notice is not None
     assert (owner.notice.may_tune, owner.notice.probability, owner.notice.tuned) == (True, 0.99, 0)
     tune(bench, owner, 5, 0.8)
-    bench.tick(60)
+    bench.tick()
     assert (owner.notice.probability, owner.notice.tuned) == (0.8, 5)
     assert observer.notice is not None
     assert (observer.notice.probability, observer.notice.tuned) == (0.8, 0)

@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 
 from common.protocol.codec import encode
@@ -6,7 +8,7 @@ from feelahead.lab.faults.session_bench import Bench, Operator
 from robot_side.operators.watchers import WATCH_S, Watchers
 
 
-def watch(bench: Bench, operator: Operator, **what: bool) -> None:
+def watch(bench: Bench, operator: Operator, **what: Any) -> None:
     payload = encode(Watch(operator.link.stamp(bench.now_s), **what))
     bench.robot.receive(operator.peer, payload, bench.now_s)
 
@@ -42,6 +44,18 @@ def test_an_old_watch_again_counts_for_nothing(bench: Bench) -> None:
     bench.tick(1500)
     bench.robot.receive(owner.peer, payload, bench.now_s)
     assert looked_at(bench) == frozenset()
+
+
+def test_pictures_are_steps_only_where_all_who_look_at_them_show_steps() -> None:
+    watchers, header = Watchers(), Bench().operator(1).link.stamp(0.0)
+    assert watchers.lacks(0.0) is None
+    watchers.heard(1, Watch(header, overview=True, lacks=(3, 0)), 0.0)
+    watchers.heard(2, Watch(header, first_person=True, lacks=(2, 9)), 0.5)
+    watchers.heard(3, Watch(header, scene=True), 0.5)
+    assert watchers.lacks(0.6) == (3, 9)
+    assert watchers.lacks(WATCH_S) == (2, 9)
+    watchers.heard(4, Watch(header, overview=True), 0.6)
+    assert watchers.lacks(0.7) is None
 
 
 def test_beginning_to_look_is_counted_once_for_each_who_begins() -> None:

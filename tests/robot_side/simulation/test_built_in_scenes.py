@@ -4,10 +4,10 @@ from typing import Any, get_args
 
 import pytest
 
-from robot_side.objects.perceived import Role
 from robot_side.simulation.built_in_scenes import SceneName
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import Scene, load_scene
+from robot_side.surroundings.perceived import Role
 
 SEEDS = range(12)
 NAMES: tuple[SceneName, ...] = get_args(SceneName)

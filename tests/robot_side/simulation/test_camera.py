@@ -3,18 +3,18 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from robot_side.objects.perceived import KINDS, Role
 from robot_side.simulation.arm import MujocoArm
 from robot_side.simulation.camera import CameraError, MujocoCamera
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.scene import Scene, load_scene
+from robot_side.surroundings.perceived import KINDS, Role
 from tests.helpers.repository import DATA
 
 
 def test_every_array_is_contiguous(shapes: Scene) -> None:
     seen = MujocoCamera(shapes).perceive(0.0)
     arrays = [getattr(seen, field.name) for field in fields(seen) if isinstance(getattr(seen, field.name), np.ndarray)]
-    assert len(arrays) == 19
+    assert len(arrays) == 23
     assert all(array.flags.c_contiguous for array in arrays)
 
 

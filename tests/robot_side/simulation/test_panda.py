@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_side.objects.perceived import Role
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.gripper_measurement import measure_gripper
 from robot_side.simulation.ground_truth import GroundTruth
+from robot_side.surroundings.perceived import Role
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 

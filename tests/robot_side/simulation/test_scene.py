@@ -8,12 +8,12 @@ import pytest
 from common.errors import ConfigurationError
 from robot_side.assembly import assemble
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from robot_side.objects.perceived import Role
 from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.ground_truth import GroundTruth
 from robot_side.simulation.scene import Scene, load_scene
+from robot_side.surroundings.perceived import Role
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
 from tests.helpers.repository import DATA
 
@@ -86,7 +86,7 @@ def test_objects_and_roles_come_from_names(shapes: Scene) -> None:
         "Target_egg": Role.TARGET,
         "stone": Role.OBSTACLE,
     }
-    assert set(shapes.primitives.volume_errors) == {"post", "Target_egg"}
+    assert set(shapes.primitives.volume_errors) == {"post"}
     post = next(thing for thing in shapes.objects if thing.name == "post")
     assert len(post.geoms) == 3
 

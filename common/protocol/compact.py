@@ -1,0 +1,187 @@
+"""Stiffness and telemetry packed: everything but the header and a name stands in one binary field.
+
+    stiffness    [tag, header, field]            110 bytes of field
+    telemetry    [tag, header, name, field]      57 bytes
+
+Ways are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the gripper: a way is
+never longer than it was. A step that is a power of two is exact, so that nothing is lost twice. Speeds, accelerations
+and shares are single precision; rumble is eighths, rounded up. All is little-endian.
+"""
+
+import math
+import struct
+from bisect import bisect_left
+from typing import Final, get_args
+
+from common.protocol.messages import (
+    Hello,
+    LeaseNotice,
+    LinkReport,
+    Message,
+    MotionCommand,
+    MotionState,
+    StiffnessUpdate,
+    Telemetry,
+    TriggerField,
+    Tune,
+    Vector3,
+    Watch,
+    Ways,
+)
+
+STEP_M: Final = 2.0**-14
+_STEPS: Final = 2.0**14
+_IN_STEPS: Final = _STEPS.__mul__
+_IN_METRES: Final = STEP_M.__rmul__
+_BEYOND: Final = 2**15 - 1
+"""Stands for a way at the horizon or beyond it."""
+_ALL_BEYOND: Final = [_BEYOND] * 8
+_NOTHING_NEAR: Final = tuple(_ALL_BEYOND)
+_FARTHEST: Final = _BEYOND - 1
+"""2 m; stands for a longer way that is short of the horizon, too."""
+_PAST: Final = -(2**15)
+"""Stands for a way so far behind that 16 bits do not hold it."""
+_PAST_M: Final = -100.0
+_STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
+_HOLDING, _PLACED = 4, 8
+_LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
+
+_STIFFNESS: Final = struct.Struct("<32h10fiBB")
+"""Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state."""
+_TELEMETRY: Final = struct.Struct("<14fB")
+"""Position, target, up; speed, opening, enlargement, L2, R2; state, and bits for holding and a known target."""
+
+
+class StiffnessOnWire(Message, frozen=True, tag="stiffness"):
+    """A StiffnessUpdate as it travels."""
+
+    field: bytes
+
+
+class TelemetryOnWire(Message, frozen=True, tag="telemetry"):
+    """A Telemetry as it travels."""
+
+    target: str | None
+    field: bytes
+
+
+AnyOnWire = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessOnWire | TelemetryOnWire
+
+
+def packed(message: Message) -> Message:
+    """Pack a message for its way."""
+    if isinstance(message, StiffnessUpdate):
+        return StiffnessOnWire(message.header, _pack_stiffness(message))
+    if isinstance(message, Telemetry):
+        return TelemetryOnWire(message.header, message.target, _pack_telemetry(message))
+    return message
+
+
+def unpacked(
+    message: AnyOnWire,
+) -> Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry:
+    """Unpack a message that has travelled; ValueError or struct.error for a field that is no valid one."""
+    if isinstance(message, StiffnessOnWire):
+        return _unpack_stiffness(message)
+    return _unpack_telemetry(message) if isinstance(message, TelemetryOnWire) else message
+
+
+def _pack_stiffness(update: StiffnessUpdate) -> bytes:
+    l2, r2, horizon_m, told_m_s = update.l2, update.r2, update.horizon_m, update.told_m_s
+    return _STIFFNESS.pack(
+        *_steps(l2.fast_m, horizon_m),
+        *_steps(l2.slow_m, horizon_m),
+        *_steps(r2.fast_m, horizon_m),
+        *_steps(r2.slow_m, horizon_m),
+        *(l2.full_speed_m_s, l2.acceleration_m_s2, l2.displacement_m, l2.stiffness),
+        *(r2.full_speed_m_s, r2.acceleration_m_s2, r2.displacement_m, r2.stiffness),
+        update.speed_m_s,
+        math.nan if told_m_s is None else told_m_s,
+        math.floor(horizon_m * _STEPS),
+        math.ceil(8.0 * update.rumble),
+        _STATES.index(update.state),
+    )
+
+
+def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
+    content = _STIFFNESS.unpack(message.field)
+    speed_m_s, told_m_s, horizon, rumble, state = content[40:]
+    if state >= len(_STATES):
+        raise ValueError(f"state = {state}; valid: 0 to {len(_STATES) - 1}")
+    horizon_m = horizon * STEP_M
+    return StiffnessUpdate(
+        message.header,
+        TriggerField(_ways(content[:8], horizon_m), _ways(content[8:16], horizon_m), *content[32:36]),
+        TriggerField(_ways(content[16:24], horizon_m), _ways(content[24:32], horizon_m), *content[36:40]),
+        speed_m_s,
+        horizon_m,
+        rumble / 8.0,
+        _STATES[state],
+        told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
+    )
+
+
+def _steps(ways: Ways, horizon_m: float) -> list[int]:
+    within = bisect_left(ways, horizon_m)
+    if not within:
+        return _ALL_BEYOND
+    steps = list(map(math.floor, map(_IN_STEPS, ways[:within])))
+    if steps[0] <= _PAST or steps[-1] > _FARTHEST:
+        steps = [max(_PAST, min(step, _FARTHEST)) for step in steps]
+    return steps + _ALL_BEYOND[within:]
+
+
+def _ways(steps: tuple[int, ...], horizon_m: float) -> Ways:
+    if steps == _NOTHING_NEAR:
+        return (horizon_m,) * 8
+    ways = tuple(map(_IN_METRES, steps))
+    if steps[0] == _PAST or steps[-1] == _BEYOND:
+        if steps != tuple(sorted(steps)):
+            raise ValueError(f"ways = {steps}; valid: none shorter than the one before")
+        past, within = steps.count(_PAST), len(steps) - steps.count(_BEYOND)
+        ways = (_PAST_M,) * past + ways[past:within] + (horizon_m,) * (len(steps) - within)
+    if ways[-1] > horizon_m:
+        raise ValueError(f"ways = {ways}; valid: none beyond the horizon, {horizon_m}")
+    return ways  # type: ignore[return-value]  # the format says eight
+
+
+def _pack_telemetry(view: Telemetry) -> bytes:
+    placed = view.target_in_tool_m
+    numbers = (
+        *view.tool_position_m,
+        *(placed or (0.0, 0.0, 0.0)),
+        *view.up_in_tool,
+        *(view.tool_speed_m_s, view.gripper_opening_m, view.enlargement_m, view.l2, view.r2),
+    )
+    bits = _STATES.index(view.state) + _HOLDING * view.holding + _PLACED * (placed is not None)
+    try:
+        return _TELEMETRY.pack(*numbers, bits)
+    except OverflowError:
+        # A simulation about to become unstable shows wild figures, and must get as far as saying so.
+        return _TELEMETRY.pack(*(max(-_LARGEST_SINGLE, min(one, _LARGEST_SINGLE)) for one in numbers), bits)
+
+
+def _unpack_telemetry(message: TelemetryOnWire) -> Telemetry:
+    *numbers, bits = _TELEMETRY.unpack(message.field)
+    state = bits % _HOLDING
+    if state >= len(_STATES) or bits >= 2 * _PLACED:
+        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and two more bits")
+    speed_m_s, opening_m, enlargement_m, l2, r2 = numbers[9:]
+    return Telemetry(
+        message.header,
+        state=_STATES[state],
+        tool_position_m=_three(numbers, 0),
+        tool_speed_m_s=speed_m_s,
+        target=message.target,
+        target_in_tool_m=_three(numbers, 3) if bits & _PLACED else None,
+        up_in_tool=_three(numbers, 6),
+        gripper_opening_m=opening_m,
+        holding=bool(bits & _HOLDING),
+        enlargement_m=enlargement_m,
+        l2=l2,
+        r2=r2,
+    )
+
+
+def _three(numbers: list[float], first: int) -> Vector3:
+    return numbers[first], numbers[first + 1], numbers[first + 2]

@@ -1,0 +1,69 @@
+"""The kernel's figures of a TCP connection: how much it had to send again."""
+
+import contextlib
+import socket
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Final, NamedTuple, Self
+
+_BYTES: Final = 160
+_ROUND_TRIP, _SENT_AGAIN, _SENT = 68, 100, 156
+"""Offsets in the kernel's `struct tcp_info`: tcpi_rtt in microseconds, tcpi_total_retrans, tcpi_data_segs_out."""
+
+
+class TcpFigures(NamedTuple):
+    """Packets with data that one or more connections sent since they began."""
+
+    sent: int = 0
+    sent_again: int = 0
+    """Those among them that repeat a lost one."""
+    round_trip_s: float | None = None
+    """The kernel's smoothed estimate, the least of the connections; None where it has none."""
+
+    def since(self, before: Self) -> "TcpFigures":
+        """What was sent after `before` was taken."""
+        sent, again = self.sent - before.sent, self.sent_again - before.sent_again
+        return TcpFigures(max(sent, 0), max(again, 0), self.round_trip_s)
+
+    @property
+    def lost_share(self) -> float | None:
+        """Packets sent again among all sent, 0 to 1; None before the first."""
+        return self.sent_again / self.sent if self.sent else None
+
+
+def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
+    """Add up the figures of the connections with these `descriptors`; one that has ended counts nothing."""
+    sent = again = 0
+    trips_s = []
+    for descriptor in descriptors:
+        with contextlib.suppress(OSError), _borrowed(descriptor) as connection:
+            info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _BYTES)
+            if len(info) == _BYTES:
+                again += struct.unpack_from("I", info, _SENT_AGAIN)[0]
+                sent += struct.unpack_from("I", info, _SENT)[0]
+                trips_s.append(1e-6 * struct.unpack_from("I", info, _ROUND_TRIP)[0])
+    return TcpFigures(sent, again, min((trip_s for trip_s in trips_s if trip_s > 0.0), default=None))
+
+
+def connected_to(port: int) -> list[int]:
+    """Descriptors of this process's TCP connections to `port` of another; ZeroMQ names none of its own."""
+    found = []
+    for name in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            if name.is_socket():
+                descriptor = int(name.name)
+                with _borrowed(descriptor) as connection:
+                    place = connection.getpeername()
+                    if isinstance(place, tuple) and place[1] == port:
+                        found.append(descriptor)
+    return found
+
+
+@contextlib.contextmanager
+def _borrowed(descriptor: int) -> Iterator[socket.socket]:
+    connection = socket.socket(fileno=descriptor)
+    try:
+        yield connection
+    finally:
+        connection.detach()

@@ -1,0 +1,88 @@
+"""Follow a view's pictures in H.264, and make JPEG of each, which pages and files hold."""
+
+from fractions import Fraction
+from typing import Final
+
+import av
+from av.codec.context import CodecContext, Flags
+from av.video.codeccontext import VideoCodecContext
+
+from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
+
+_MOST_PIXELS: Final = 4096 * 4096
+_JPEG_SCALE: Final = 2
+"""The scale of FFmpeg's MJPEG, 1 to 31: 2 is about JPEG 90. These bytes never see a link."""
+
+
+class Steps:
+    """Decodes the steps of every view, in the order in which they come."""
+
+    def __init__(self) -> None:
+        """av.FFmpegError, ValueError: where this FFmpeg has no H.264 or no JPEG."""
+        _decoder()
+        _jpeg_encoder(16, 16)
+        self._views: dict[ViewName, _View] = {}
+
+    @property
+    def lacks(self) -> tuple[int, int]:
+        """The newest picture of each view that came without the one before it, for `Watch`; 0 for none."""
+        first, second = (view.lacks if (view := self._views.get(name)) else 0 for name in VIEW_NAMES)
+        return first, second
+
+    def follow(self, step: VideoStep) -> VideoFrame | None:
+        """Return the picture as JPEG; None where the picture before it is not here, or the bytes hold none."""
+        jpeg = self._views.setdefault(step.view, _View()).follow(step)
+        if jpeg is None:
+            return None
+        return VideoFrame(step.header, step.view, step.captured_s, step.width, step.height, jpeg)
+
+
+class _View:
+    def __init__(self) -> None:
+        self.lacks = 0
+        self._number = 0
+        self._decoder: VideoCodecContext | None = None
+        self._encoder: VideoCodecContext | None = None
+
+    def follow(self, step: VideoStep) -> bytes | None:
+        if step.whole:
+            self._decoder = _decoder()
+        elif step.number != self._number + 1:
+            self._decoder = None
+        self._number = step.number
+        jpeg = None if self._decoder is None else self._jpeg(self._decoder, step)
+        if jpeg is None:
+            self._decoder = None
+        self.lacks = step.number if jpeg is None else 0
+        return jpeg
+
+    def _jpeg(self, decoder: VideoCodecContext, step: VideoStep) -> bytes | None:
+        size = step.width, step.height
+        try:
+            [picture] = decoder.decode(av.Packet(step.h264))
+            if (picture.width, picture.height, picture.format.name) != (*size, "yuvj420p"):
+                return None
+            if self._encoder is None or (self._encoder.width, self._encoder.height) != size:
+                self._encoder = _jpeg_encoder(*size)
+            [packet] = self._encoder.encode(picture)
+        except (av.FFmpegError, ValueError):
+            return None
+        return bytes(packet)
+
+
+def _decoder() -> VideoCodecContext:
+    decoder = CodecContext.create("h264", "r")
+    decoder.thread_count = 1
+    decoder.flags |= Flags.low_delay
+    decoder.options = {"max_pixels": str(_MOST_PIXELS)}
+    return decoder
+
+
+def _jpeg_encoder(width: int, height: int) -> VideoCodecContext:
+    encoder = CodecContext.create("mjpeg", "w")
+    encoder.width, encoder.height, encoder.pix_fmt = width, height, "yuvj420p"
+    encoder.thread_count = 1
+    encoder.framerate = Fraction(30)
+    encoder.qmin = encoder.qmax = _JPEG_SCALE
+    encoder.options = {"huffman": "default"}
+    return encoder

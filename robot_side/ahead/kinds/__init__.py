@@ -1,1 +1,0 @@
-"""The kinds of primitives that objects are made of, a file each: layout, bounds, volume, nearest point."""

@@ -1,0 +1,66 @@
+"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a whole one, and then what changes from one to the next."""
+
+from fractions import Fraction
+from typing import Final
+
+import av
+import numpy as np
+import numpy.typing as npt
+from av.codec.context import CodecContext
+from av.video.codeccontext import VideoCodecContext
+from av.video.frame import PictureType
+from av.video.reformatter import VideoReformatter
+
+_ENDLESS: Final = 1 << 30
+
+
+class H264:
+    """Encodes one view. It looks at no later picture and back at one alone, so that it adds no delay in pictures."""
+
+    def __init__(self, preset: str = "superfast", refresh: int = _ENDLESS) -> None:
+        """preset: of x264. refresh: pictures within which a column that is made new sweeps over the view.
+
+        av.FFmpegError, ValueError: where this FFmpeg has no x264.
+        """
+        self._preset, self._refresh = preset, refresh
+        self._reformatter = VideoReformatter()
+        self._kind: tuple[int, int, int] | None = None
+        self._encoder: VideoCodecContext = CodecContext.create("libx264", "w")
+        self.number = 0
+        """The number of the newest picture, from 1"""
+
+    def encode(self, rgb: npt.NDArray[np.uint8], quality: int, *, whole: bool = False) -> tuple[bytes, bool]:
+        """Encode the next picture, RGB (height, width, 3), even sizes; the bytes, and whether it needs no other one.
+
+        quality: as JPEG's, 1 to 100. Another one, or another size, makes this picture a whole one.
+        """
+        height, width, _ = rgb.shape
+        if self._kind != (kind := (width, height, constant_rate_factor(quality))):
+            self._kind, whole = kind, True
+            self._encoder = self._opened(*kind)
+        frame = self._reformatter.reformat(av.VideoFrame.from_ndarray(rgb, "rgb24"), format="yuvj420p")
+        frame.pts, frame.pict_type = self.number, PictureType.I if whole else PictureType.NONE
+        self.number += 1
+        return b"".join(bytes(packet) for packet in self._encoder.encode(frame)), whole
+
+    def _opened(self, width: int, height: int, factor: int) -> VideoCodecContext:
+        encoder: VideoCodecContext = CodecContext.create("libx264", "w")
+        encoder.width, encoder.height, encoder.pix_fmt = width, height, "yuvj420p"
+        encoder.framerate = Fraction(30)
+        encoder.time_base = Fraction(1, 30)
+        encoder.gop_size, encoder.max_b_frames, encoder.thread_count = self._refresh, 0, 1
+        encoder.options = {
+            "preset": self._preset,
+            "tune": "zerolatency",
+            "crf": str(factor),
+            "forced-idr": "1",
+            "intra-refresh": str(int(self._refresh < _ENDLESS)),
+            # A cut would make a whole picture by itself, which nobody asked for.
+            "sc_threshold": "0",
+        }
+        return encoder
+
+
+def constant_rate_factor(quality: int) -> int:
+    """x264's factor, less is better, at which pictures are at least as near (SSIM) as JPEG's of `quality`: 75, 26."""
+    return round(45.0 - 0.25 * quality)

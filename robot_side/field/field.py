@@ -1,0 +1,133 @@
+"""The field along one direction: the distances at which the eight strengths begin."""
+
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray, require_finite
+from robot_side.arm.port import GripperPose
+from robot_side.field.look import look
+from robot_side.field.scratch import Scratch
+from robot_side.surroundings.scene_table import SceneTable
+
+_STILL: FloatArray = np.empty(0)
+
+
+@dataclass(frozen=True)
+class Along:
+    """A direction, and how uncertain what lies along it is (eq. 9-10)."""
+
+    direction: FloatArray
+    """û (3,), unit, in the world frame"""
+    mean_m: float
+    """û·(μ_ee - μ_c) + μ_δ"""
+    variance_m2: float
+    """σ_c² + σ_δ²"""
+    quantile: float
+    """Φ⁻¹(P)"""
+    reach_m: float
+    """How far ahead is looked."""
+    early_m: FloatArray | None = None
+    """(k,) by how much each object's ways are shorter, as it comes towards the gripper; None: all stand still"""
+
+
+@dataclass(frozen=True)
+class Field:
+    """What is ahead along one direction, as it was when it was looked at."""
+
+    ways_m: FloatArray
+    """(2, 8) the distances at which strengths 1 to 8 begin, never falling, infinite beyond the reach. The fast list,
+    and the slow one: an object that is to be touched is felt less there, and where it is expected."""
+    sigma_m: float
+    """The largest D_σ of the gripper's spheres."""
+
+    @property
+    def fast_m(self) -> FloatArray:
+        """(8,)"""
+        fast_m: FloatArray = self.ways_m[0]
+        return fast_m
+
+    @property
+    def slow_m(self) -> FloatArray:
+        """(8,)"""
+        slow_m: FloatArray = self.ways_m[1]
+        return slow_m
+
+
+@dataclass
+class FieldCounts:
+    """How much work there was, over the run."""
+
+    fields: int = 0
+    pairs: int = 0
+    """Pairs of a sphere and an object that the sphere meets within the reach."""
+    profiles: int = 0
+    """Of these, overlap profiles that were sampled."""
+    overlaps: int = 0
+    """Of one sphere and one primitive."""
+    limited: int = 0
+    """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)."""
+    with_nothing_near: int = 0
+    """Fields within the reach of which no sphere met anything."""
+    flat: int = 0
+    """Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them."""
+
+
+@dataclass
+class Ahead:
+    """Looks ahead along directions; keeps the room that this takes."""
+
+    encoder_sigma_rad: FloatArray
+    """(n,)"""
+    counts: FieldCounts = field(default_factory=FieldCounts)
+
+    def __post_init__(self) -> None:
+        self._encoder_variance = self.encoder_sigma_rad * self.encoder_sigma_rad
+        self.scratch = Scratch(0, 0, 0)
+
+    def look(
+        self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
+    ) -> Field:
+        """The field at `pose`; classes (k,): of the objects (`object_class`); widest_m: half the fingers' gap.
+
+        ValueError that names the field of `pose` or `along` that holds NaN or infinity: it would compare as far away
+        and silently give no warning.
+        """
+        objects = len(scene.first_rows) - 1
+        early_m = _STILL if along.early_m is None else along.early_m
+        if len(classes) != objects or len(early_m) not in (0, objects):
+            raise ValueError(f"classes holds {len(classes)}, early_m {len(early_m)}; valid: each of {objects} objects")
+        needed = len(pose.sphere_radii_m), len(scene.kinds), len(scene.first_rows)
+        if not self.scratch.fits(*needed):
+            self.scratch = Scratch(*needed)
+        scratch = self.scratch
+        found = look(
+            *(np.ascontiguousarray(pose.sphere_centers_m), pose.sphere_radii_m, pose.sphere_on_finger),
+            *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),
+            *(along.direction, along.mean_m, along.variance_m2, along.quantile, widest_m, along.reach_m),
+            *(classes, early_m, scene.bundle, scratch.bundle),
+        )
+        if not found:
+            _refuse(pose, along)
+        pairs, profiles, overlaps, limited = scratch.counts.tolist()
+        counts = self.counts
+        counts.fields += 1
+        counts.pairs += pairs
+        counts.profiles += profiles
+        counts.overlaps += overlaps
+        counts.limited += limited
+        counts.with_nothing_near += pairs == 0
+        counts.flat = scene.flat
+        return Field(scratch.distances_m.copy(), float(scratch.largest_m[0]))
+
+
+def _refuse(pose: GripperPose, along: Along) -> NoReturn:
+    """Raise the ValueError that says what is not finite."""
+    for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
+        require_finite(f"pose.{name}", getattr(pose, name))
+    for name in ("direction", "mean_m", "variance_m2", "quantile", "reach_m"):
+        require_finite(f"along.{name}", getattr(along, name))
+    if along.early_m is not None:
+        require_finite("along.early_m", along.early_m)
+    raise ValueError("the encoders' errors or the sums of all these are not finite; valid: metres and radians")

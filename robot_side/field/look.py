@@ -1,0 +1,281 @@
+"""One look along a direction, in one compiled call: where the eight strengths begin (eq. 3-12, §4.2).
+
+    inflate ─▶ broad phase: objects, clusters of spheres ─▶ contact of each sphere ─▶ overlap profiles
+
+Best first: the object, the cluster or the sphere that may be touched first comes next. An overlap is worked out only
+where a strength may begin sooner than those known by then (`profile`).
+"""
+
+import math
+from typing import Any, Final
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import (
+    NUMBER,
+    TRUTH,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_flags,
+    input_indices,
+)
+from robot_side.compiled.vectors import Vector, load
+from robot_side.field.inflation import around_spheres, inflate
+from robot_side.field.nearest_first import drop_first, push
+from robot_side.field.object_class import PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.profile import follow
+from robot_side.field.samples import Profile
+from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
+from robot_side.surroundings.any_kind import contact
+from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
+from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
+
+MARGIN_M: Final = 0.012
+"""m: over this distance before the one at which full strength is due, strength grows."""
+LEAST_DEPTH_M: Final = 0.0005
+"""A shallower overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
+_ROUNDED: Final = 5e-3
+"""The cosine at a contact may be off by this where rounding chose another nearest point."""
+
+scene_at, scratch_at = SCENE.at, SCRATCH.at
+
+
+@inlined
+def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
+    """The bound: a contact beyond this, less its lead, changes no strength."""
+    last: float = max(scratch.distances_m[0, STRENGTHS - 1], scratch.distances_m[1, STRENGTHS - 1])
+    return last + margin
+
+
+@building_block
+def _near_rows(
+    bundles: Bundles, first: int, end: int, center: Vector, size: float, along: Vector, reach: float
+) -> tuple[int, float]:
+    """Keep those of the rows that a sphere around others touches within the reach; how many, and the least distance."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    count, least = 0, math.inf
+    for row in range(first, end):
+        kind = scene.kinds[row]
+        if kind == HALF_SPACE or passes(center, along, reach, scene.bounds, row, size):
+            distance, _ = contact(kind, scene.shapes, row, center, size, along, reach)
+            if distance <= reach:
+                scratch.rows[count], least = row, min(least, distance)
+                count += 1
+    return count, least
+
+
+@building_block
+def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> float:
+    """The least distance at which any of a cluster's spheres touches any of the first rows kept."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    center, radius, least = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf
+    for k in range(rows):
+        row, near = scratch.rows[k], min(reach, least)
+        kind = scene.kinds[row]
+        if kind == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius):
+            least = min(least, contact_with(scene, row, center, along, radius, near, False)[0])
+    return least
+
+
+@building_block
+def _meet_sphere(
+    bundles: Bundles, i: int, rows: int, radius: float, along: Vector, reach: float, clear: bool
+) -> Contact:
+    """Where a sphere first touches any of the first rows kept."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
+    for k in range(rows):
+        row = scratch.rows[k]
+        near = min(reach, least)
+        if least > 0.0 and (scene.kinds[row] == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius)):
+            found, closing = contact_with(scene, row, center, along, radius, near, clear)
+            if found < least:
+                least, least_closing = found, closing
+    return least, least_closing
+
+
+@building_block
+def _pair(
+    bundles: Bundles,
+    place: int,
+    i: int,
+    uninflated: bool,
+    rows: int,
+    thing: int,
+    object_class: int,
+    early: float,
+    along: Vector,
+    widest: float,
+    reach: float,
+    clear: bool,
+) -> Any:
+    """Write the pair of a sphere and an object; where they do not touch within the reach, its contact is infinite."""
+    scratch = scratch_at(bundles.scratch)
+    pair, inflated = scratch.pairs[place], scratch.sigma_m[i, 0]
+    if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
+        inflated = widest
+        scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
+    sooner = inflated if uninflated else 0.0
+    pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
+    pair.lead, pair.touchable = early + sooner, object_class in (TOUCHABLE, TARGET)
+    pair.expected = inflated - min(scratch.sigma_m[i, 1], inflated) if pair.touchable else 0.0
+    pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + sooner, clear)
+    pair.overlaps = pair.contact == 0.0
+    return pair
+
+
+@building_block
+def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
+    """Write which of the rows kept a pair's sphere enters, and where; how many."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    if rows == 1:
+        entry = scratch.entries[0]
+        entry.row, entry.enters, entry.again = scratch.rows[0], pair.contact, math.inf
+        return 1
+    count, center = 0, load(scratch.spheres, pair.sphere)
+    for k in range(rows):
+        row = scratch.rows[k]
+        if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
+            enters, _ = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
+            if enters <= reach:
+                entry = scratch.entries[count]
+                entry.row, entry.enters, entry.again = row, enters, math.inf
+                count += 1
+    return count
+
+
+@building_block
+def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, reach: float, waits: bool) -> bool:
+    """Follow the overlap profile of the pair at a place; see `follow`."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    pair = scratch.pairs[item]
+    center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
+    entries = _enter(bundles, pair, rows, along, end)
+    least = min(math.pi * pair.radius * LEAST_DEPTH_M * LEAST_DEPTH_M, 0.5 * scene.object_volumes[thing])
+    closing = min(pair.closing + _ROUNDED, 1.0) if entries == 1 and pair.closing > 0.0 else 0.0
+    return follow(Profile(pair, entries, center, along, MARGIN_M, end), closing, least, waits, bundles)
+
+
+@building_block
+def _look_at(
+    bundles: Bundles,
+    spheres: int,
+    rows: int,
+    thing: int,
+    object_class: int,
+    early: float,
+    along: Vector,
+    widest: float,
+    reach: float,
+) -> None:
+    """Shorten the distances by one object, of which the first rows are kept: best first.
+
+    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Pairs that
+    wait lie at the other end.
+    """
+    scratch = scratch_at(bundles.scratch)
+    keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
+    far = reach + margin + early
+    for cluster in range((spheres + CLUSTER - 1) // CLUSTER):
+        bound = _cluster_contact(bundles, rows, cluster, along, far)
+        if bound <= far:
+            # A cluster that may overlap comes first.
+            count = push(keys, items, count, bound - early if bound > 0.0 else -math.inf, -1 - cluster)
+    while count > 0 and keys[0] < _last_to_count(scratch, margin):
+        item, clear = items[0], keys[0] > -math.inf
+        count = drop_first(keys, items, count)
+        if item >= 0:
+            if _follow(bundles, item, rows, thing, along, reach, True):
+                waiting += 1
+                items[items.size - waiting] = item
+            continue
+        last = min(far, _last_to_count(scratch, margin) + early)
+        for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
+            for uninflated in (False, True):
+                pair = _pair(
+                    bundles, pairs, i, uninflated, rows, thing, object_class, early, along, widest, last, clear
+                )
+                if pair.contact < math.inf:
+                    count = push(keys, items, count, pair.contact - pair.lead, pairs)
+                    pairs += 1
+                # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
+                if not pair.overlaps:
+                    break
+    for k in range(waiting):
+        _follow(bundles, items[items.size - 1 - k], rows, thing, along, reach, False)
+    scratch.counts[Count.PAIRS] += pairs
+
+
+@compiled(
+    *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    returns=TRUTH,
+)
+def look(
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
+    tool: FloatArray,
+    jacobian: FloatArray,
+    encoder_variance: FloatArray,
+    direction: FloatArray,
+    mean: float,
+    variance: float,
+    quantile: float,
+    widest: float,
+    reach: float,
+    classes: IntArray,
+    early: FloatArray,
+    scene_bundle: IntArray,
+    scratch_bundle: IntArray,
+) -> bool:
+    """Fill the scratch's distances; False for spheres, or errors, that are not finite: they would compare as far away.
+
+    centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
+    encoder_variance (n,), direction: the unit û (3,). mean, variance: of eq. 10 along û, without the joints' part;
+    quantile: Φ⁻¹(P). widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards
+    the target (§3.4). classes (k,): of the objects (`object_class`). early (k,): their strengths begin sooner by this,
+    as they come nearer; empty where all stand still.
+    """
+    bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
+    along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
+    scratch.distances_m[:], scratch.counts[:] = math.inf, 0
+    origin = load(tool.reshape(1, 3), 0)
+    finite = inflate(
+        centers, radii, on_finger, origin, jacobian, encoder_variance, along, mean, variance, quantile, scratch
+    )
+    if not (finite and math.isfinite(reach)):
+        return False
+    middle, size = around_spheres(scratch.spheres, scratch.sigma_m, 0, spheres)
+    count, place, farthest, keys, things = 0, -1, reach + margin, scratch.bounds_m, scratch.objects
+    moves = early.size > 0
+    for thing in range(early.size):
+        if not math.isfinite(early[thing]):
+            return False
+        farthest = max(farthest, reach + margin + early[thing])
+    while True:
+        place = next_object(scene, place + 1, middle, along, farthest, size)
+        if place >= scene.object_order.size:
+            break
+        thing = scene.object_order[place]
+        if classes[thing] != PASSED_OVER:
+            first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], early[thing] if moves else 0.0
+            rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
+            if rows > 0:
+                count = push(keys, things, count, nearest - sooner if nearest > 0.0 else -math.inf, thing)
+    while count > 0 and keys[0] < _last_to_count(scratch, margin):
+        thing = things[0]
+        count = drop_first(keys, things, count)
+        first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], early[thing] if moves else 0.0
+        rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
+        _look_at(bundles, spheres, rows, thing, classes[thing], sooner, along, widest, reach)
+    for kind in range(2):
+        soonest = math.inf
+        for level in range(STRENGTHS - 1, -1, -1):
+            # Where a strength begins, the weaker ones have begun. Beyond the reach not all is known.
+            soonest = min(soonest, scratch.distances_m[kind, level])
+            scratch.distances_m[kind, level] = soonest if soonest <= reach else math.inf
+    return True

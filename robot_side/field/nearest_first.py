@@ -1,0 +1,33 @@
+"""A binary heap of numbered items, the one with the least key first."""
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import building_block
+
+
+@building_block
+def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -> int:
+    """Add an item to the first `count`; how many there are then."""
+    place = count
+    while place > 0 and keys[(place - 1) // 2] > key:
+        above = (place - 1) // 2
+        keys[place], items[place] = keys[above], items[above]
+        place = above
+    keys[place], items[place] = key, item
+    return count + 1
+
+
+@building_block
+def drop_first(keys: FloatArray, items: IntArray, count: int) -> int:
+    """Remove the first of `count` items; how many are left."""
+    left, place = count - 1, 0
+    key, item = keys[left], items[left]
+    while 2 * place + 1 < left:
+        below = 2 * place + 1
+        if below + 1 < left and keys[below + 1] < keys[below]:
+            below += 1
+        if keys[below] >= key:
+            break
+        keys[place], items[place] = keys[below], items[below]
+        place = below
+    keys[place], items[place] = key, item
+    return left

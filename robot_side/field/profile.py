@@ -1,0 +1,254 @@
+"""The overlap profile of one gripper sphere and one object, and where it makes strengths begin (§4.2).
+
+    W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
+    s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
+
+V(E) is the overlap after the distance E along û. It is sampled only as far as a strength can still begin sooner than
+those known so far (`sooner`). Between two samples goes a cubic (`samples`); where it says that a strength begins, V is
+asked.
+"""
+
+import math
+from typing import Final, NamedTuple
+
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.field.samples import NOTHING, Profile, Sample, next_entry, on_cubic, peak, sample
+from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count
+from robot_side.field.sooner import begin, latest_of, matters, may_count
+
+scratch_at = SCRATCH.at
+_TOLERANCE_M: Final = 2e-5
+"""A strength's beginning is known this well."""
+_DOUBT_M: Final = 5e-4
+"""The cubic is trusted this well to say that a strength begins too late to count."""
+_MOST_STEPS: Final = 12
+_MOST_SAMPLES: Final = 400
+_MOST_OF_A_PEAK: Final = 4
+_FLAT: Final = 0.005
+"""A peak is known this well, as a share of what the overlap has risen by."""
+_FINE: Final = 1.0 / 6.0
+_COARSE: Final = 0.5
+"""The distance between samples beyond the margin, in margins: where another primitive is entered, and elsewhere."""
+_EARLY: Final = 0.4
+"""A second sample of a smooth profile lies at this share of the margin, where early strengths begin."""
+
+
+class Rise(NamedTuple):
+    """The distance at which an overlap begins to rise, the overlap there, and the rise that full strength takes."""
+
+    free: Sample
+    """At d"""
+    floor: float
+    """V(0)"""
+    least: float
+    """max(m |∇V(0)|, V_min)"""
+
+
+@building_block
+def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, bundles: Bundles) -> Sample:
+    """The first distance between two samples at which V passes a volume."""
+    for step in range(_MOST_STEPS):
+        guess = on_cubic(a, b, wanted)
+        if b.at - a.at <= _TOLERANCE_M:
+            return guess
+        # The cubic converges slowly where V has a kink.
+        at = guess.at if step < 3 else 0.5 * (a.at + b.at)
+        found, _, _ = sample(profile, at, bundles)
+        if abs(found.volume - wanted) <= _TOLERANCE_M * found.slope:
+            return found
+        if found.volume < wanted:
+            a = found
+        else:
+            b = found
+    return b
+
+
+@building_block
+def _top(profile: Profile, a: Sample, b: Sample, floor: float, bundles: Bundles) -> tuple[bool, Sample]:
+    """The highest overlap between two samples; False where the cubic has no peak there.
+
+    It may have one although V rises, or falls, at both. A peak with a kink is no cubic's, and is asked for again.
+    """
+    best = a if a.volume > b.volume else b
+    peaks = False
+    for _ in range(_MOST_OF_A_PEAK):
+        part = peak(a, b)
+        if part < 0.0:
+            break
+        top, _, _ = sample(profile, a.at + part * (b.at - a.at), bundles)
+        if top.volume > best.volume:
+            peaks, best = True, top
+        a, b = (top, b) if top.slope > 0.0 else (a, top)
+        if abs(top.slope) * (b.at - a.at) <= _FLAT * (top.volume - floor):
+            break
+    return peaks, best
+
+
+@building_block
+def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundles: Bundles) -> tuple[bool, Rise]:
+    """Look for d beyond the sample at 0 of a pair that overlaps there; False where no strength can begin sooner.
+
+    full: at least what full strength takes.
+    """
+    scratch, floor = scratch_at(bundles.scratch), last.volume
+    pair, ball = profile.pair, 4.0 / 3.0 * math.pi * profile.pair.radius**3
+    disc, step = math.pi * pair.radius * pair.radius, _FINE * profile.margin
+    # What rises by rounding alone, to fall at once, has not begun to.
+    if last.slope * _TOLERANCE_M > NOTHING * ball:
+        return True, Rise(last, floor, full)
+    given_up = True
+    for _ in range(_MOST_SAMPLES):
+        if not matters(profile, 0, last.at, scratch.distances_m):
+            given_up = False
+            break
+        at = last.at + max(step, (floor - last.volume) / disc)
+        if not rises:
+            at = max(next_entry(profile, last.at, scratch), last.at + (floor - last.volume) / disc)
+            if at >= profile.end:
+                given_up = False
+                break
+        found, _, may_rise = sample(profile, at, bundles)
+        if rises and found.volume - floor <= NOTHING * ball:
+            _, found_top = _top(profile, last, found, floor, bundles)
+            found = found_top if found_top.volume - floor > NOTHING * ball else found
+        if rises and found.volume - floor > NOTHING * ball:
+            for _ in range(_MOST_STEPS):
+                if found.at - last.at <= _TOLERANCE_M:
+                    break
+                middle, _, _ = sample(profile, 0.5 * (last.at + found.at), bundles)
+                if middle.volume - floor > NOTHING * ball:
+                    found = middle
+                else:
+                    last = middle
+            return True, Rise(last, floor, full)
+        last, rises = found, may_rise
+    # After the most samples the overlap counts as rising from there: early, and never silent.
+    return given_up, Rise(last, floor, full)
+
+
+@building_block
+def _most_over_margin(profile: Profile, rise: Rise, full: Sample, bundles: Bundles) -> float:
+    """W(d + m), with samples over the margin that are kept; full: the last of them."""
+    scratch = scratch_at(bundles.scratch)
+    samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.floor)
+    last = rise.free
+    for k in range(SAMPLES + 1):
+        found = rise.free if k == 0 else full
+        if 0 < k < SAMPLES:
+            found, _, _ = sample(profile, rise.free.at + k * step, bundles)
+        samples[k, 0], samples[k, 1] = found.volume, found.slope
+        most = max(most, found.volume - rise.floor)
+        if k > 0:
+            _, top = _top(profile, last, found, rise.floor, bundles)
+            most = max(most, top.volume - rise.floor)
+        last = found
+    return most
+
+
+@inlined
+def _take(
+    profile: Profile,
+    level: int,
+    a: Sample,
+    b: Sample,
+    floor: float,
+    reference: float,
+    bundles: Bundles,
+) -> int:
+    """Let the strengths begin that do so between two samples, from `level` on; the next one."""
+    distances = scratch_at(bundles.scratch).distances_m
+    while level < STRENGTHS:
+        wanted = floor + (level + 0.5) / STRENGTHS * reference
+        if b.volume < wanted:
+            break
+        latest = latest_of(profile, level, distances)
+        if latest > a.at:
+            found = a if a.volume >= wanted else on_cubic(a, b, wanted)
+            if found.at < latest + _DOUBT_M and a.volume < wanted:
+                found = _crossing(profile, a, b, wanted, bundles)
+                # What is known there serves the next strength, too.
+                a = found
+            if found.at < latest:
+                begin(profile, level, found.at, distances)
+        level += 1
+    return level
+
+
+@building_block
+def follow(profile: Profile, closing: float, least: float, waits: bool, bundles: Bundles) -> bool:
+    """Shorten the distances at which strengths begin by one pair; True: ask again, after all other pairs.
+
+    closing: û·n of the plane in which one convex primitive is touched, above 0; 0 for several primitives, or a mesh.
+    least: V_min. waits: a pair whose overlap falls at first may wait, as it takes many samples.
+    """
+    scratch = scratch_at(bundles.scratch)
+    pair, distances, margin = profile.pair, scratch.distances_m, profile.margin
+    nothing = Sample(pair.contact, 0.0, 0.0)
+    rise = Rise(nothing, 0.0, least)
+    if pair.overlaps:
+        first, lean, rises = sample(profile, 0.0, bundles)
+        if waits and rises and first.slope <= 0.0:
+            return True
+        scratch.counts[Count.PROFILES] += 1
+        rises, rise = _first_rise(profile, first, rises, max(least, margin * lean), bundles)
+        if not (rises and may_count(profile, closing, rise.floor, rise.least, rise.free, nothing, distances)):
+            return False
+    elif not may_count(profile, closing, 0.0, least, nothing, nothing, distances):
+        return False
+    else:
+        scratch.counts[Count.PROFILES] += 1
+    free, floor = rise.free, rise.floor
+    full, _, may_rise = sample(profile, free.at + margin, bundles)
+    reference, smooth = max(rise.least, full.volume - floor), closing > 0.0 and full.slope > 0.0
+    if not may_count(profile, closing, floor, reference, full, free, distances):
+        return False
+    level, stored, last = 0, 0, free
+    if smooth:
+        # The overlap with one convex primitive rises until there.
+        half, _, _ = sample(profile, free.at + _EARLY * margin, bundles)
+        if not may_count(profile, closing, floor, reference, full, half, distances):
+            return False
+        level = _take(profile, level, free, half, floor, reference, bundles)
+        level = _take(profile, level, half, full, floor, reference, bundles)
+        last = full
+    else:
+        reference, stored = max(reference, _most_over_margin(profile, rise, full, bundles)), SAMPLES
+    _go_on(profile, level, last, stored, may_rise, rise, reference, bundles)
+    return False
+
+
+@building_block
+def _go_on(
+    profile: Profile,
+    level: int,
+    last: Sample,
+    stored: int,
+    may_rise: bool,
+    rise: Rise,
+    reference: float,
+    bundles: Bundles,
+) -> None:
+    """Let the strengths from `level` on begin beyond a sample, of which the first `stored` steps are kept."""
+    scratch, floor = scratch_at(bundles.scratch), rise.floor
+    step = profile.margin / SAMPLES
+    for k in range(_MOST_SAMPLES):
+        if level == STRENGTHS or not matters(profile, level, last.at, scratch.distances_m):
+            break
+        if k < stored:
+            at = rise.free.at + (k + 1) * step
+            found = Sample(at, scratch.samples[k + 1, 0], scratch.samples[k + 1, 1])
+        else:
+            comes = next_entry(profile, last.at, scratch)
+            if not may_rise and comes == math.inf:
+                break
+            near = comes < last.at + _COARSE * profile.margin
+            at = last.at + (_FINE if near else _COARSE) * profile.margin
+            if not may_rise:
+                at = max(at, comes)
+            found, _, may_rise = sample(profile, at, bundles)
+        peaks, top = _top(profile, last, found, floor, bundles)
+        if peaks:
+            level = _take(profile, level, last, top, floor, reference, bundles)
+            last = top
+        level = _take(profile, level, last, found, floor, reference, bundles)
+        last = found

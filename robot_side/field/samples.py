@@ -1,0 +1,125 @@
+"""Samples of the overlap profile of one gripper sphere and one object, and the cubic between two of them (Hermite)."""
+
+import math
+from typing import Any, Final, NamedTuple
+
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, add, dot, scale
+from robot_side.field.scratch import SCRATCH, Bundles, Count, ScratchColumns
+from robot_side.surroundings.kinds.layout import MESH
+from robot_side.surroundings.overlaps import overlap
+from robot_side.surroundings.scene_columns import SCENE, contact_in_front
+
+scene_at, scratch_at = SCENE.at, SCRATCH.at
+NOTHING: Final = 1e-9
+"""Shares of the sphere's volume, and of its disc, below which a change is rounding."""
+
+
+class Profile(NamedTuple):
+    """A pair, and what its profile is made of."""
+
+    pair: Any
+    entries: int
+    """How many entries of the scratch belong to the pair"""
+    center: Vector
+    along: Vector
+    margin: float
+    end: float
+    """No strength within the reach begins beyond."""
+
+
+class Sample(NamedTuple):
+    """V and its slope dV/dE at a distance."""
+
+    at: float
+    volume: float
+    slope: float
+
+
+@building_block
+def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float, bool]:
+    """Work out V at a distance, |∇V| there, and whether any primitive's part of it may still rise."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    radius, push = profile.pair.radius, scratch.push
+    center = add(profile.center, scale(at, profile.along))
+    volume, gradient, may_rise = 0.0, (0.0, 0.0, 0.0), False
+    for k in range(profile.entries):
+        entry = scratch.entries[k]
+        if entry.enters > at:
+            continue
+        kind = scene.kinds[entry.row]
+        part = overlap(kind, scene.kernels, scene.shapes, entry.row, center, radius, scene.meshes, push)
+        slope = push[0] * profile.along[0] + push[1] * profile.along[1] + push[2] * profile.along[2]
+        volume, gradient = volume + part, add(gradient, (push[0], push[1], push[2]))
+        scratch.counts[Count.OVERLAPS] += 1
+        rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3
+        if kind == MESH and not rising:
+            # A mesh may rise again, where the next triangle in front is touched.
+            left = profile.end - at
+            entry.again = at + contact_in_front(scene, entry.row, center, profile.along, radius, left)
+            rising = entry.again <= at
+        may_rise = may_rise or rising
+    size = math.sqrt(dot(gradient, gradient))
+    return Sample(at, volume, dot(gradient, profile.along)), size, may_rise
+
+
+@inlined
+def next_entry(profile: Profile, at: float, scratch: ScratchColumns) -> float:
+    """The distance beyond `at` at which another primitive is entered, or one that has fallen rises again."""
+    nearest = math.inf
+    for k in range(profile.entries):
+        entry = scratch.entries[k]
+        comes = entry.enters if entry.enters > at else entry.again
+        if comes > at:
+            nearest = min(nearest, comes)
+    return nearest
+
+
+@inlined
+def cubic(a: Sample, b: Sample, part: float) -> float:
+    """V at `part`, 0 to 1, of the distance between two samples."""
+    rest, step = 1.0 - part, b.at - a.at
+    return (
+        rest * rest * (1.0 + 2.0 * part) * a.volume
+        + part * part * (3.0 - 2.0 * part) * b.volume
+        + step * part * rest * (rest * a.slope - part * b.slope)
+    )
+
+
+@inlined
+def cubic_slope(a: Sample, b: Sample, part: float) -> float:
+    """dV by the part."""
+    rest, step = 1.0 - part, b.at - a.at
+    return 6.0 * (b.volume - a.volume) * part * rest + step * (
+        a.slope * rest * (1.0 - 3.0 * part) + b.slope * part * (3.0 * part - 2.0)
+    )
+
+
+@inlined
+def peak(a: Sample, b: Sample) -> float:
+    """The part, 0 to 1, of the distance between two samples at which the cubic peaks; -1 where it does not."""
+    step, rise = b.at - a.at, b.volume - a.volume
+    begin, end = step * a.slope, step * b.slope
+    # Of dV = begin + bend t + more t², the root where it falls.
+    bend, more = 2.0 * (3.0 * rise - 2.0 * begin - end), 3.0 * (begin + end - 2.0 * rise)
+    inside = bend * bend - 4.0 * begin * more
+    if inside <= 0.0:
+        return -1.0
+    root = math.sqrt(inside)
+    part = 2.0 * begin / (root - bend) if bend < 0.0 else (-bend - root) / (2.0 * more)
+    return part if 0.0 < part < 1.0 else -1.0
+
+
+@inlined
+def on_cubic(a: Sample, b: Sample, wanted: float) -> Sample:
+    """Where between two samples the cubic passes a volume: Newton's method, and halves where it leaves the bracket."""
+    low, high, part = 0.0, 1.0, 0.5
+    for _ in range(8):
+        off = cubic(a, b, part) - wanted
+        low, high = (part, high) if off < 0.0 else (low, part)
+        steep = cubic_slope(a, b, part)
+        part -= off / steep if steep > 0.0 else 0.0
+        if not low < part < high:
+            part = 0.5 * (low + high)
+    step = b.at - a.at
+    return Sample(a.at + part * step, wanted, cubic_slope(a, b, part) / step)

@@ -1,0 +1,84 @@
+"""The overlap of a gripper's spheres with all objects, and with each (eq. 11-12)."""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import add, load
+from robot_side.field.inflation import around_spheres
+from robot_side.field.object_class import PASSED_OVER
+from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.kinds.layout import HALF_SPACE
+from robot_side.surroundings.overlaps import overlap
+from robot_side.surroundings.scene_columns import SCENE, next_object
+from robot_side.surroundings.scene_table import SceneTable
+
+_scene_at = SCENE.at
+_NOWHERE = np.empty(0)
+
+
+def total_overlap_m3(
+    spheres: FloatArray,
+    scene: SceneTable,
+    classes: IntArray,
+    inflated_m: FloatArray | None = None,
+    moved_m: FloatArray | None = None,
+    of_objects_m3: FloatArray = _NOWHERE,
+) -> float:
+    """Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over; classes (k,).
+
+    inflated_m (m, 1 or more): by its first column. moved_m (3,). of_objects_m3 (k,): takes each object's part.
+    ValueError for a sphere that is not finite, which would compare as far away from everything.
+    """
+    by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m
+    total = _sum(
+        spheres, by_m, np.zeros(3) if moved_m is None else moved_m, classes, scene.bundle, np.empty(3), of_objects_m3
+    )
+    if math.isnan(total):
+        raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
+    return float(total)
+
+
+@compiled(
+    *(input_array(2), input_array(2), input_array(1), input_indices(), BUNDLE, output_array(1), output_array(1)),
+    returns=NUMBER,
+)
+def _sum(
+    spheres: FloatArray,
+    inflated: FloatArray,
+    moved: FloatArray,
+    classes: IntArray,
+    scene_bundle: IntArray,
+    push: FloatArray,
+    of_objects: FloatArray,
+) -> float:
+    """NaN for what is not finite."""
+    scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
+    check = shift[0] + shift[1] + shift[2]
+    for i in range(count):
+        check += spheres[i, 0] + spheres[i, 1] + spheres[i, 2] + spheres[i, 3] + inflated[i, 0]
+    if not math.isfinite(check):
+        return math.nan
+    middle, size = around_spheres(spheres, inflated, 0, count)
+    middle, total, nowhere = add(middle, shift), 0.0, (0.0, 0.0, 0.0)
+    place = next_object(scene, 0, middle, nowhere, 0.0, size)
+    while place < scene.object_order.size:
+        thing, mine = scene.object_order[place], 0.0
+        place = next_object(scene, place + 1, middle, nowhere, 0.0, size)
+        if classes[thing] == PASSED_OVER:
+            continue
+        for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
+            kind = scene.kinds[row]
+            if kind != HALF_SPACE and not passes(middle, nowhere, 0.0, scene.bounds, row, size):
+                continue
+            for i in range(count):
+                center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
+                if kind == HALF_SPACE or passes(center, nowhere, 0.0, scene.bounds, row, radius):
+                    mine += overlap(kind, scene.kernels, scene.shapes, row, center, radius, scene.meshes, push)
+        total += mine
+        if of_objects.size > 0:
+            of_objects[thing] = mine
+    return total

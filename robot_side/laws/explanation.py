@@ -1,0 +1,78 @@
+"""What the enlargement is made of and what overlaps, for people who look; worked out only when asked for."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.view_messages import EnlargementTerms
+from robot_side.arm.port import GripperPose
+from robot_side.field.field import Along
+from robot_side.field.inflation import explain_inflation
+from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.laws.law import Sensed, Situation
+from robot_side.surroundings.scene_table import SceneTable
+
+Trigger = Literal["l2", "r2"]
+Overlaps = dict[int, float]
+"""By object, m³; only where there is any."""
+
+
+@dataclass(frozen=True)
+class TriggerExplained:
+    """Of one trigger."""
+
+    terms: EnlargementTerms
+    overlaps_m3: Overlaps
+    """Of the gripper inflated by D_σ and moved by the robot side's δ (eq. 11-12)"""
+
+
+class Explains(Protocol):
+    """A law that can say why."""
+
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """One trigger, as `sensed` was found in `situation`."""
+        ...
+
+
+def enlargement_terms(
+    situation: Situation,
+    along: Along,
+    encoder_sigma_rad: FloatArray,
+    camera_sd_m: float,
+    prediction_sd_m: float,
+    displacement_m: float,
+) -> tuple[EnlargementTerms, FloatArray]:
+    """What eq. 8-10 are made of for the sphere with the largest D_σ; and D_σ of all (m,). encoder_sigma_rad (n,)."""
+    pose, count = situation.pose, len(situation.pose.sphere_radii_m)
+    kinematic_m2, sigma_m = np.empty(count), np.empty(count)
+    explain_inflation(
+        *(np.ascontiguousarray(pose.sphere_centers_m), pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian)),
+        *(encoder_sigma_rad**2, along.direction, along.mean_m, along.variance_m2, along.quantile),
+        *(kinematic_m2, sigma_m),
+    )
+    largest = int(sigma_m.argmax())
+    terms = EnlargementTerms(
+        sigma_m=float(sigma_m[largest]),
+        mean_m=float(along.mean_m),
+        kinematic_sd_m=float(np.sqrt(kinematic_m2[largest])),
+        camera_sd_m=camera_sd_m,
+        prediction_sd_m=float(prediction_sd_m),
+        quantile=along.quantile,
+        loop_age_s=float(situation.loop_age_s),
+        displacement_m=float(displacement_m),
+    )
+    return terms, sigma_m
+
+
+def overlaps_by_object(spheres: FloatArray, scene: SceneTable, classes: IntArray) -> Overlaps:
+    """Σ_i V_ij of each object j that the spheres (m, 4) overlap, but for those passed over; classes (k,)."""
+    found_m3 = np.zeros(len(classes))
+    total_overlap_m3(spheres, scene, classes, of_objects_m3=found_m3)
+    return {int(thing): float(found_m3[thing]) for thing in np.flatnonzero(found_m3)}
+
+
+def moved_and_inflated(pose: GripperPose, moved_m: FloatArray, by_m: FloatArray) -> FloatArray:
+    """The gripper's spheres (m, 4): moved by (3,), inflated by (m,)."""
+    return np.concatenate([pose.sphere_centers_m + moved_m, (pose.sphere_radii_m + by_m)[:, None]], axis=1)

@@ -1,0 +1,65 @@
+"""What a law makes of the surroundings in one tick: two trigger fields and a rumble, whatever the law."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from common.arrays import FloatArray
+from common.protocol.messages import Compensation, TriggerField, Vector2
+from robot_side.arm.port import GripperPose
+from robot_side.surroundings.perceived import PerceivedObjects
+
+LawName = Literal["swept", "paper"]
+"""swept: ways along each trigger, for its own zones. paper: the plain law of §4.2, one number for both triggers."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Where the gripper is among what, and what is known of the link."""
+
+    pose: GripperPose
+    """With the spheres of what it holds"""
+    joint_velocities_rad_s: FloatArray
+    """(n,)"""
+    objects: PerceivedObjects
+    loop_age_s: float
+    """t_d of eq. 8; the configured worst case while unknown"""
+    loop_age_known: bool
+    """Whether the owner has echoed a stamp, so that what is under way is no older than `loop_age_s`."""
+    compensation: Compensation
+    """Whose prediction of the delay's displacement is felt."""
+    gap_m: float | None
+    """Free gap between the fingers; None without a gripper"""
+    held: int | None
+    """The object that the gripper holds"""
+    lateral: Vector2
+    """Deflection of the stick that moves across, as commanded"""
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What one tick found out about the surroundings."""
+
+    l2: TriggerField
+    r2: TriggerField
+    speed_m_s: float
+    """v along the direction in which R2 advances"""
+    horizon_m: float
+    """So far the fields look ahead."""
+    rumble: float
+    """Danger where the stick leads, in eighths, 0 to 1"""
+    enlargement_m: float
+    """D_incr of eq. 10 along the motion: |v| t_d + D_σ, the largest of the gripper's spheres"""
+    overlap_m3: float
+    """Σ V_ij of the enlarged gripper (eq. 11-12)"""
+
+
+class Law(Protocol):
+    """From a situation to what is felt."""
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Work out one tick."""
+        ...
+
+    def summary(self) -> dict[str, int]:
+        """How much work there was and was not, over the run."""
+        ...

@@ -1,0 +1,121 @@
+"""The paper's plain law (§4.2), to compare with: every sphere enlarged by D_incr in all directions, one total overlap.
+
+s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
+"""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from common.protocol.view_messages import EnlargementTerms
+from robot_side.arm.ability import JointLimits, along_approach
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
+from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.field.object_class import OBSTACLE, PASSED_OVER
+from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.laws.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
+from robot_side.laws.law import Sensed, Situation
+from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.surroundings import Surroundings
+
+REFERENCE_SHARE: Final = 0.05
+"""f. The paper names no reference: the smaller it is, the earlier all is full, beside and behind, too."""
+PERIOD_S: Final = 0.01
+
+
+class PaperLaw:
+    """Keeps what it found until it looks again."""
+
+    def __init__(
+        self,
+        uncertainty: Uncertainty,
+        encoder_sigma_rad: FloatArray,
+        limits: JointLimits,
+        motion: ToolMotionSettings,
+        surroundings: Surroundings | None = None,
+    ) -> None:
+        """encoder_sigma_rad (n,): eq. 3. surroundings: the owner of what is perceived; one of its own by default."""
+        self.surroundings = surroundings or Surroundings()
+        self.looked = 0
+        self._uncertainty = uncertainty
+        self._encoder_sigma_rad = encoder_sigma_rad
+        self._limits = limits
+        self._motion = motion
+        self._sensed: tuple[float, Sensed] | None = None
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        """Work out one tick; the overlap is looked at a hundred times a second."""
+        if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
+            self._sensed = now_s, self._look(situation)
+        return self._sensed[1]
+
+    def expect(self, probability: float) -> None:
+        """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+        self._uncertainty = replace(self._uncertainty, probability=probability)
+
+    def summary(self) -> dict[str, int]:
+        """How much work there was, over the run."""
+        return {"fields": self.looked}
+
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
+        """The same for both triggers: D_incr in all directions, of which |v| t_d is called displacement here."""
+        del trigger, sensed
+        enlargement_m, covariances, velocities = self._enlargements(situation)
+        largest = int(enlargement_m.argmax())
+        displacement_m = float(np.linalg.norm(velocities[largest])) * situation.loop_age_s
+        uncertainty = self._uncertainty
+        terms = EnlargementTerms(
+            sigma_m=float(enlargement_m[largest]) - displacement_m,
+            mean_m=math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m),
+            kinematic_sd_m=math.sqrt(float(np.trace(covariances[largest]))),
+            camera_sd_m=uncertainty.camera_sd_m,
+            prediction_sd_m=0.0,
+            quantile=uncertainty.quantile,
+            loop_age_s=situation.loop_age_s,
+            displacement_m=displacement_m,
+        )
+        spheres = moved_and_inflated(situation.pose, np.zeros(3), enlargement_m)
+        table = self.surroundings.see(situation.objects)
+        return TriggerExplained(terms, overlaps_by_object(spheres, table, _classes_of(situation)))
+
+    def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
+        jacobians = situation.pose.sphere_jacobians
+        covariances = position_covariance(jacobians, self._encoder_sigma_rad)
+        velocities_m_s = jacobians @ situation.joint_velocities_rad_s
+        enlargements_m = plain_enlargements_m(self._uncertainty, covariances, velocities_m_s, situation.loop_age_s)
+        return enlargements_m, covariances, velocities_m_s
+
+    def _look(self, situation: Situation) -> Sensed:
+        self.looked += 1
+        pose = situation.pose
+        enlargement_m, _, _ = self._enlargements(situation)
+        radii, classes = pose.sphere_radii_m + enlargement_m, _classes_of(situation)
+        spheres = np.concatenate([pose.sphere_centers_m, radii[:, None]], axis=1)
+        overlap_m3 = total_overlap_m3(spheres, self.surroundings.see(situation.objects), classes)
+        stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii**3).sum())))
+        able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
+        felt = uniform_field(round(STRENGTHS * stiffness), able.full_speed_m_s, able.acceleration_m_s2)
+        return Sensed(
+            l2=felt,
+            r2=felt,
+            speed_m_s=float(pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s)),
+            horizon_m=FAR_M,
+            rumble=0.0,
+            enlargement_m=float(enlargement_m.max()),
+            overlap_m3=overlap_m3,
+        )
+
+
+def _classes_of(situation: Situation) -> IntArray:
+    classes = np.array(
+        [PASSED_OVER if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
+    )
+    if situation.held is not None:
+        classes[situation.held] = PASSED_OVER
+    return classes

@@ -1,0 +1,26 @@
+"""Nearest point of, and contact of a moving sphere with, a primitive of any kind."""
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import building_block
+from robot_side.compiled.vectors import Vector
+from robot_side.surroundings.kinds.kind import by_kind
+from robot_side.surroundings.kinds.layout import Contact, Nearest
+from robot_side.surroundings.perceived import KINDS
+
+_nearest, _contact = by_kind([kind.nearest for kind in KINDS]), by_kind([kind.contact for kind in KINDS])
+
+
+@building_block
+def nearest(kind: int, shapes: FloatArray, row: int, point: Vector) -> Nearest:
+    """The nearest point of the primitive in `row`; of a mesh, the box around it."""
+    found: Nearest = _nearest(kind, shapes, row, point)
+    return found
+
+
+@building_block
+def contact(
+    kind: int, shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float
+) -> Contact:
+    """Where a sphere that moves along the unit vector `along` first touches; of a mesh, the box around it."""
+    found: Contact = _contact(kind, shapes, row, start, radius, along, reach)
+    return found

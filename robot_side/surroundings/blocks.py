@@ -1,0 +1,87 @@
+"""Objects in blocks that lie together, and blocks of blocks, so that far ones are passed over 64 and 4 096 at a time.
+
+The order is that of a curve through all of space (Morton 1966); it needs no tree, and stays when objects move: the
+bounds around the blocks that they are in follow them.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
+from robot_side.surroundings.bounds import write_around
+
+TOGETHER: Final = 64
+"""Objects in a block, and blocks in a block of blocks."""
+_CELLS: Final = 1 << 16
+"""Along each axis of the curve."""
+
+
+def in_blocks(object_bounds: FloatArray) -> IntArray:
+    """The objects of bounds (k, 4) that have any, as they follow each other in blocks; those without an end first.
+
+    What fits in one block stays in the order of the objects.
+    """
+    there = np.flatnonzero(object_bounds[:, 3] >= 0.0)
+    if len(there) <= TOGETHER:
+        return there
+    centers_m, endless = object_bounds[there, :3], np.isinf(object_bounds[there, 3])
+    low = centers_m[~endless].min(axis=0, initial=math.inf)
+    extent = centers_m[~endless].max(axis=0, initial=-math.inf) - low
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cells = np.nan_to_num((centers_m - low) / extent * (_CELLS - 1))
+    cells = np.clip(cells, 0, _CELLS - 1).astype(np.uint64)
+    places = np.zeros(len(there), dtype=np.uint64)
+    for axis in range(3):
+        places |= _spread(cells[:, axis]) << np.uint64(axis)
+    return there[np.lexsort((places, ~endless))]
+
+
+def _spread(numbers: np.ndarray) -> np.ndarray:
+    """The 16 bits of each number (n,), two zeros after each."""
+    for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
+        numbers = (numbers | (numbers << np.uint64(shift))) & np.uint64(mask)
+    return numbers
+
+
+@compiled(input_array(2), input_indices(), output_array(2), output_array(2))
+def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
+    """Bound the blocks `which`, rising, of objects with bounds (o, 4) in their order, and the blocks around them."""
+    for k in range(which.size):
+        first = which[k] * TOGETHER
+        write_around(bounds, first, min(first + TOGETHER, bounds.shape[0]), blocks[which[k]])
+    done = -1
+    for k in range(which.size):
+        group = which[k] // TOGETHER
+        if group != done:
+            write_around(blocks, group * TOGETHER, min((group + 1) * TOGETHER, blocks.shape[0]), groups[group])
+            done = group
+
+
+class Blocks:
+    """The order of objects, and what bounds their blocks."""
+
+    def __init__(self, object_bounds: FloatArray, order: IntArray | None = None) -> None:
+        """object_bounds (k, 4): read whenever blocks are bound. order: kept from where the objects were before."""
+        self.order = in_blocks(object_bounds) if order is None else order
+        """(o,) those that have bounds"""
+        self._object_bounds = object_bounds
+        self.bounds: FloatArray = object_bounds[self.order]
+        """(o, 4) of each, in the order"""
+        self.blocks: FloatArray = np.empty((-(-len(self.order) // TOGETHER), 4))
+        """(b, 4) around each block"""
+        self.groups: FloatArray = np.empty((-(-len(self.blocks) // TOGETHER), 4))
+        """(c, 4) around each block of blocks"""
+        _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
+
+    def places(self, things: IntArray) -> IntArray:
+        """Where these objects are in the order, rising."""
+        return np.flatnonzero(np.isin(self.order, things))
+
+    def follow(self, places: IntArray) -> None:
+        """Bound the blocks of the objects at these places, rising, where they are now."""
+        self.bounds[places] = self._object_bounds[self.order[places]]
+        blocks = places // TOGETHER
+        _bound(self.bounds, blocks[np.flatnonzero(np.diff(blocks, prepend=-1))], self.blocks, self.groups)

@@ -1,0 +1,97 @@
+"""Distances of points from the objects of a frame, by the same nearest points as the compiled pass has."""
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import load, norm, subtract
+from robot_side.surroundings.any_kind import nearest
+from robot_side.surroundings.bounds import around
+from robot_side.surroundings.kinds.layout import MESH
+from robot_side.surroundings.scene_table import SceneTable
+
+
+def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Signed distances (p,) in metres, and directions (p, 3), from points (p, 3) to the scene's primitives `rows` (p,).
+
+    Positive outside. The direction is the unit vector along which the distance falls fastest.
+    """
+    distances, directions = np.empty(len(rows)), np.empty((len(rows), 3))
+    points_m = np.ascontiguousarray(points_m)
+    _nearest_loop(points_m, scene.shapes, scene.kinds, rows, distances, directions)
+    meshes = np.flatnonzero(scene.kinds.take(rows) == MESH)
+    if len(meshes):
+        distances[meshes], directions[meshes] = nearest_mesh_points(points_m[meshes], scene, rows[meshes])
+    return distances, directions
+
+
+def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    """The same for rows that are meshes, all of them."""
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
+
+    objects, own = scene.objects, scene.rows_of_kind.take(rows)
+    if objects.mesh_library is None:
+        raise ValueError("rows name meshes although the scene has no library of them")
+    return nearest_mesh_pairs(
+        points_m,
+        objects.mesh_library,
+        objects.mesh_index.take(own),
+        objects.mesh_positions_m.take(own, axis=0),
+        objects.mesh_rotations.take(own, axis=0),
+    )
+
+
+def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTable, reach_m: float) -> FloatArray:
+    """The distance (k,) from spheres (m,) to each object, where it is no more than `reach_m`; else infinite."""
+    gaps: FloatArray = np.full(len(scene.objects.names), np.inf)
+    spheres = np.concatenate([centers_m, radii_m[:, None]], axis=1)
+    _least_gaps(spheres, scene.bounds, scene.shapes, scene.kinds, scene.object_index, reach_m, gaps)
+    for row in np.flatnonzero(scene.kinds == MESH):
+        least = np.linalg.norm(centers_m - scene.bounds[row, :3], axis=1) - radii_m - scene.bounds[row, 3]
+        near = np.flatnonzero(least <= reach_m)
+        if len(near):
+            apart, _ = nearest_mesh_points(centers_m[near], scene, np.full(len(near), row))
+            thing = scene.object_index[row]
+            gaps[thing] = min(gaps[thing], float((apart - radii_m[near]).min()))
+    return np.where(gaps <= reach_m, gaps, np.inf)
+
+
+@compiled(input_array(2), input_array(2), input_indices(), input_indices(), output_array(1), output_array(2))
+def _nearest_loop(
+    points: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    rows: IntArray,
+    distances: FloatArray,
+    directions: FloatArray,
+) -> None:
+    for k in range(rows.size):
+        if kinds[rows[k]] == MESH:
+            continue
+        distances[k], direction = nearest(kinds[rows[k]], shapes, rows[k], load(points, k))
+        for axis in range(3):
+            directions[k, axis] = direction[axis]
+
+
+@compiled(input_array(2), input_array(2), input_array(2), input_indices(), input_indices(), NUMBER, output_array(1))
+def _least_gaps(
+    spheres: FloatArray,
+    bounds: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    objects: IntArray,
+    reach: float,
+    gaps: FloatArray,
+) -> None:
+    """Lower `gaps` (k,) to the distances to all primitives but meshes that bounds do not show to be beyond `reach`."""
+    middle, size = around(spheres, 0, spheres.shape[0])
+    for row in range(kinds.size):
+        if kinds[row] == MESH or norm(subtract(load(bounds, row), middle)) - bounds[row, 3] - size > reach:
+            continue
+        for i in range(spheres.shape[0]):
+            least = gaps[objects[row]]
+            center = load(spheres, i)
+            if norm(subtract(load(bounds, row), center)) - bounds[row, 3] - spheres[i, 3] <= min(reach, least):
+                gap = nearest(kinds[row], shapes, row, center)[0] - spheres[i, 3]
+                gaps[objects[row]] = min(least, gap)

@@ -1,0 +1,223 @@
+"""Boxes {c + Q diag(half) x : |x_i| <= 1}: centre (3), Q by rows (9), half sizes (3)."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, power_of_two_below
+from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract
+from robot_side.overlap.lanes.box_lane import box_lane
+from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.layout import (
+    CLOSING,
+    LEAST_WAY_M,
+    MOST_STEPS,
+    NEVER,
+    OVERLAP,
+    TOUCHING_M,
+    Contact,
+    Nearest,
+    take_over,
+)
+
+
+@inlined
+def place(columns: tuple[FloatArray, FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
+    """Write one box's numbers and bounds; its volume in m³."""
+    centers, rotations, half_sizes = columns
+    half = load(half_sizes, k)
+    for axis in range(3):
+        shape[axis] = bound[axis] = centers[k, axis]
+        shape[12 + axis] = half_sizes[k, axis]
+        for column in range(3):
+            shape[3 + 3 * axis + column] = rotations[k, axis, column]
+    bound[3] = norm(half)
+    return 8.0 * (half[0] * half[1] * half[2])
+
+
+@inlined
+def _axis(shapes: FloatArray, row: int, k: int) -> Vector:
+    """The unit vector along the box's edge k: a column of Q."""
+    return shapes[row, 3 + k], shapes[row, 6 + k], shapes[row, 9 + k]
+
+
+@inlined
+def _along(shapes: FloatArray, row: int, k: int, point: Vector) -> float:
+    """How far `point` lies from the centre along edge k."""
+    return dot(_axis(shapes, row, k), subtract(point, (shapes[row, 0], shapes[row, 1], shapes[row, 2])))
+
+
+@building_block
+def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
+    """The nearest point of the surface of the box in `row`; from inside that of the nearest face."""
+    local = _along(shapes, row, 0, point), _along(shapes, row, 1, point), _along(shapes, row, 2, point)
+    beyond = abs(local[0]) - shapes[row, 12], abs(local[1]) - shapes[row, 13], abs(local[2]) - shapes[row, 14]
+    excess = max(beyond[0], 0.0), max(beyond[1], 0.0), max(beyond[2], 0.0)
+    distance = norm(excess)
+    if distance > 0.0:
+        towards = 0.0, 0.0, 0.0
+        for k in range(3):
+            towards = add(towards, scale(math.copysign(excess[k] / distance, -local[k]), _axis(shapes, row, k)))
+        return distance, towards
+    face = 0
+    for k in (1, 2):
+        if beyond[k] > beyond[face]:
+            face = k
+    return beyond[face], scale(math.copysign(1.0, -local[face]), _axis(shapes, row, face))
+
+
+@building_block
+def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
+    """Where a sphere that moves along the unit vector `along` first touches the box.
+
+    In the box's own frame: each step ends at the plane that touches the box at its nearest point.
+    """
+    x, y, z = _along(shapes, row, 0, start), _along(shapes, row, 1, start), _along(shapes, row, 2, start)
+    u, v, w = (
+        dot(_axis(shapes, row, 0), along),
+        dot(_axis(shapes, row, 1), along),
+        dot(_axis(shapes, row, 2), along),
+    )
+    a, b, c = shapes[row, 12], shapes[row, 13], shapes[row, 14]
+    moved = 0.0
+    for _ in range(MOST_STEPS):
+        # From the nearest point of the box to the centre.
+        i, j, k = x - min(max(x, -a), a), y - min(max(y, -b), b), z - min(max(z, -c), c)
+        distance = math.sqrt(i * i + j * j + k * k)
+        gap = distance - radius
+        if gap < -TOUCHING_M:
+            return moved, 1.0
+        closing = -(i * u + j * v + k * w)
+        if closing <= CLOSING * distance:
+            return NEVER
+        if gap <= TOUCHING_M:
+            return max(moved, LEAST_WAY_M), closing / distance
+        step = gap * distance / closing
+        moved += step
+        if moved > reach:
+            return NEVER
+        x, y, z = x + step * u, y + step * v, z + step * w
+    # A sphere that still moves grazes: it has not touched so far.
+    return moved, 1.0
+
+
+@building_block
+def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
+    """The part of the unit ball with x >= a and y >= b, and the areas of its flat sides at a and at b.
+
+    V = (S - a A - b B) / 3, where the spherical part's area S follows from its boundary's curvature (Gauss and Bonnet).
+    """
+    if a * a + b * b >= 1.0 and a > 0.0 and b > 0.0:
+        return 0.0, 0.0, 0.0
+    a, b = max(a, -1.0), max(b, -1.0)
+    disc_a, disc_b = math.sqrt(1.0 - a * a), math.sqrt(1.0 - b * b)
+    inside = math.sqrt(max(1.0 - a * a - b * b, 0.0))
+    turn_a, turn_b = _arc_cosine(b, disc_a), _arc_cosine(a, disc_b)
+    area_a, area_b = disc_a * disc_a * turn_a - b * inside, disc_b * disc_b * turn_b - a * inside
+    surface = 2.0 * (math.pi - a * turn_a - b * turn_b - _arc_cosine(-a * b, disc_a * disc_b))
+    return max(surface - a * area_a - b * area_b, 0.0) / 3.0, area_a, area_b
+
+
+@inlined
+def _arc_cosine(near: float, far: float) -> float:
+    """The angle whose cosine is near / far; 0 or π beyond."""
+    if abs(near) >= far:
+        return 0.0 if near > 0.0 else math.pi
+    return math.acos(near / far)
+
+
+@inlined
+def _reaches_corner(a: float, b: float, c: float) -> bool:
+    """Whether the unit ball reaches beyond three faces at once."""
+    return max(a, 0.0) ** 2 + max(b, 0.0) ** 2 + max(c, 0.0) ** 2 < 1.0
+
+
+@compiled(*OVERLAP, returns=NUMBER)
+def overlap_one_box(
+    shapes: FloatArray,
+    row: int,
+    x: float,
+    y: float,
+    z: float,
+    radius: float,
+    _meshes: IntArray,
+    push: FloatArray,
+) -> float:
+    """The overlap with a box: the ball less its parts beyond each face, and plus those beyond two; the lane at corners.
+
+    In radii, with faces named 0 to 2 for the upper ones of each axis, 3 to 5 for the lower ones.
+    """
+    a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]
+    axes = (
+        (shapes[row, 3], shapes[row, 6], shapes[row, 9]),
+        (shapes[row, 4], shapes[row, 7], shapes[row, 10]),
+        (shapes[row, 5], shapes[row, 8], shapes[row, 11]),
+    )
+    half, part = (shapes[row, 12], shapes[row, 13], shapes[row, 14]), 1.0 / radius
+    u, v, w = dot(axes[0], (a, b, c)), dot(axes[1], (a, b, c)), dot(axes[2], (a, b, c))
+    push[0] = push[1] = push[2] = 0.0
+    gap = max(abs(u) - half[0], 0.0) ** 2 + max(abs(v) - half[1], 0.0) ** 2 + max(abs(w) - half[2], 0.0) ** 2
+    if gap >= radius * radius:
+        return 0.0
+    away = (
+        *(part * (half[0] - u), part * (half[1] - v), part * (half[2] - w)),
+        *(part * (half[0] + u), part * (half[1] + v), part * (half[2] + w)),
+    )
+    volume, corner, along = 4.0 / 3.0 * math.pi, False, (0.0, 0.0, 0.0)
+    for face in range(6):
+        if away[face] >= 1.0:
+            continue
+        height, area = max(away[face], -1.0), 0.0
+        area += math.pi * (1.0 - height * height)
+        volume -= math.pi / 3.0 * (1.0 - height) * (1.0 - height) * (2.0 + height)
+        for other in range(6):
+            if other % 3 == face % 3 or away[other] >= 1.0:
+                continue
+            beyond, mine, _ = _beyond_edge(away[face], away[other])
+            area -= mine
+            volume += 0.5 * beyond
+            for third in range(other + 1, 6):
+                if third % 3 != face % 3 and third % 3 != other % 3:
+                    corner = corner or _reaches_corner(away[face], away[other], away[third])
+        rising = area if face >= 3 else -area
+        axis = face % 3
+        along = (
+            along[0] + (rising if axis == 0 else 0.0),
+            along[1] + (rising if axis == 1 else 0.0),
+            along[2] + (rising if axis == 2 else 0.0),
+        )
+    if not corner:
+        pushed = add(scale(along[0], axes[0]), add(scale(along[1], axes[1]), scale(along[2], axes[2])))
+        return take_over(max(volume, 0.0), pushed, radius, radius, push)
+    size = power_of_two_below(radius)
+    part = 1.0 / size
+    found, _ = box_lane(
+        *((0.0, 0.0, 0.0), part * radius, (-part * a, -part * b, -part * c), axes),
+        (part * half[0], part * half[1], part * half[2]),
+    )
+    return take_over(found[0], found[1], size, radius, push)
+
+
+def _placed(
+    positions: FloatArray, rotations: FloatArray, offsets: FloatArray, half_sizes: FloatArray
+) -> tuple[Any, ...]:
+    return positions + np.einsum("bij,bj->bi", rotations, offsets), rotations, half_sizes
+
+
+KIND: Final = Kind(
+    "box",
+    (
+        Array("box_centers_m", (3,)),
+        Array("box_rotations", (3, 3), Check.ORTHONORMAL),
+        Array("box_half_sizes_m", (3,), Check.NOT_NEGATIVE),
+    ),
+    placed=_placed,
+    place=place,
+    nearest=nearest,
+    contact=contact,
+    kernel=overlap_one_box,
+    centers=lambda centers, _rotations, _half_sizes: centers,
+    in_box=True,
+)

@@ -1,0 +1,160 @@
+"""Ellipsoids {c + Q diag(a) x : |x| <= 1}: centre (3), Q by rows (9), half axes a (3).
+
+The rule: nearest points by Newton's method on the secular equation (Eberly 2013), contact by tangent planes, overlap by
+adaptive quadrature over plane sections (`ellipsoid_sections`).
+"""
+
+import math
+from typing import Final
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined
+from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
+from robot_side.surroundings.kinds import box
+from robot_side.surroundings.kinds.convex_contact import convex_contact
+from robot_side.surroundings.kinds.ellipsoid_sections import reach_up, rolled, sum_slices
+from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.layout import (
+    OVERLAP,
+    Nearest,
+    take_over,
+)
+
+_NEWTON_STEPS: Final = 60
+
+
+@inlined
+def place(columns: tuple[FloatArray, FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
+    """Write one ellipsoid's numbers and bounds; its volume in m³."""
+    volume = box.place(columns, k, shape, bound)
+    bound[3] = max(shape[12], shape[13], shape[14])
+    return math.pi / 6.0 * volume
+
+
+@inlined
+def _turned_back(shapes: FloatArray, row: int, vector: Vector) -> Vector:
+    x, y, z = vector
+    return (
+        shapes[row, 3] * x + shapes[row, 6] * y + shapes[row, 9] * z,
+        shapes[row, 4] * x + shapes[row, 7] * y + shapes[row, 10] * z,
+        shapes[row, 5] * x + shapes[row, 8] * y + shapes[row, 11] * z,
+    )
+
+
+@inlined
+def _turned(shapes: FloatArray, row: int, vector: Vector) -> Vector:
+    return (
+        dot((shapes[row, 3], shapes[row, 4], shapes[row, 5]), vector),
+        dot((shapes[row, 6], shapes[row, 7], shapes[row, 8]), vector),
+        dot((shapes[row, 9], shapes[row, 10], shapes[row, 11]), vector),
+    )
+
+
+@inlined
+def _local(shapes: FloatArray, row: int, point: Vector) -> Vector:
+    return _turned_back(shapes, row, subtract(point, (shapes[row, 0], shapes[row, 1], shapes[row, 2])))
+
+
+@building_block
+def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
+    """Signed distance of a point from the surface, and the unit normal at the nearest point, in the own frame.
+
+    The nearest point is y_i = a_i² x_i / (a_i² + t), where t solves F(t) = Σ (a_i x_i / (a_i² + t))² - 1 = 0. F falls
+    and is convex, and starts at 2 or less where its largest term is 1: Newton's method climbs to the root from there.
+    """
+    least = 0
+    if a[1] < a[least]:
+        least = 1
+    if a[2] < a[least]:
+        least = 2
+    lowest = -a[least] * a[least] * (1.0 - 1e-14)
+    t = max(a[0] * (abs(x[0]) - a[0]), a[1] * (abs(x[1]) - a[1]), a[2] * (abs(x[2]) - a[2]), lowest)
+    for _ in range(_NEWTON_STEPS):
+        p, q, r = a[0] * a[0] + t, a[1] * a[1] + t, a[2] * a[2] + t
+        u, v, w = a[0] * x[0] / p, a[1] * x[1] / q, a[2] * x[2] / r
+        excess, slope = u * u + v * v + w * w - 1.0, -2.0 * (u * u / p + v * v / q + w * w / r)
+        if excess <= 0.0:
+            break
+        step = -excess / slope
+        t += step
+        if step <= 1e-16 * abs(t):
+            break
+    p, q, r = a[0] * a[0] + t, a[1] * a[1] + t, a[2] * a[2] + t
+    u, v, w = a[0] * x[0] / p, a[1] * x[1] / q, a[2] * x[2] / r
+    missing = 1.0 - u * u - v * v - w * w
+    if missing > 0.0:
+        # On the plane of the two longer axes, near the middle: the nearest points lie above and below it.
+        if least == 0:
+            u = math.copysign(math.sqrt(u * u + missing), x[0])
+        elif least == 1:
+            v = math.copysign(math.sqrt(v * v + missing), x[1])
+        else:
+            w = math.copysign(math.sqrt(w * w + missing), x[2])
+    normal = u / a[0], v / a[1], w / a[2]
+    length = norm(normal)
+    return t * length, scale(1.0 / length, normal)
+
+
+@building_block
+def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
+    """The nearest point of the surface of the ellipsoid in `row`."""
+    distance, normal = _surface((shapes[row, 12], shapes[row, 13], shapes[row, 14]), _local(shapes, row, point))
+    return distance, _turned(shapes, row, scale(-1.0, normal))
+
+
+contact = convex_contact(nearest)
+
+
+@compiled(*OVERLAP, returns=NUMBER)
+def overlap_one_ellipsoid(
+    shapes: FloatArray,
+    row: int,
+    x: float,
+    y: float,
+    z: float,
+    radius: float,
+    _meshes: IntArray,
+    push: FloatArray,
+) -> float:
+    """The overlap with an ellipsoid, by sections across the axis that the nearest normal is closest to; in radii."""
+    half = scale(1.0 / radius, (shapes[row, 12], shapes[row, 13], shapes[row, 14]))
+    center = scale(1.0 / radius, _local(shapes, row, (x, y, z)))
+    distance, normal = _surface(half, center)
+    push[0] = push[1] = push[2] = 0.0
+    if distance >= 1.0:
+        return 0.0
+    if distance <= -1.0:
+        return take_over(4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0), radius, radius, push)
+    axis = 0
+    for k in (1, 2):
+        if abs(normal[k]) > abs(normal[axis]):
+            axis = k
+    half, center, normal = rolled(half, axis), rolled(center, axis), rolled(normal, axis)
+    low = max(center[2] - reach_up(-normal[2], distance), -half[2])
+    high = min(center[2] + reach_up(normal[2], distance), half[2])
+    between = min(max(center[2] - distance * normal[2], low), high)
+    below, downward = sum_slices(center, half, low, between)
+    above, upward = sum_slices(center, half, between, high)
+    # Back from the order of the axes: rolling by 1 - axis undoes it.
+    pushed = add(downward, upward)
+    pushed = (
+        (pushed[2], pushed[0], pushed[1]) if axis == 0 else ((pushed[1], pushed[2], pushed[0]) if axis == 1 else pushed)
+    )
+    return take_over(max(below + above, 0.0), _turned(shapes, row, pushed), radius, radius, push)
+
+
+KIND: Final = Kind(
+    "ellipsoid",
+    (
+        Array("ellipsoid_centers_m", (3,)),
+        Array("ellipsoid_rotations", (3, 3), Check.ORTHONORMAL),
+        Array("ellipsoid_half_axes_m", (3,), Check.NOT_NEGATIVE),
+    ),
+    placed=lambda positions, rotations, half_axes: (positions, rotations, half_axes),
+    place=place,
+    nearest=nearest,
+    contact=contact,
+    kernel=overlap_one_ellipsoid,
+    centers=lambda centers, _rotations, _half_axes: centers,
+    in_box=True,
+)

@@ -1,0 +1,63 @@
+"""Half-spaces, solid where normal·x <= offset: normal (3), offset."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import inlined
+from robot_side.compiled.vectors import Vector, dot, negative
+from robot_side.overlap.closed_forms.half_space import half_space_overlap
+from robot_side.overlap.closed_forms.solid import Overlap
+from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, NEVER, TOUCHING_M, Contact, Nearest
+
+
+@inlined
+def place(columns: tuple[FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
+    """Write one half-space's numbers and bounds; its volume has no end."""
+    normals, offsets = columns
+    for axis in range(3):
+        shape[axis], bound[axis] = normals[k, axis], 0.0
+    shape[3], bound[3] = offsets[k], math.inf
+    return math.inf
+
+
+@inlined
+def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
+    """The nearest point of the plane in `row`."""
+    normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
+    return dot(normal, point) - shapes[row, 3], negative(normal)
+
+
+@inlined
+def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
+    """Where a sphere that moves along the unit vector `along` touches the plane."""
+    normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
+    gap, closing = dot(normal, start) - shapes[row, 3] - radius, -dot(normal, along)
+    if gap < -TOUCHING_M:
+        return 0.0, 1.0
+    return (max(gap / closing, LEAST_WAY_M), closing) if closing > CLOSING else NEVER
+
+
+@inlined
+def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
+    """The exact overlap of a sphere with the half-space in `row` (eq. 12)."""
+    return half_space_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
+
+
+def _placed(positions: FloatArray, rotations: FloatArray) -> tuple[Any, ...]:
+    normals = np.ascontiguousarray(rotations[:, :, 2])
+    return normals, np.einsum("pi,pi->p", normals, positions)
+
+
+KIND: Final = Kind(
+    "half_space",
+    (Array("half_space_normals", (3,), Check.UNIT), Array("half_space_offsets_m", ())),
+    placed=_placed,
+    place=place,
+    nearest=nearest,
+    contact=contact,
+    overlap=overlap,
+)

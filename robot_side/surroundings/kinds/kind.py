@@ -1,0 +1,110 @@
+"""What a kind of primitive says of itself: one descriptor a kind, from which every list of kinds follows.
+
+The rule: a kind is one file with one `KIND`, named once in `perceived.KINDS` beside its arrays. The regret: a kernel
+takes no list of arrays, so `by_kind` builds its if-chain of closures, one inside another, and types end at `Any`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_side.compiled.kernel import Compiled, inlined
+
+Row = tuple[int, ...]
+"""The shape of an array's rows."""
+
+
+class Check(Enum):
+    """What the numbers of an array must be, besides finite."""
+
+    FINITE = auto()
+    NOT_NEGATIVE = auto()
+    UNIT = auto()
+    ORTHONORMAL = auto()
+    INDEX = auto()
+
+
+class Array(NamedTuple):
+    """An array of a frame with a row for each primitive of a kind."""
+
+    name: str
+    row: Row
+    check: Check = Check.FINITE
+
+    @property
+    def type(self) -> type:
+        """The type of the values."""
+        return np.int64 if self.check is Check.INDEX else np.float64
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """One kind of primitive; k counts its primitives, `columns` are arrays as `read` returns them."""
+
+    name: str
+    arrays: tuple[Array, ...]
+    """Where it is, and how large"""
+    placed: Callable[..., tuple[Any, ...]]
+    """From positions (k, 3) and rotations (k, 3, 3) of their own frames, and sizes in these, to the arrays' values"""
+    place: Callable[..., float]
+    """(columns, row, shape (15,), bounds (4,)) to the volume in m³: writes the last two. Compiled, as all below."""
+    nearest: Callable[..., Any]
+    """(shapes (n, 15), row, point) to Nearest"""
+    contact: Callable[..., Any]
+    """(shapes (n, 15), row, start, radius, along, reach) to Contact"""
+    overlap: Callable[..., Any] | None = None
+    """(shapes (n, 15), row, center, radius) to Overlap, where that is short; else `kernel` has it"""
+    kernel: Compiled | None = None
+    """The kernel of overlaps with the signature OVERLAP; a scene loads those of its own kinds alone"""
+    centers: Callable[..., Any] | None = None
+    """(columns) to centres (k, 3) in metres; None where it has no end"""
+    in_box: bool = False
+    """Whether its first columns are a box around it: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
+    rows: tuple[Row, ...] | None = None
+    """Of the columns, where they are not the arrays"""
+    derive: Callable[[Any], tuple[Any, ...]] | None = None
+    """Makes such columns from a frame"""
+
+    @cached_property
+    def owner(self) -> str:
+        """The field that holds each primitive's object."""
+        return f"{self.name}_object"
+
+    @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """The names of the arrays that may differ from frame to frame: all but indices."""
+        return tuple(array.name for array in self.arrays if array.check is not Check.INDEX)
+
+    @property
+    def column_rows(self) -> tuple[Row, ...]:
+        """The shapes of the columns' rows."""
+        return self.rows or tuple(array.row for array in self.arrays)
+
+    def read(self, objects: Any) -> tuple[Any, ...]:
+        """The columns of a frame."""
+        return self.derive(objects) if self.derive else tuple([getattr(objects, name) for name in self.fields])
+
+
+def by_kind(functions: Sequence[Callable[..., Any]], first: int = 0) -> Any:
+    """Make the function of a kind's number and arguments that calls the one at this place, the last for any other."""
+    function, *others = functions
+    if not others:
+
+        @inlined
+        def last(_kind: int, *arguments: Any) -> Any:
+            return function(*arguments)
+
+        return last
+    rest = by_kind(others, first + 1)
+
+    @inlined
+    def chosen(kind: int, *arguments: Any) -> Any:
+        if kind == first:
+            return function(*arguments)
+        return rest(kind, *arguments)
+
+    return chosen

@@ -1,0 +1,63 @@
+"""What the kinds share: their numbers, and a row of 15 numbers for the shape of any of them."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array
+from robot_side.compiled.vectors import Vector
+from robot_side.overlap.closed_forms.solid import sphere_volume
+
+SPHERE: Final = 0
+BOX: Final = 1
+TETRAHEDRON: Final = 2
+HALF_SPACE: Final = 3
+MESH: Final = 4
+"""A mesh has the layout of the box around it. Contact and overlap come from `placed_meshes`, by address."""
+SHAPE_NUMBERS: Final = 15
+
+Nearest = tuple[float, Vector]
+"""Signed distance, positive outside, and the unit vector along which it falls fastest: towards the nearest point from
+outside, away from it from inside, the same on both sides of a face."""
+Contact = tuple[float, float]
+"""The distance along û at which a moving sphere first touches, and û·n of the plane in which it does so: 0 and 1 where
+it overlaps already; infinite and 0 for never, or beyond a given reach."""
+NEVER: Final[Contact] = (math.inf, 0.0)
+ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
+"""For a point from which every way is as long."""
+
+
+def rows(*columns: FloatArray) -> FloatArray:
+    """Shapes (k, 15) from columns (k, ...) that follow each other, the rest 0."""
+    count = len(columns[0])
+    flat = [column.reshape(count, math.prod(column.shape[1:])) for column in columns]
+    used = sum(column.shape[1] for column in flat)
+    return np.concatenate([*flat, np.zeros((count, SHAPE_NUMBERS - used))], axis=1)
+
+
+OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMBER, NUMBER, BUNDLE, output_array(1)),)
+"""What a kernel of overlaps takes: shapes (n, 15), the row, the sphere's centre and radius, the scene's meshes, and
+room (3,) for dV/dcentre. It returns V."""
+CONTACT: Final[tuple[Any, ...]] = (BUNDLE, COUNT, *(NUMBER,) * 8, TRUTH)
+"""What a kernel of contacts with meshes takes (see `placed_meshes`)."""
+TOUCHING_M: Final = 1e-7
+"""What is no farther off, and no deeper, than this touches: it overlaps by nothing yet, and may go on to do so."""
+LEAST_WAY_M: Final = 1e-12
+"""The way to what is touched already; 0 is that to what overlaps."""
+CLOSING: Final = 1e-9
+"""Slower than this share of the way, what is beside does not come nearer."""
+MOST_STEPS: Final = 60
+
+
+@inlined
+def take_over(volume: float, gradient: Vector, size: float, radius: float, push: FloatArray) -> float:
+    """Take over what was found in units of `size`; the whole sphere where the numbers overflowed, which is early."""
+    area = size * size
+    if not math.isfinite(volume + gradient[0] + gradient[1] + gradient[2]):
+        push[0] = push[1] = push[2] = 0.0
+        return sphere_volume(radius)
+    push[0], push[1], push[2] = gradient[0] * area, gradient[1] * area, gradient[2] * area
+    return volume * area * size

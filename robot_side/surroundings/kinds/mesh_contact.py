@@ -1,0 +1,169 @@
+"""Closed meshes, convex or not: where a moving sphere begins to enter one.
+
+The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So
+only the triangles in front count, those with n·û < 0: the next rise begins where the sphere next touches one.
+Everything here is in the mesh's own frame; the walks are those of `tree_queries`.
+"""
+
+import math
+from typing import Final, NamedTuple
+
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
+from robot_side.overlap.meshes.mesh_tables import MeshTables
+from robot_side.overlap.meshes.tree_queries import (
+    corner_of,
+    is_clear_of,
+    to_triangle,
+    touches_surface,
+    winding_number,
+)
+from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, TOUCHING_M
+
+_ENLARGED: Final = 1.0 + 1e-9
+"""Bounds are enlarged by this, so that rounding never passes over what is touched."""
+
+
+class Sweep(NamedTuple):
+    """A sphere that moves from `start` along the unit vector `along`, as far as `reach`."""
+
+    start: Vector
+    along: Vector
+    radius: float
+    reach: float
+
+
+@building_block
+def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
+    """Whether a sphere overlaps a mesh at its start, deeper than what only touches."""
+    if is_clear_of(tables, mesh, sweep.start, sweep.radius):
+        return False
+    if touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M):
+        return True
+    if is_clear_of(tables, mesh, sweep.start, 0.0):
+        return False
+    return winding_number(tables, mesh, sweep.start) > 0
+
+
+@building_block
+def _node_is_passed(tables: MeshTables, node: int, sweep: Sweep) -> bool:
+    """Whether the sweep misses a node's box, enlarged by the radius."""
+    enter, leave = 0.0, sweep.reach
+    grown = sweep.radius * _ENLARGED + TOUCHING_M
+    for axis in range(3):
+        low = tables.boxes[node, axis] - grown - sweep.start[axis]
+        high = tables.boxes[node, 3 + axis] + grown - sweep.start[axis]
+        speed = sweep.along[axis]
+        if abs(speed) * sweep.reach < 1e-12:
+            if low > 0.0 or high < 0.0:
+                return True
+            continue
+        first, last = low / speed, high / speed
+        enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+    return enter > leave
+
+
+@inlined
+def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep) -> bool:
+    """Whether the sweep misses the ball around a triangle, or the triangle faces away."""
+    normal = corner_of(tables, triangle, 3)
+    if dot(normal, sweep.along) >= -CLOSING:
+        return True
+    offset = subtract(load(tables.spheres, triangle), sweep.start)
+    part = min(max(dot(offset, sweep.along), 0.0), sweep.reach)
+    apart = subtract(offset, scale(part, sweep.along))
+    most: float = (tables.spheres[triangle, 3] + sweep.radius) * _ENLARGED + TOUCHING_M
+    return dot(apart, apart) > most * most
+
+
+@building_block
+def _touch(tables: MeshTables, triangle: int, sweep: Sweep, best: float) -> float:
+    """The way at which the sphere first touches a triangle in front, 0 where it does; `best` or more if it is beyond.
+
+    The triangle enlarged by the radius is a prism, three cylinders and three balls: the first of these counts.
+    """
+    start, along, radius = sweep.start, sweep.along, sweep.radius
+    normal = corner_of(tables, triangle, 3)
+    a = subtract(corner_of(tables, triangle, 0), start)
+    b = subtract(corner_of(tables, triangle, 1), start)
+    c = subtract(corner_of(tables, triangle, 2), start)
+    height, closing = -dot(normal, a), -dot(normal, along)
+    if height < -radius:
+        return math.inf
+    way = (height - radius) / closing
+    if way >= best:
+        return math.inf
+    if way >= 0.0:
+        foot = add(scale(way, along), scale(-radius, normal))
+        inside = (
+            dot(cross(subtract(a, foot), subtract(b, foot)), normal) >= 0.0
+            and dot(cross(subtract(b, foot), subtract(c, foot)), normal) >= 0.0
+            and dot(cross(subtract(c, foot), subtract(a, foot)), normal) >= 0.0
+        )
+        if inside:
+            return way
+    towards = to_triangle(tables, triangle, start)
+    distance = norm(towards)
+    if distance <= radius + TOUCHING_M:
+        return 0.0 if dot(towards, along) > CLOSING * distance or distance < radius - TOUCHING_M else math.inf
+    least = min(_corner_touch(a, along, radius), _corner_touch(b, along, radius), _corner_touch(c, along, radius))
+    least = min(least, _edge_touch(a, b, along, radius))
+    least = min(least, _edge_touch(b, c, along, radius))
+    return min(least, _edge_touch(c, a, along, radius))
+
+
+@inlined
+def _corner_touch(corner: Vector, along: Vector, radius: float) -> float:
+    """The way at which a sphere that starts at the origin, clear of it, touches a corner."""
+    ahead, apart = dot(corner, along), dot(corner, corner) - radius * radius
+    inside = ahead * ahead - apart
+    if ahead <= 0.0 or inside < 0.0:
+        return math.inf
+    found: float = max(apart, 0.0) / (ahead + math.sqrt(inside))
+    return found
+
+
+@inlined
+def _edge_touch(first: Vector, second: Vector, along: Vector, radius: float) -> float:
+    """And an edge, between its ends."""
+    edge = subtract(second, first)
+    squared_length = dot(edge, edge)
+    slant, lean = dot(edge, along), dot(edge, first)
+    # What is across the edge, of the way and of the way to the edge, by squares of its length.
+    across = squared_length - slant * slant
+    ahead = squared_length * dot(first, along) - lean * slant
+    apart = squared_length * (dot(first, first) - radius * radius) - lean * lean
+    inside = ahead * ahead - across * apart
+    if ahead <= 0.0 or inside < 0.0:
+        return math.inf
+    way = max(apart, 0.0) / (ahead + math.sqrt(inside))
+    place = way * slant - lean
+    return way if 0.0 <= place <= squared_length else math.inf
+
+
+@building_block
+def way(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
+    """The way at which the overlap begins to rise, 0 where there is one; infinite beyond the reach."""
+    if overlaps(tables, mesh, sweep):
+        return 0.0
+    return max(next_touch(tables, mesh, sweep), LEAST_WAY_M)
+
+
+@building_block
+def next_touch(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
+    """The way at which the sphere next touches a triangle in front, 0 where it does; infinite beyond the reach."""
+    best = math.inf
+    node, end = tables.roots[mesh], tables.roots[mesh + 1]
+    while node < end and best > 0.0:
+        if _node_is_passed(tables, node, sweep):
+            node = tables.links[3 * node]
+            continue
+        first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(first, first + size):
+            if not _is_passed(tables, triangle, sweep):
+                found = _touch(tables, triangle, sweep, best)
+                if found < best:
+                    # Nothing beyond the nearest touch so far counts.
+                    best, sweep = found, Sweep(sweep.start, sweep.along, sweep.radius, min(sweep.reach, found))
+        node += 1
+    return best if best <= sweep.reach else math.inf

@@ -1,0 +1,63 @@
+"""Spheres: centre (3), radius."""
+
+import math
+from typing import Final
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import inlined
+from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
+from robot_side.overlap.closed_forms.ball import sphere_overlap
+from robot_side.overlap.closed_forms.solid import Overlap
+from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, NEVER, TOUCHING_M, Contact, Nearest
+
+
+@inlined
+def place(columns: tuple[FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
+    """Write one sphere's numbers and bounds; its volume in m³."""
+    centers, radii = columns
+    for axis in range(3):
+        shape[axis] = bound[axis] = centers[k, axis]
+    shape[3] = bound[3] = radii[k]
+    return 4.0 / 3.0 * math.pi * float(radii[k] ** 3)
+
+
+@inlined
+def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
+    """The nearest point of the sphere in `row`."""
+    offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), point)
+    length = norm(offset)
+    return length - shapes[row, 3], unit(offset) if length > 0.0 else ANY_DIRECTION
+
+
+@inlined
+def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
+    """Where a sphere that moves along the unit vector `along` touches the one in `row`."""
+    offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), start)
+    reach = shapes[row, 3] + radius
+    ahead, apart = dot(offset, along), dot(offset, offset) - reach * reach
+    if apart < -2.0 * reach * TOUCHING_M:
+        return 0.0, 1.0
+    inside = ahead * ahead - apart
+    if ahead <= 0.0 or inside < 0.0:
+        return NEVER
+    found = max(apart / (ahead + math.sqrt(inside)), LEAST_WAY_M)
+    return found, (ahead - found) / reach
+
+
+@inlined
+def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
+    """The exact overlap of a sphere with the one in `row` (eq. 11)."""
+    return sphere_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
+
+
+KIND: Final = Kind(
+    "sphere",
+    (Array("sphere_centers_m", (3,)), Array("sphere_radii_m", (), Check.NOT_NEGATIVE)),
+    placed=lambda positions, _rotations, radii: (positions, radii),
+    place=place,
+    nearest=nearest,
+    contact=contact,
+    overlap=overlap,
+    centers=lambda centers, _radii: centers,
+)

@@ -1,0 +1,72 @@
+"""Overlap of a sphere with one primitive of any kind (eq. 11-12): short closed forms in place, others by address.
+
+A scene compiles the kernels of its own kinds alone. Boxes, tetrahedra and meshes: the lanes of `robot_side.overlap`
+without the precise forms, exact to 1e-13 of the sphere. Ellipsoids: quadrature, to some 1e-9. A strength needs 1e-3.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.kernel import NUMBER, inlined
+from robot_side.compiled.vectors import Vector
+from robot_side.surroundings.kinds.kind import by_kind
+from robot_side.surroundings.kinds.layout import OVERLAP
+from robot_side.surroundings.perceived import KINDS
+
+_by_address = call_at_address(NUMBER, OVERLAP)
+
+
+def _overlap(number: int, closed_form: Callable[..., Any] | None) -> Callable[..., float]:
+    @inlined
+    def called(
+        kernels: IntArray,
+        shapes: FloatArray,
+        row: int,
+        center: Vector,
+        radius: float,
+        meshes: IntArray,
+        push: FloatArray,
+    ) -> float:
+        found: float = _by_address(kernels[number], (shapes, row, *center, radius, meshes, push))
+        return found
+
+    if closed_form is None:
+        return called
+
+    @inlined
+    def worked_out(
+        _kernels: IntArray,
+        shapes: FloatArray,
+        row: int,
+        center: Vector,
+        radius: float,
+        _meshes: IntArray,
+        push: FloatArray,
+    ) -> float:
+        volume, gradient, _ = closed_form(shapes, row, center, radius)
+        push[0], push[1], push[2] = gradient
+        found: float = volume
+        return found
+
+    return worked_out
+
+
+_overlap_by_kind = by_kind([_overlap(number, kind.overlap) for number, kind in enumerate(KINDS)])
+
+
+@inlined
+def overlap(
+    kind: int,
+    kernels: IntArray,
+    shapes: FloatArray,
+    row: int,
+    center: Vector,
+    radius: float,
+    meshes: IntArray,
+    push: FloatArray,
+) -> float:
+    """V of a sphere and the primitive in `row`; `push` (3,) takes dV/dcentre. kernels: addresses by kind."""
+    found: float = _overlap_by_kind(kind, kernels, shapes, row, center, radius, meshes, push)
+    return found

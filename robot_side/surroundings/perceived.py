@@ -1,0 +1,115 @@
+"""What the camera reports: objects as spheres, boxes, tetrahedra, half-spaces, meshes, ellipsoids, each with a role."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Final, Protocol
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphere, tetrahedron
+
+if TYPE_CHECKING:
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
+
+
+class Role(Enum):
+    """What an object is to the task."""
+
+    OBSTACLE = "obstacle"
+    TARGET = "target"
+    SUPPORT = "support"
+    IGNORED = "ignored"
+
+
+KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)
+"""The kinds by their numbers in `kinds.layout`; their fields are those of PerceivedObjects."""
+
+
+@dataclass(frozen=True, eq=False)
+class PerceivedObjects:
+    """Every object at its perceived pose, in the world frame, as contiguous arrays by kind of primitive.
+
+    An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`.
+    Ignored objects have no primitives. Each frame is equal to itself alone.
+    """
+
+    time_s: float
+    """When the frame was taken."""
+    names: tuple[str, ...]
+    roles: tuple[Role, ...]
+    sphere_centers_m: FloatArray
+    """(s, 3)"""
+    sphere_radii_m: FloatArray
+    """(s,)"""
+    sphere_object: IntArray
+    box_centers_m: FloatArray
+    """(b, 3)"""
+    box_rotations: FloatArray
+    """(b, 3, 3) box to world"""
+    box_half_sizes_m: FloatArray
+    """(b, 3)"""
+    box_object: IntArray
+    tetrahedron_vertices_m: FloatArray
+    """(t, 4, 3)"""
+    tetrahedron_object: IntArray
+    half_space_normals: FloatArray
+    """(p, 3) unit; solid where normal·x <= offset"""
+    half_space_offsets_m: FloatArray
+    """(p,)"""
+    half_space_object: IntArray
+    mesh_library: "MeshLibrary | None" = None
+    """The shapes that meshes may have, prepared once for all frames; None without meshes."""
+    mesh_index: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """(q,) into `mesh_library`"""
+    mesh_positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    """(q, 3) where the origins of the meshes' own frames are"""
+    mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    """(q, 3, 3) mesh to world"""
+    mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    ellipsoid_centers_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    """(e, 3)"""
+    ellipsoid_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    """(e, 3, 3) ellipsoid to world"""
+    ellipsoid_half_axes_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    """(e, 3)"""
+    ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    positions_m: FloatArray | None = None
+    """(k, 3) of each object's own frame, that of its first primitive, in the world frame; None where nobody knows"""
+    rotations: FloatArray | None = None
+    """(k, 3, 3) object to world, with `positions_m`"""
+    velocities_m_s: FloatArray | None = None
+    """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
+    since: "tuple[SomeObjects, PerceivedObjects] | None" = field(default=None, init=False, repr=False)
+    """Which objects may be elsewhere than in an earlier frame, and the frame of these alone; None: any may be."""
+
+
+class SomeObjects(Protocol):
+    """Objects of a frame that may be elsewhere in the next ones (see `movers`)."""
+
+    first: PerceivedObjects
+    things: IntArray
+    rows: Mapping[str, IntArray]
+
+    @property
+    def at_first(self) -> PerceivedObjects:
+        """These alone, as they are in `first`."""
+        ...
+
+    def place_of(self, thing: int) -> int | None:
+        """Which of these an object is; None for another one."""
+        ...
+
+
+class ObjectSource(Protocol):
+    """A camera with segmentation, simulated or real."""
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
+        ...
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change what the object `name` is to the task, from the next frame on."""
+        ...

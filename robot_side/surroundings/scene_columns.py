@@ -1,0 +1,81 @@
+"""A scene as kernels read it: primitives in rows, objects, and blocks of objects; contact with any of them."""
+
+from typing import Final, NamedTuple
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.columns import BUNDLED, INDICES, NUMBERS, Declared, rows
+from robot_side.compiled.kernel import NUMBER, inlined
+from robot_side.compiled.vectors import Vector
+from robot_side.surroundings.any_kind import contact
+from robot_side.surroundings.blocks import TOGETHER
+from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.kinds.layout import CONTACT, MESH, SHAPE_NUMBERS, Contact
+
+
+class SceneColumns(NamedTuple):
+    """The columns; the fields are those of SceneTable."""
+
+    bounds: FloatArray
+    shapes: FloatArray
+    kinds: IntArray
+    first_rows: IntArray
+    object_bounds: FloatArray
+    object_volumes: FloatArray
+    object_order: IntArray
+    ordered_bounds: FloatArray
+    block_bounds: FloatArray
+    group_bounds: FloatArray
+    kernels: IntArray
+    meshes: IntArray
+
+
+SCENE: Final = Declared(
+    SceneColumns,
+    *(rows(4), rows(SHAPE_NUMBERS), INDICES, INDICES, rows(4), NUMBERS),
+    *(INDICES, rows(4), rows(4), rows(4), INDICES, BUNDLED),
+)
+_mesh_contact = call_at_address(NUMBER, CONTACT)
+
+
+@inlined
+def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float) -> float:
+    """The distance at which a sphere next touches a triangle in front of a mesh; infinite beyond the reach."""
+    found: float = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, True))
+    return found
+
+
+@inlined
+def contact_with(
+    scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float, clear: bool
+) -> Contact:
+    """Where a sphere first touches the primitive in `row`; û·n is 0 for a mesh, of which it bounds nothing.
+
+    clear: it is known not to overlap, which a mesh need not be asked then.
+    """
+    kind = scene.kinds[row]
+    found, closing = contact(kind, scene.shapes, row, start, radius, along, reach)
+    if kind == MESH and found <= reach:
+        # So far it was the box around the mesh.
+        found = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
+        closing = 0.0
+    return found, closing
+
+
+@inlined
+def next_object(scene: SceneColumns, place: int, center: Vector, along: Vector, reach: float, radius: float) -> int:
+    """The first place in the order, from `place` on, of an object that a swept sphere may meet; blocks first."""
+    size = scene.object_order.size
+    while place < size:
+        block = place // TOGETHER
+        if place % (TOGETHER * TOGETHER) == 0 and not passes(
+            center, along, reach, scene.group_bounds, block // TOGETHER, radius
+        ):
+            place += TOGETHER * TOGETHER
+        elif place % TOGETHER == 0 and not passes(center, along, reach, scene.block_bounds, block, radius):
+            place += TOGETHER
+        elif passes(center, along, reach, scene.ordered_bounds, place, radius):
+            break
+        else:
+            place += 1
+    return place

@@ -1,0 +1,69 @@
+"""What is perceived has one owner: it makes and keeps the tables of the newest frames, the target and its centre."""
+
+from typing import Final
+
+from common.arrays import FloatArray
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.scene_table import SceneTable, go_to, make, moved_table
+from robot_side.surroundings.target import object_centers
+from robot_side.surroundings.validity import require_valid
+
+_KEPT: Final = 8
+"""The number of frames whose tables are kept"""
+
+
+class Surroundings:
+    """The frames seen lately, and what follows from each."""
+
+    def __init__(self) -> None:
+        self._tables: dict[int, SceneTable] = {}
+        """By the identity of the frame that each was made of"""
+        self._target: tuple[object, int | None] = (None, None)
+        """The roles that were searched last, and what was found"""
+        self._centers: tuple[PerceivedObjects, FloatArray] | None = None
+        """The frame whose centres were worked out last, and these"""
+
+    def see(self, frame: PerceivedObjects) -> SceneTable:
+        """The table of a frame, made when it is first seen; ValueError for what `require_valid` refuses.
+
+        A frame that says what is new since an earlier one shares that one's table, which is updated in
+        place. Asking for another of these frames updates the table again. A frame that is refused changes nothing.
+        """
+        first = frame if frame.since is None else frame.since[0].first
+        for kept in (first, frame):
+            known = self._tables.get(id(kept))
+            if known is not None and known.objects is frame:
+                return known
+        table = self._tables.get(id(first))
+        if table is None:
+            require_valid(first)
+            last = next(reversed(self._tables.values()), None)
+            moved = None if last is None else moved_table(last, first)
+            table = self._keep(first, make(first) if moved is None else moved)
+        if table.objects is not frame and not go_to(table, frame):
+            return self._keep(frame, make(frame))
+        return table
+
+    def target(self, frame: PerceivedObjects) -> int | None:
+        """The object whose role is the target; None when there is none."""
+        # Frames share their roles, which may be many.
+        if self._target[0] is not frame.roles:
+            self._target = frame.roles, frame.roles.index(Role.TARGET) if Role.TARGET in frame.roles else None
+        return self._target[1]
+
+    def center_m(self, frame: PerceivedObjects, index: int) -> FloatArray:
+        """The row (3,) of `object_centers` of one object, at the cost of what is new in the frame."""
+        if frame.since is not None:
+            movers, moved = frame.since
+            place = movers.place_of(index)
+            frame, index = (movers.first, index) if place is None else (moved, place)
+        if self._centers is None or self._centers[0] is not frame:
+            self._centers = frame, object_centers(frame)
+        center_m: FloatArray = self._centers[1][index]
+        return center_m
+
+    def _keep(self, frame: PerceivedObjects, table: SceneTable) -> SceneTable:
+        self._tables[id(frame)] = table
+        if len(self._tables) > _KEPT:
+            del self._tables[next(iter(self._tables))]
+        return table

@@ -1,0 +1,52 @@
+"""Which object is the target: found in a frame, and switched by the operator's button."""
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+
+_OFF_AXIS_WEIGHT = 3.0
+"""A metre off the approach axis puts an object as far back in the order as three along it."""
+
+
+def object_centers(objects: PerceivedObjects) -> FloatArray:
+    """(k, 3) the mean of each object's primitives' centres, in metres; NaN for half-spaces and ignored objects.
+
+    A mesh's centre is that of its bounding box in its own frame.
+    """
+    count = len(objects.names)
+    parts = [(kind.centers(*kind.read(objects)), getattr(objects, kind.owner)) for kind in KINDS if kind.centers]
+    centers, owners = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    counts = np.bincount(owners, minlength=count)
+    sums = np.column_stack([np.bincount(owners, weights=centers[:, axis], minlength=count) for axis in range(3)])
+    with np.errstate(invalid="ignore"):
+        centers_m: FloatArray = sums / np.where(counts > 0.0, counts, np.nan)[:, None]
+    return centers_m
+
+
+def next_target(
+    objects: PerceivedObjects,
+    present: int | None,
+    centers_m: FloatArray,
+    tool_position_m: FloatArray,
+    approach: FloatArray,
+) -> str | None:
+    """The object to become the target when the operator asks for another one; None when there is no other.
+
+    The obstacles and the target ahead of the tool stand in an order of nearness along the approach axis; the
+    one after the `present` target follows it, and the first one follows the last, or a target without a centre.
+    centers_m (k, 3) from `object_centers`; `approach` is a unit vector (3,) in the world frame.
+    """
+    offsets = centers_m - tool_position_m
+    along = offsets @ approach
+    across = np.linalg.norm(offsets - along[:, None] * approach, axis=1)
+    eligible = [
+        index
+        for index, role in enumerate(objects.roles)
+        if (role is Role.OBSTACLE and along[index] > 0.0) or (role is Role.TARGET and np.isfinite(along[index]))
+    ]
+    order = sorted(eligible, key=lambda index: along[index] + _OFF_AXIS_WEIGHT * across[index])
+    if present is None or present not in order:
+        return objects.names[order[0]] if order else None
+    follower = order[(order.index(present) + 1) % len(order)]
+    return None if follower == present else objects.names[follower]

@@ -1,0 +1,324 @@
+"""Several connections of one peer: in turn, everywhere, broken off, taken over, and not read any more."""
+
+import fcntl
+import socket
+import struct
+from collections import Counter
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import zmq
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.sockets import robot as robot_sockets
+from common.sockets.allow_list import AllowList
+from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair
+from common.sockets.descriptors import shut_down
+from common.sockets.keys import KeyFolder
+from common.sockets.operator import OperatorSockets
+from common.sockets.peers import Connection, Peers
+from common.sockets.robot import RobotSockets
+from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
+from common.sockets.turns import (
+    CONNECTIONS,
+    MOST_CONNECTIONS_EACH,
+    SILENCE_S,
+    Offered,
+    Turns,
+    Way,
+    group_of,
+    new_group,
+    routing_id,
+)
+from feelahead.lab.hostile.raw_zmtp import RawConnection, message, port_of
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
+
+STIFFNESS = bytes(461)
+
+
+@dataclass(eq=False)
+class Fed(Way):
+    answer: Offered = Offered.TAKEN
+    taken: int = 0
+
+    def offered(self, payload: bytes) -> Offered:
+        self.taken += self.answer is Offered.TAKEN and bool(payload)
+        return self.answer
+
+
+@given(answers=st.lists(st.sampled_from([Offered.TAKEN, Offered.FULL]), min_size=1, max_size=16))
+def test_each_takes_its_turn_and_who_is_full_is_passed_over(answers: list[Offered]) -> None:
+    turns: Turns[Fed] = Turns(Fed.offered)
+    turns.ways.extend(Fed(answer=answer) for answer in answers)
+    able = answers.count(Offered.TAKEN)
+    assert [turns.send(b"newest", 1.0, everywhere=False) for _ in range(3 * (able or 1))] == [able > 0] * 3 * (
+        able or 1
+    )
+    assert {way.taken for way in turns.ways if way.answer is Offered.TAKEN} <= {3}
+    assert turns.send(b"stop", 1.0, everywhere=True) == (able > 0)
+    assert sum(way.taken for way in turns.ways) == 4 * able
+
+
+def test_who_was_full_is_tried_again_before_long() -> None:
+    turns: Turns[Fed] = Turns(Fed.offered)
+    turns.ways.append(only := Fed(answer=Offered.FULL))
+    assert not turns.send(b"newest", 1.0, everywhere=False)
+    only.answer = Offered.TAKEN
+    assert not turns.send(b"newest", 1.0005, everywhere=False)
+    assert turns.send(b"newest", 1.0015, everywhere=False)
+
+
+def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> None:
+    """Both ends pass over what is silent: without it a connection that came back late would stay so on both."""
+    turns: Turns[Fed] = Turns(Fed.offered)
+    lively, silent = Fed(), Fed()
+    turns.ways.extend((lively, silent))
+    for millisecond in range(2000):
+        turns.heard(lively, now_s := 10.0 + millisecond / 1e3)
+        assert turns.send(b"newest", now_s, everywhere=False)
+    assert (lively.taken, silent.taken) == (2000, 4)
+    lively.answer = Offered.FULL
+    assert not turns.send(b"newest", 12.6, everywhere=False), "whether it is there nobody knows"
+    lively.answer = Offered.TAKEN
+    turns.heard(silent, 13.0)
+    turns.heard(lively, 13.0)
+    assert all(turns.send(b"newest", 13.0, everywhere=False) for _ in range(10))
+    assert silent.taken == 5 + 5
+
+
+def test_who_has_long_been_silent_is_passed_over_until_the_others_are_gone() -> None:
+    turns: Turns[Fed] = Turns(Fed.offered)
+    turns.ways.extend([silent := Fed(), heard := Fed()])
+    turns.heard(silent, 1.0)
+    turns.heard(heard, 1.0 + SILENCE_S)
+    assert all(turns.send(b"newest", 2.0, everywhere=False) for _ in range(4))
+    assert (silent.taken, heard.taken) == (2, 2)
+    turns.heard(heard, 1.01 + SILENCE_S)
+    assert all(turns.send(b"newest", 2.0, everywhere=False) for _ in range(4))
+    assert (silent.taken, heard.taken) == (2, 6)
+    turns.forget(heard)
+    assert turns.send(b"newest", 2.0, everywhere=False)
+    assert silent.taken == 3
+
+
+@given(name=st.binary(max_size=20))
+def test_only_what_we_name_is_grouped(name: bytes) -> None:
+    ours = len(name) == 17 and name[0] == 1 and name[16] < MOST_CONNECTIONS_EACH
+    assert group_of(name) == (name[:16] if ours else name)
+    group = new_group()
+    assert {group_of(routing_id(group, index)) for index in range(MOST_CONNECTIONS_EACH)} == {group}
+
+
+def test_peers_and_their_connections_are_bounded() -> None:
+    def taken(_: Connection, __: bytes) -> Offered:
+        return Offered.GONE
+
+    peers = Peers(taken)
+    for _ in range(300):
+        group = new_group()
+        for index in range(MOST_CONNECTIONS_EACH):
+            newest = peers.connection(routing_id(group, index), "a key").peer
+    assert len(peers.connections) == 1024
+    assert len(peers._peers) == 1024 // MOST_CONNECTIONS_EACH
+    assert len(newest.turns.ways) == MOST_CONNECTIONS_EACH
+    assert not newest.turns.send(b"", 0.0, everywhere=True)
+    assert peers.get(newest.name) is None, "all that are gone are forgotten"
+
+
+@pytest.mark.parametrize("connections", [0, 17])
+def test_refuses_a_number_of_connections_that_cannot_be(connections: int) -> None:
+    with pytest.raises(ValueError, match=f"connections = {connections}; valid: 1 to 16"):
+        OperatorSockets("tcp://127.0.0.1:9", connections=connections)
+
+
+@pytest.mark.parametrize("connections", [1, 4, 16])
+def test_a_message_goes_over_one_connection_or_over_all(robot: RobotSockets, connections: int) -> None:
+    with OperatorSockets(robot.control_endpoint, heartbeat_timeout_s=PATIENT_S, connections=connections) as operator:
+        peer = greet(robot, operator)
+        for everywhere, copies in ((False, 1), (True, connections)):
+            assert operator.send(b"stop", everywhere=everywhere)
+            drain_all(lambda: [payload for _, payload in robot.receive()], robot.wait, [b"stop"] * copies)
+            assert robot.send(peer, b"state", everywhere=everywhere)
+            drain_all(operator.receive, operator.wait, [b"state"] * copies)
+        assert robot.dropped == 0
+
+
+def test_a_connection_that_breaks_off_comes_back_to_the_same_peer(
+    robot: RobotSockets, operator: OperatorSockets
+) -> None:
+    peer = greet(robot, operator)
+    [*before] = [each.descriptor for each in robot._peers.connections.values()]
+    for descriptor in before[:2]:
+        shut_down(descriptor)
+    for number in range(200):
+        operator.send(b"%d" % number)
+        robot.wait(0.01)
+        assert {name for name, _ in robot.receive()} <= {peer}
+        robot.send(peer, b"state")
+        operator.wait(0.0)
+        operator.receive()
+    assert greet(robot, operator) == peer
+
+
+def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_answers(tmp_path: Path) -> None:
+    folder, (public, secret) = KeyFolder(tmp_path), make_key_pair()
+    with ExitStack() as stack:
+        robot = stack.enter_context(
+            RobotSockets(EPHEMERAL, keys=RobotKeys(secret, AllowList(folder)), heartbeat_timeout_s=PATIENT_S)
+        )
+        pairs = {name: make_key_pair() for name in ("anna", "ben")}
+        for name, (theirs, _) in pairs.items():
+            folder.allow(name, theirs)
+        robot.refresh_keys()
+        anna = stack.enter_context(
+            OperatorSockets(
+                robot.control_endpoint,
+                robot.view_endpoint,
+                keys=OperatorKeys(pairs["anna"][1], public),
+                heartbeat_timeout_s=PATIENT_S,
+            )
+        )
+        peer = greet(robot, anna)
+        # Nobody but anna and the robot side can know it: the handshake hides it.
+        stolen = min(robot._peers.connections)
+        context = stack.enter_context(zmq.Context())
+        ben = stack.enter_context(context.socket(zmq.DEALER))
+        ben.setsockopt(zmq.LINGER, 0)
+        ben.setsockopt(zmq.ROUTING_ID, stolen)
+        OperatorKeys(pairs["ben"][1], public).secure(ben)
+        ben.connect(robot.control_endpoint)
+        ben.send(b"as anna")
+        heard: list[tuple[bytes, bytes]] = []
+        while not any(payload == b"as anna" for _, payload in heard):
+            assert robot.wait(PATIENT_S)
+            heard += robot.receive()
+        [claimed] = [name for name, payload in heard if payload == b"as anna"]
+        assert claimed != peer
+        for number in range(20):
+            assert robot.send(peer, b"anna's %d" % number, everywhere=number % 2 == 0)
+            assert anna.wait(PATIENT_S)
+            anna.receive()
+        assert robot.send(claimed, b"ben's")
+        assert ben.poll(round(1e3 * PATIENT_S))
+        assert ben.recv() == b"ben's", "nothing of anna's came before"
+        # Anna's connection was ended with it, so that she takes her place again.
+        for _ in range(ROUNDS):
+            anna.send(b"anna")
+            robot.wait(0.01)
+            assert {name for name, payload in robot.receive() if payload == b"anna"} <= {peer}
+            if robot._peers.connections[stolen].peer.name == peer:
+                return
+        pytest.fail("anna does not get her connection back")
+
+
+def test_an_operator_of_sixteen_connections_stays_in_in_a_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
+    with ExitStack() as stack:
+        robot = stack.enter_context(RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S))
+        operator = stack.enter_context(
+            OperatorSockets(robot.control_endpoint, heartbeat_timeout_s=PATIENT_S, connections=16)
+        )
+        peer = greet(robot, operator)
+        crowd = [stack.enter_context(closing(RawConnection(port_of(robot.control_endpoint)))) for _ in range(100)]
+        assert any(robot.crowded >= 90 for _ in range(ROUNDS) if robot.wait(0.01) or not robot.receive())
+        assert all(connection.ended() for connection in crowd[:90])
+        assert operator.send(b"still here", everywhere=True)
+        drain_all(lambda: [payload for _, payload in robot.receive()], robot.wait, [b"still here"] * 16)
+        assert robot.send(peer, b"and heard")
+
+
+# Who does not read
+
+
+def unsent_bytes(descriptor: int) -> int:
+    """Bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
+    return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
+
+
+def held_back(end: RobotSockets) -> list[int]:
+    """TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
+    ports, marks = {port_of(end.control_endpoint), port_of(end.view_endpoint)}, []
+    for descriptor in Path("/proc/self/fd").iterdir():
+        try:
+            connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=int(descriptor.name))
+        except OSError:
+            continue
+        try:
+            if ports & {connection.getsockname()[1], connection.getpeername()[1]}:
+                marks.append(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT))
+        except (OSError, IndexError):
+            pass
+        finally:
+            connection.detach()
+    return sorted(marks)
+
+
+def test_the_kernel_holds_little_for_any_connection_of_either_side(
+    robot: RobotSockets, operator: OperatorSockets
+) -> None:
+    greet(robot, operator)
+    publish_until_seen(robot, operator, b"telemetry")
+    expected = 2 * CONNECTIONS * [CONTROL_UNSENT_BYTES] + 2 * [VIEW_UNSENT_BYTES]
+    for _ in range(ROUNDS):
+        robot.receive(), operator.receive()
+        if held_back(robot) == expected:
+            return
+        robot.wait(0.01)
+    assert held_back(robot) == expected
+
+
+def test_little_waits_for_who_stops_reading_and_others_lose_nothing(
+    robot: RobotSockets, operator: OperatorSockets
+) -> None:
+    """Both sides hold back: some messages and kilobytes for each connection, however long it goes on."""
+    owner = greet(robot, operator)
+    group, receive_bytes = new_group(), 4096
+    port = port_of(robot.control_endpoint)
+    with ExitStack() as stack:
+        for index in range(4):
+            deaf = RawConnection.introduced(port, buffer_bytes=receive_bytes, name=routing_id(group, index))
+            stack.enter_context(closing(deaf)).send(message(b"hello"))
+        names = Counter[bytes]()
+        while names.total() < 4:
+            assert robot.wait(PATIENT_S)
+            names.update(name for name, _ in robot.receive())
+        [observer] = names
+        taken = 0
+        for number in range(2000):
+            taken += robot.send(observer, STIFFNESS)
+            assert robot.send(owner, b"%d" % number)
+            drain_all(operator.receive, operator.wait, [b"%d" % number])
+        assert taken + robot.dropped == 2000, "the owner lost nothing"
+        for each in robot._peers.get(observer).turns.ways:  # type: ignore[union-attr]
+            assert unsent_bytes(each.descriptor) <= 8 * 1024
+        # The receiver's own buffer takes more than twice its size, as the kernel counts it.
+        assert taken * len(STIFFNESS) <= 4 * (16 * 1024 + 4 * receive_bytes)
+
+
+def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_nothing(
+    robot: RobotSockets, operator: OperatorSockets
+) -> None:
+    """A tick may publish both cameras' pictures and the scene just before telemetry."""
+    rounds, picture = 100, bytes(100_000)
+    tick = [(b"video", picture), (b"video", picture), (b"scene", b"scene"), (b"telemetry", b"state")]
+    publish_until_seen(robot, operator, b"telemetry")
+    with closing(RawConnection.introduced(port_of(robot.view_endpoint), b"SUB", buffer_bytes=4096)) as deaf:
+        deaf.send(message(b"\x01video"))
+        gate = robot._gates[1]
+        assert any(robot.wait(0.01) or len(gate.crowd._numbers) == 2 for _ in range(ROUNDS) if not robot.receive())
+        operator.receive_view()
+        for _ in range(rounds):
+            robot.receive()
+            for topic, payload in tick:
+                robot.publish(topic, payload)
+            seen: list[tuple[bytes, bytes]] = []
+            while len(seen) < len(tick):
+                assert operator.wait(PATIENT_S)
+                seen += [told for told in operator.receive_view() if told[1] != b"probe"]
+            assert seen == tick
+        assert max(unsent_bytes(descriptor) for descriptor in gate.crowd._numbers) <= 2 * VIEW_UNSENT_BYTES
+        kept = len(deaf.read_all()) / len(picture)
+    assert 1 < kept < VIEW_HIGH_WATER_MARK + 3, "the subscription was there, and next to nothing waited"

@@ -1,0 +1,98 @@
+"""`feelahead doctor --connect` measures the path: the verdict by made-up facts, the measurement on loopback."""
+
+import json
+from dataclasses import replace
+from typing import cast
+
+import pytest
+
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.view_messages import VIDEO_TOPIC, VideoFrame
+from common.sockets.tcp_figures import TcpFigures
+from feelahead.commands.doctor import path
+from feelahead.commands.doctor.path import PathFacts, path_line, path_told
+from feelahead.main import command
+from tests.helpers.felt import felt
+from tests.helpers.serving_robot import ServingRobot
+
+FINE = PathFacts(
+    linked=True,
+    round_trip_s=(0.2, 0.212),
+    queue_s=0.006,
+    longest_gap_s=0.031,
+    received_bits_s=480e3,
+    sent_again=0.011,
+    pictures=(("first_person", 12.0, 0.24), ("overview", 12.0, 0.24)),
+)
+
+
+@pytest.mark.parametrize(
+    ("facts", "works", "views", "said"),
+    [
+        (FINE, True, 2, "what works: the arm and both views"),
+        (
+            replace(FINE, pictures=(("first_person", 12.0, 0.24), ("overview", 2.0, 0.3))),
+            True,
+            1,
+            "works: the arm and one view",
+        ),
+        (replace(FINE, pictures=(("first_person", 12.0, 0.8),)), True, 0, "works: the arm alone"),
+        (replace(FINE, pictures=()), True, 0, "no pictures came"),
+        (replace(FINE, longest_gap_s=0.1), False, 2, "stop again and again: silences reach the limit of 100 ms"),
+        (replace(FINE, linked=False), False, 2, "stop again and again"),
+        (PathFacts(linked=False), False, 0, "nothing measured"),
+    ],
+)
+def test_the_verdict(facts: PathFacts, works: bool, views: int, said: str) -> None:
+    assert (facts.arm_works, facts.views_that_work) == (works, views)
+    assert said in path_line(facts)
+    assert json.loads(json.dumps(path_told(facts)))["arm_works"] is works
+
+
+def test_the_line_names_every_figure() -> None:
+    assert path_line(FINE) == (
+        "path: round trip 200 ms, 95 % within 212 ms, queue 6 ms, longest silence 31 ms, 1.1 % of packets sent again, "
+        "480 kbit/s came, first person 12 pictures a second up to 240 ms old, overview 12 pictures a second up to "
+        "240 ms old; what works: the arm and both views"
+    )
+
+
+def test_lost_packets_are_a_share_of_those_sent_meanwhile() -> None:
+    figures = TcpFigures(sent=300, sent_again=5).since(TcpFigures(sent=100, sent_again=3))
+    assert figures.lost_share == 0.01
+    assert figures.since(figures).lost_share is None
+
+
+class _Filming(ServingRobot):
+    """Lets everybody feel, and publishes a picture of the overview, 50 ms old, in each turn while somebody watches."""
+
+    def tick(self, now_s: float) -> None:
+        for one in [*self.session.owners(now_s), *self.session.observers(now_s)]:
+            self.sockets.send(one.peer, encode(felt(one.header, state="disarmed")))
+        if "overview" in self.session.watchers.looked_at(now_s):
+            header = self.session.shown_header(now_s)
+            frame = VideoFrame(header, "overview", captured_s=now_s - 0.05, width=4, height=4, jpeg=b"picture")
+            self.sockets.publish(VIDEO_TOPIC, encode(frame))
+
+
+@pytest.mark.parametrize("taken", [False, True])
+def test_the_path_is_measured_and_the_arm_stays_disarmed(
+    taken: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(path, "MEASURE_S", 0.5)
+    with _Filming() as robot:
+        if taken:
+            owner = LinkEnd("operator", 2, "an operator's")
+            now_s = robot._clock.now()
+            robot.session.receive(b"owner", encode(owner.hello(now_s)), now_s)
+        code = command(["doctor", "--connect", robot.control, "--view-connect", robot.view, "--json"])
+        told = json.loads(capsys.readouterr().out)["path"]
+        assert robot.session.safety.state == "disarmed"
+        assert (robot.session.owner_peer == b"owner") is taken
+        assert robot.session.leases_granted == 1
+    assert (code, told["arm_works"], told["views_that_work"]) == (0, True, 1)
+    assert told["round_trip_ms"]["p95"] >= told["round_trip_ms"]["p50"] > 0.0
+    assert cast(float, told["views"]["overview"]["age_p95_ms"]) >= 50.0
+    assert told["received_kbit_s"] > 0.0
+    assert told["sent_again"] == 0.0

@@ -1,0 +1,81 @@
+"""Fields of small grippers in small scenes, for the tests of what is ahead."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray, IntArray
+from feelahead.lab.reference.ways_by_definition import Judged, defined_ways
+from robot_side.arm.port import GripperPose
+from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.scene_table import scene_table
+from tests.helpers.gripper_poses import free_pose
+
+AHEAD = np.array([0.0, 0.0, 1.0])
+REACH_M = 0.15
+RADIUS_M = 0.008
+"""Of a fingertip's sphere."""
+EQUAL_M = 1e-4
+"""Ways are known this well."""
+CLASSES = {Role.TARGET: TARGET, Role.IGNORED: PASSED_OVER}
+
+
+def ball_pose(radius_m: float = RADIUS_M, **placed: Any) -> GripperPose:
+    """One sphere, about the tool's own point."""
+    return free_pose([[0.0, 0.0, 0.0]], [radius_m], **placed)
+
+
+def along(
+    direction: FloatArray = AHEAD,
+    inflated_m: float = 0.0,
+    *,
+    variance_m2: float = 0.0,
+    quantile: float = 0.0,
+    reach_m: float = REACH_M,
+) -> Along:
+    """A direction; `inflated_m` is the D_σ of every sphere where nothing varies."""
+    return Along(np.ascontiguousarray(direction), inflated_m, variance_m2, quantile, reach_m)
+
+
+def _classes(objects: PerceivedObjects, given: list[int] | None) -> IntArray:
+    found = [CLASSES.get(role, OBSTACLE) for role in objects.roles] if given is None else given
+    return np.array(found, dtype=np.int64)
+
+
+def look(
+    pose: GripperPose,
+    objects: PerceivedObjects,
+    ahead: Along,
+    *,
+    classes: list[int] | None = None,
+    widest_m: float = np.inf,
+    by: Ahead | None = None,
+) -> Field:
+    """The field, by tables of its own unless `by` says whose; what objects are follows from their roles."""
+    looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
+    return looking.look(pose, scene_table(objects), _classes(objects, classes), ahead, widest_m)
+
+
+def ways_of(pose: GripperPose, objects: PerceivedObjects, ahead: Along) -> FloatArray:
+    """The eight ways (8,) at which the strengths begin."""
+    return look(pose, objects, ahead).fast_m
+
+
+def judged(
+    pose: GripperPose,
+    objects: PerceivedObjects,
+    ahead: Along,
+    *,
+    classes: list[int] | None = None,
+    widest_m: float = np.inf,
+    by: Ahead | None = None,
+) -> Judged:
+    """How far off the ways of such a look are from their definition."""
+    looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
+    found = look(pose, objects, ahead, classes=classes, widest_m=widest_m, by=looking)
+    defined = defined_ways(pose, objects, _classes(objects, classes), ahead, widest_m, looking.encoder_sigma_rad)
+    assert found.sigma_m == pytest.approx(defined.sigma_m, abs=1e-12)
+    return defined.judge(found.ways_m, ahead.reach_m)

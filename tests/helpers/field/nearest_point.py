@@ -1,0 +1,67 @@
+"""The nearest point of a primitive's surface, of many pairs at once: thin faces over what the compiled pass uses.
+
+Point i is paired with primitive i throughout. See `robot_side.surroundings.distances.nearest_points` for what is found.
+"""
+
+import math
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.surroundings.distances import nearest_points
+from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON, rows
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.scene_table import SceneTable, scene_table
+from tests.helpers.perceived_scenes import Scene
+
+Nearest = tuple[FloatArray, FloatArray]
+"""Signed distances (p,) in metres, and directions (p, 3)."""
+
+
+def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:
+    """Signed distance from `point_m` (3,) to an object, negative inside; infinite for one without primitives."""
+    scene = scene_table(objects)
+    rows = np.arange(scene.first_rows[index], scene.first_rows[index + 1])
+    points = np.broadcast_to(np.asarray(point_m, dtype=np.float64), (len(rows), 3))
+    return float(nearest_points(points, scene, rows)[0].min(initial=math.inf))
+
+
+def nearest_on_sphere(points_m: FloatArray, centers_m: FloatArray, radii_m: FloatArray) -> Nearest:
+    """From points (p, 3) to spheres (centers (p, 3), radii (p,))."""
+    return _each(SPHERE, points_m, centers_m, radii_m)
+
+
+def nearest_on_box(
+    points_m: FloatArray, centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray
+) -> Nearest:
+    """From points (p, 3) to boxes: centers (p, 3), rotations (p, 3, 3) box to world, half sizes (p, 3)."""
+    return _each(BOX, points_m, centers_m, rotations, half_sizes_m)
+
+
+def nearest_on_tetrahedron(points_m: FloatArray, vertices_m: FloatArray) -> Nearest:
+    """From points (p, 3) to tetrahedra (p, 4, 3), in any vertex order; one of zero volume is a plate."""
+    return _each(TETRAHEDRON, points_m, vertices_m)
+
+
+def nearest_on_half_space(points_m: FloatArray, normals: FloatArray, offsets_m: FloatArray) -> Nearest:
+    """From points (p, 3) to half-spaces, solid where normal·x <= offset."""
+    return _each(HALF_SPACE, points_m, normals, offsets_m)
+
+
+def _each(kind: int, points_m: FloatArray, *columns: FloatArray) -> Nearest:
+    """By a table of these primitives alone, those of no volume among them, which no scene's table keeps."""
+    count = len(points_m)
+    places = np.arange(count)
+    nothing = np.empty((0, 4))
+    table = SceneTable(
+        objects=Scene().objects(),
+        bounds=nothing,
+        shapes=rows(*(np.ascontiguousarray(column, dtype=np.float64) for column in columns)),
+        kinds=np.full(count, kind),
+        rows_of_kind=places,
+        first_rows=np.zeros(1, dtype=np.int64),
+        object_bounds=nothing,
+        object_volumes=np.empty(0),
+        flat=0,
+    )
+    return nearest_points(np.asarray(points_m, dtype=np.float64), table, places)

@@ -1,0 +1,91 @@
+"""Situations of a tool that flies freely, and the laws that sense them, for the tests of what is felt."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm.ability import JointLimits
+from robot_side.arm.port import GripperPose
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.enlargement.prediction_errors import PredictionErrors
+from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.paper import PaperLaw
+from robot_side.laws.swept import SweptLaw
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.surroundings import Surroundings
+from tests.helpers.field.fields import RADIUS_M, ball_pose
+from tests.helpers.perceived_scenes import Scene
+
+EXACT = PredictionErrors({"operator": ((1.0, 0.0, 0.0),), "robot": ((1.0, 0.0, 0.0),)})
+"""A prediction that never errs."""
+CAMERA_SD_M = 0.003
+SIGMA_M = 2.3263478740408408 * CAMERA_SD_M
+"""D_σ at P = 0.99 where only the camera errs."""
+FULL_SPEED_M_S, STICK_SPEED_M_S, ACCELERATION_M_S2 = 0.25, 0.1, 3.0
+LIMITS = JointLimits(np.full(6, 10.0), np.full(6, ACCELERATION_M_S2))
+MOTION = ToolMotionSettings(FULL_SPEED_M_S, STICK_SPEED_M_S)
+
+
+def uncertain(**changes: Any) -> Uncertainty:
+    """The camera errs by 3 mm, and nothing else does, unless `changes` say so."""
+    return replace(Uncertainty(0.99, camera_sd_m=CAMERA_SD_M, prediction=EXACT), **changes)
+
+
+def swept(encoder_sigma_rad: float = 0.0, **changes: Any) -> SweptLaw:
+    return SweptLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings())
+
+
+def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:
+    return PaperLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings())
+
+
+def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Situation:
+    """At rest, with a loop age of 100 ms that is known, and a stick that rests, unless `changes` say so."""
+    at_rest = Situation(
+        pose=pose,
+        joint_velocities_rad_s=np.zeros(6),
+        objects=Scene().objects() if objects is None else objects,
+        loop_age_s=0.1,
+        loop_age_known=True,
+        compensation="operator",
+        gap_m=None,
+        held=None,
+        lateral=(0.0, 0.0),
+    )
+    return replace(at_rest, **changes)
+
+
+def moving(velocity_m_s: FloatArray) -> FloatArray:
+    """The joints' rates (6,) at which the free tool moves so."""
+    return np.concatenate([velocity_m_s, np.zeros(3)])
+
+
+def walls(ahead_m: float | None, behind_m: float | None = None, front_m: float = RADIUS_M) -> PerceivedObjects:
+    """Walls so far before and behind what reaches as far as front_m."""
+    scene = Scene()
+    if ahead_m is not None:
+        scene.add().box([0.0, 0.0, front_m + ahead_m + 0.05], [0.5, 0.5, 0.05])
+    if behind_m is not None:
+        scene.add().box([0.0, 0.0, -front_m - behind_m - 0.05], [0.5, 0.5, 0.05])
+    return scene.objects()
+
+
+def at(way_m: float, across_m: float = 0.0) -> GripperPose:
+    """One sphere, so far along and across."""
+    return ball_pose(tool_position_m=[across_m, 0.0, way_m])
+
+
+@dataclass
+class Senses:
+    """A law, and time that passes by so much with each use."""
+
+    law: Law = field(default_factory=swept)
+    step_s: float = 10.0
+    now_s: float = 100.0
+
+    def sense(self, pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Sensed:
+        self.now_s += self.step_s
+        return self.law.sense(situation(pose, objects, **changes), self.now_s)

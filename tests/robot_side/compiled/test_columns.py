@@ -1,0 +1,75 @@
+"""Columns that are declared once: what a kernel sees of them, and what is refused."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLED, FLAGS, INDICES, NUMBERS, Declared, matrices, records, rows
+from robot_side.compiled.kernel import NUMBER, compiled
+
+RECORD = np.dtype([("place", np.int64), ("way", np.float64)])
+
+
+class Inner(NamedTuple):
+    numbers: FloatArray
+
+
+class Columns(NamedTuple):
+    numbers: FloatArray
+    indices: IntArray
+    flags: BoolArray
+    points: FloatArray
+    turns: FloatArray
+    found: np.ndarray
+    inner: IntArray
+
+
+INNER = Declared(Inner, NUMBERS)
+DECLARED = Declared(Columns, NUMBERS, INDICES, FLAGS, rows(3), matrices(2, 3), records(RECORD), BUNDLED)
+_at, _inner_at = DECLARED.at, INNER.at
+
+
+@dataclass
+class Owner:
+    numbers: FloatArray = field(default_factory=lambda: np.array([1.5, 2.5]))
+    indices: IntArray = field(default_factory=lambda: np.array([7, 8, 9]))
+    flags: BoolArray = field(default_factory=lambda: np.array([False, True]))
+    points: FloatArray = field(default_factory=lambda: np.arange(12.0).reshape(4, 3))
+    turns: FloatArray = field(default_factory=lambda: np.arange(18.0).reshape(3, 2, 3))
+    found: np.ndarray = field(default_factory=lambda: np.zeros(2, dtype=RECORD))
+
+    def __post_init__(self) -> None:
+        self.inner = INNER.bundle(self)
+
+
+@compiled(BUNDLE, returns=NUMBER)
+def _write_what_is_seen(bundle: IntArray) -> float:
+    columns = _at(bundle)
+    sizes = columns.numbers.size + columns.indices.size + columns.flags.size + columns.points.size + columns.turns.size
+    columns.found[1].place = columns.indices[2]
+    columns.found[1].way = columns.points[3, 1] + columns.turns[2, 1, 0]
+    if columns.flags[1] and not columns.flags[0]:
+        columns.numbers[0] += _inner_at(columns.inner).numbers[1]
+    return float(sizes)
+
+
+def test_a_kernel_sees_the_arrays_of_the_owner_in_the_forms_that_were_declared() -> None:
+    owner = Owner()
+    assert _write_what_is_seen(DECLARED.bundle(owner)) == 2 + 3 + 2 + 12 + 18
+    assert owner.found.tolist() == [(0, 0.0), (9, 10.0 + 15.0)]
+    assert owner.numbers.tolist() == [4.0, 2.5]
+
+
+def test_another_number_of_views_than_of_columns_is_refused() -> None:
+    with pytest.raises(TypeError, match="Columns has 7 columns, not 1"):
+        Declared(Columns, NUMBERS)
+
+
+def test_an_array_with_gaps_is_refused() -> None:
+    owner = Owner(points=np.zeros((4, 6))[:, ::2])
+    with pytest.raises(ValueError, match="C-contiguous"):
+        DECLARED.bundle(owner)

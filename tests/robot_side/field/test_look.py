@@ -1,0 +1,155 @@
+"""D_σ of each sphere against eq. 3-10 in NumPy, and what of a scene is looked at at all."""
+
+import dataclasses
+import math
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
+from robot_side.field.field import Ahead, Along
+from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
+from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+
+EMPTY = Scene().objects()
+seeds = st.integers(0, 2**32 - 1)
+
+
+def any_pose(rng: np.random.Generator, spheres: int, joints: int) -> GripperPose:
+    return GripperPose(
+        tool_position_m=rng.uniform(-1.0, 1.0, 3),
+        tool_rotation=random_rotation(rng),
+        tool_jacobian=rng.normal(size=(6, joints)),
+        sphere_centers_m=rng.uniform(-1.0, 1.0, (spheres, 3)),
+        sphere_radii_m=rng.uniform(0.001, 0.1, spheres),
+        sphere_on_finger=np.zeros(spheres, dtype=np.bool_),
+    )
+
+
+def sigmas(by: Ahead, pose: GripperPose, looked: Along) -> FloatArray:
+    """D_σ at P and as expected (m, 2)."""
+    look(pose, EMPTY, looked, by=by)
+    return by.scratch.sigma_m[: len(pose.sphere_radii_m)].copy()
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    seed=seeds,
+    spheres=st.integers(1, 40),
+    joints=st.integers(1, 8),
+    p=st.floats(0.001, 0.999),
+    mean_m=st.floats(-0.01, 0.01),
+)
+def test_the_enlargement_is_eq_10_for_each_sphere(
+    seed: int, spheres: int, joints: int, p: float, mean_m: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    pose, encoder_sigma = any_pose(rng, spheres, joints), rng.uniform(0.0, 2e-3, joints)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    quantile, variance = NormalDist().inv_cdf(p), float(rng.uniform(0.0, 1e-4))
+    found = sigmas(Ahead(encoder_sigma), pose, Along(direction, mean_m, variance, quantile, 0.1))
+    covariances = position_covariance(pose.sphere_jacobians, encoder_sigma)
+    of_joints = directional_variance(covariances, np.tile(direction, (spheres, 1)))
+    expected = np.maximum(0.0, mean_m + quantile * np.sqrt(of_joints + variance))
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found[:, 1], max(0.0, mean_m), rtol=1e-15)
+
+
+def test_the_largest_of_the_enlargements_is_told() -> None:
+    # The second joint turns the tool about y: what lies farther out along x errs more along z.
+    pose = free_pose([[0.01, 0.0, 0.0], [0.3, 0.0, 0.0]], [0.01, 0.01])
+    by = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 1e-2, 0.0]))
+    assert look(pose, EMPTY, along(AHEAD, 0.001, quantile=2.0), by=by).sigma_m == pytest.approx(0.001 + 2.0 * 3e-3)
+
+
+@pytest.mark.parametrize("p", [0.9, 0.99])
+def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
+    """True gripper and true object drawn many times: the gap closes by more than D_σ in 1 - P of them."""
+    rng = np.random.default_rng(5)
+    known = Uncertainty(p, (0.001, -0.002, 0.0005), 0.002, (0.0005, 0.001, -0.001))
+    jacobian, encoder_sigma = rng.normal(size=(6, 6)), np.full(6, 1e-3)
+    pose = dataclasses.replace(free_pose([[0.1, 0.2, 0.05]], [0.01]), tool_jacobian=jacobian)
+    direction = np.array([0.6, 0.0, 0.8])
+    looked = Along(direction, known.mean_along_m(direction), known.camera_sd_m**2, known.quantile, 0.1)
+    distance = sigmas(Ahead(encoder_sigma), pose, looked)[0, 0]
+    draws = 200_000
+    covariance = position_covariance(pose.sphere_jacobians, encoder_sigma)[0]
+    true_less_estimated = rng.multivariate_normal(known.kinematic_mean_m, covariance, draws)
+    # e_c is true less perceived: an object that errs along the direction is farther than it seems.
+    camera_error = rng.normal(known.camera_mean_m, known.camera_sd_m, (draws, 3))
+    closing = (true_less_estimated - camera_error) @ direction
+    assert (closing <= distance).mean() == pytest.approx(p, abs=4.0 * math.sqrt(p * (1.0 - p) / draws))
+
+
+def test_what_is_far_beside_or_behind_costs_no_overlap() -> None:
+    by = Ahead(np.zeros(6))
+    away = Scene()
+    for place in ([0.5, 0.0, 0.0], [0.0, -0.5, 0.1], [0.0, 0.0, -0.5], [0.0, 0.0, 9.0]):
+        away.add().box(place, [0.05, 0.05, 0.05]).add().sphere(place, 0.06)
+    away.add().half_space([0.0, 0.0, 1.0], -0.3).add().half_space([1.0, 0.0, 0.0], -0.3)
+    found = look(gripper_pose(), away.objects(), along(AHEAD, 0.007, reach_m=0.3), by=by)
+    assert np.isinf(found.fast_m).all()
+    assert np.isinf(found.slow_m).all()
+    assert (by.counts.fields, by.counts.with_nothing_near, by.counts.pairs, by.counts.overlaps) == (1, 1, 0, 0)
+    near = away.add().box([0.0, 0.0, 0.2], [0.05, 0.05, 0.05]).objects()
+    look(gripper_pose(), near, along(AHEAD, 0.007, reach_m=0.3), by=by)
+    assert (by.counts.fields, by.counts.with_nothing_near) == (2, 1)
+    assert by.counts.pairs > 0
+    assert by.counts.overlaps > 0
+
+
+def test_a_scene_of_many_far_things_is_as_quickly_told_as_one() -> None:
+    """Only what may shorten a way is worked out: what is behind the nearest wall costs nothing."""
+    wall = Scene().add().box([0.0, 0.0, 0.15], [0.3, 0.3, 0.01])
+    alone, crowded = Ahead(np.zeros(6)), Ahead(np.zeros(6))
+    looked = along(AHEAD, 0.007, reach_m=0.3)
+    expected = look(gripper_pose(), wall.objects(), looked, by=alone)
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        wall.add().box([*rng.uniform(-0.2, 0.2, 2), rng.uniform(0.2, 0.3)], rng.uniform(0.01, 0.03, 3))
+    found = look(gripper_pose(), wall.objects(), looked, by=crowded)
+    np.testing.assert_array_equal(found.fast_m, expected.fast_m)
+    assert crowded.counts.overlaps == alone.counts.overlaps
+
+
+@pytest.mark.parametrize("name", ["tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_pose_that_is_not_finite_is_named_and_never_silently_far_away(name: str, bad: float) -> None:
+    pose = gripper_pose()
+    values = getattr(pose, name).copy()
+    values.reshape(-1)[-1] = bad
+    objects = random_scene(np.random.default_rng(1), 2)
+    with pytest.raises(ValueError, match=f"pose.{name} holds NaN or infinity"):
+        look(dataclasses.replace(pose, **{name: values}), objects, along())
+
+
+@pytest.mark.parametrize("name", ["direction", "mean_m", "variance_m2", "quantile", "reach_m"])
+def test_a_direction_that_is_not_finite_is_named(name: str) -> None:
+    bad: Any = np.full(3, math.nan) if name == "direction" else math.nan
+    with pytest.raises(ValueError, match=f"along.{name} holds NaN or infinity"):
+        look(ball_pose(), EMPTY, dataclasses.replace(along(), **{name: bad}))
+
+
+def test_what_is_far_behind_something_swallowed_is_early_and_never_silent() -> None:
+    scene = Scene().add().box([0.0, 0.0, -0.01], [0.05, 0.05, 0.01])
+    objects = scene.box([0.0, 0.0, 0.05], [0.001, 0.001, 0.001]).box([0.0, 0.0, 0.9], [0.5, 0.5, 0.02]).objects()
+    found = look(ball_pose(), objects, along(reach_m=3.0))
+    assert found.fast_m[0] <= 0.9 - 0.02 - RADIUS_M
+
+
+@pytest.mark.parametrize("early_m", [np.nan, np.inf])
+def test_how_much_sooner_things_come_is_a_number(early_m: float) -> None:
+    objects = Scene().add().box([0.0, 0.0, 0.1], [0.05, 0.05, 0.01]).objects()
+    with pytest.raises(ValueError, match=r"along\.early_m"):
+        look(ball_pose(), objects, dataclasses.replace(along(), early_m=np.array([early_m])))
+    with pytest.raises(ValueError, match="classes holds 0"):
+        look(ball_pose(), objects, along(), classes=[])

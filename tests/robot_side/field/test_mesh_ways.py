@@ -1,0 +1,124 @@
+"""Where a moving sphere begins to enter closed meshes of any form, against small steps with the exact overlap."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray, IntArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
+from robot_side.field.look import MARGIN_M
+from robot_side.overlap import Mesh
+from robot_side.surroundings.kinds.layout import LEAST_WAY_M
+from tests.helpers.field.fields import AHEAD, EQUAL_M, along, ball_pose, judged
+from tests.helpers.field.first_contact import first_contact_m
+from tests.helpers.perceived_scenes import Scene, random_rotation
+from tests.helpers.scene_meshes import cup
+
+REACH_M = 0.15
+seeds = st.integers(0, 2**32 - 1)
+
+
+def star(rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+    """A prism over a polygon with dents, some 60 mm wide and up to 60 mm high."""
+    corners = 2 * int(rng.integers(3, 9))
+    turns = 2.0 * np.pi * (np.arange(corners) + rng.uniform(0.0, 0.4, corners)) / corners
+    reach = np.where(np.arange(corners) % 2, rng.uniform(0.008, 0.02), rng.uniform(0.02, 0.05, corners))
+    flat = np.column_stack([reach * np.cos(turns), reach * np.sin(turns)])
+    half = float(rng.uniform(0.005, 0.03))
+    rings = [np.column_stack([flat, np.full(corners, z)]) for z in (-half, half)]
+    vertices = np.concatenate([*rings, [[0.0, 0.0, -half], [0.0, 0.0, half]]])
+    low, up = np.arange(corners), corners + np.arange(corners)
+    next_low, next_up = np.roll(low, -1), np.roll(up, -1)
+    under, over = np.full(corners, 2 * corners), np.full(corners, 2 * corners + 1)
+    sides = np.column_stack([low, next_low, next_up]), np.column_stack([low, next_up, up])
+    ends = np.column_stack([under, next_low, low]), np.column_stack([over, up, next_up])
+    return vertices, np.concatenate([*sides, *ends])
+
+
+def hollow() -> tuple[FloatArray, IntArray]:
+    """A block of 90 mm with a cubic cavity of 30 mm in its middle."""
+    places, tetrahedra = grid_tetrahedra(3)
+    middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
+    triangles = surface_of(tetrahedra[~middle])
+    used, numbers = np.unique(triangles, return_inverse=True)
+    return 0.03 * (places[used] - 1.5), numbers.reshape(-1, 3)
+
+
+def any_mesh(rng: np.random.Generator) -> Mesh:
+    return Mesh(*(star(rng), star(rng), hollow(), cup())[int(rng.integers(4))])
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(seed=seeds)
+def test_the_way_to_a_mesh_is_the_one_that_small_steps_find(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mesh, radius = any_mesh(rng), float(rng.uniform(0.002, 0.02))
+    rotation, position = random_rotation(rng), rng.uniform(-0.02, 0.02, 3)
+    direction, start = rng.normal(size=3), rng.uniform(-0.08, 0.08, 3)
+    direction /= np.linalg.norm(direction)
+    found = first_contact_m(
+        Scene().add().mesh(mesh, position, rotation).objects(), start, radius, direction, REACH_M + MARGIN_M
+    )
+    local, ahead = (start - position) @ rotation, direction @ rotation
+    ways = np.arange(0.0, REACH_M + MARGIN_M, 1e-4)
+    entered = np.flatnonzero(mesh.overlap(local + ways[:, None] * ahead, np.full(len(ways), radius)) > 0.0)
+    if len(entered) == 0:
+        # What grazes by less than a step sees may be found.
+        assert np.isinf(found) or mesh.overlap(local + (found + 5e-5) * ahead, radius) < 1e-9
+        return
+    expected = ways[entered[0]]
+    assert found <= expected
+    if expected > 0.0:
+        # Nothing before it; and just behind it there is something, if only what lies between two steps.
+        before = np.linspace(0.0, max(found - 2e-7, 0.0), 200)
+        assert mesh.overlap(local + before[:, None] * ahead, np.full(200, radius)).max() == 0.0
+        assert mesh.overlap(local + (found + 1e-5) * ahead, radius) > 0.0
+    else:
+        assert found == 0.0
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(seed=seeds)
+def test_the_ways_to_a_mesh_are_those_of_the_definition(seed: int) -> None:
+    """Before it, in its dents, in its cavity, and overlapping it at the start."""
+    rng = np.random.default_rng(seed)
+    mesh, radius, inflated = any_mesh(rng), float(rng.uniform(0.004, 0.015)), float(rng.uniform(0.0, 0.01))
+    rotation, start = random_rotation(rng), rng.uniform(-0.06, 0.06, 3)
+    objects = Scene().add().mesh(mesh, [0.0, 0.0, 0.0], rotation).objects()
+    off = judged(ball_pose(radius, tool_position_m=start), objects, along(AHEAD, inflated, reach_m=REACH_M))
+    assert np.abs(off.off_m).max(initial=0.0) < EQUAL_M
+
+
+@pytest.mark.parametrize("gap_m", [0.0, 5e-8, -5e-8])
+def test_what_is_touched_exactly_is_entered_at_once_and_what_rests_beside_never(gap_m: float) -> None:
+    box = Scene().add().mesh(Mesh(CUBE_CORNERS * 0.05, CUBE_TRIANGLES), [0.0, 0.0, 0.0]).objects()
+    start = np.array([0.01, 0.012, -0.05 - 0.008 - gap_m])
+    assert LEAST_WAY_M <= first_contact_m(box, start, 0.008, AHEAD, REACH_M + MARGIN_M) <= 1e-7
+    for away in (-AHEAD, np.array([1.0, 0.0, 0.0])):
+        assert np.isinf(first_contact_m(box, start, 0.008, away, REACH_M + MARGIN_M))
+
+
+def test_a_sphere_in_a_cavity_meets_its_far_wall() -> None:
+    rotation = random_rotation(np.random.default_rng(3))
+    objects = Scene().add().mesh(Mesh(*hollow()), [0.0, 0.0, 0.0], rotation).objects()
+    for axis in np.concatenate([np.eye(3), -np.eye(3)]):
+        assert first_contact_m(objects, np.zeros(3), 0.004, rotation @ axis, REACH_M + MARGIN_M) == pytest.approx(
+            0.011, abs=1e-12
+        )
+    # All of it in the block, it overlaps.
+    assert first_contact_m(objects, rotation @ [0.0, 0.0, 0.03], 0.004, rotation @ AHEAD, REACH_M + MARGIN_M) == 0.0
+
+
+def test_walls_that_lean_in_are_entered_and_walls_that_lead_away_are_not() -> None:
+    for degrees, sign in itertools.product((0.05, 0.3, 2.0), (1.0, -1.0)):
+        angle = sign * np.radians(degrees)
+        turned = np.array([[np.cos(angle), 0.0, -np.sin(angle)], [0.0, 1.0, 0.0], [np.sin(angle), 0.0, np.cos(angle)]])
+        # Beside a plate of 20 mm that goes on for a metre; its side is 0.1 mm and the radius off.
+        plate = Scene().add().mesh(Mesh(CUBE_CORNERS * [0.01, 0.5, 0.5], CUBE_TRIANGLES), [0.0, 0.0, 0.0], turned)
+        start = turned @ [-0.01 - 0.008 - 1e-4, 0.0, 0.0]
+        found = first_contact_m(plate.objects(), start, 0.008, AHEAD, REACH_M + MARGIN_M)
+        leans_in = sign > 0.0
+        assert (found == pytest.approx(1e-4 / np.sin(abs(angle)), rel=1e-6)) if leans_in else np.isinf(found)

@@ -1,0 +1,97 @@
+"""Σ V_ij of many spheres and all objects, against the overlaps one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from feelahead.lab.reference.solids import Solids
+from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.overlap import Mesh, sphere_sphere
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.scene_table import scene_table
+from tests.helpers.field.fields import REACH_M, along, ball_pose, ways_of
+from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+
+
+def total(spheres: FloatArray, objects: PerceivedObjects, passed_over: frozenset[int] = frozenset()) -> float:
+    classes = np.zeros(len(objects.names), dtype=np.int64)
+    classes[list(passed_over)] = PASSED_OVER
+    return total_overlap_m3(spheres, scene_table(objects), classes)
+
+
+def any_spheres(rng: np.random.Generator, count: int) -> FloatArray:
+    return np.concatenate([rng.uniform(-0.4, 0.4, (count, 3)), rng.uniform(0.0, 0.2, (count, 1))], axis=1)
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), of_each_kind=st.integers(0, 5), count=st.integers(1, 6))
+def test_it_is_the_sum_over_all_pairs_but_those_passed_over(seed: int, of_each_kind: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    objects, spheres = random_scene(rng, of_each_kind, 0.4), any_spheres(rng, count)
+    passed_over = frozenset(np.flatnonzero(rng.uniform(size=len(objects.names)) < 0.3).tolist())
+    counted = [thing for thing in range(len(objects.names)) if thing not in passed_over]
+    things, every = np.tile(counted, count).astype(np.int64), np.repeat(spheres, len(counted), axis=0)
+    expected = float(Solids(objects).overlap(every[:, :3], every[:, 3], things)[0].sum())
+    assert total(spheres, objects, passed_over) == pytest.approx(expected, rel=1e-9, abs=1e-18)
+
+
+def test_a_box_made_of_tetrahedra_or_of_a_mesh_is_the_box() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        center, half, rotation = rng.normal(size=3) * 0.1, rng.uniform(0.05, 0.2, 3), random_rotation(rng)
+        spheres = any_spheres(rng, 10)
+        whole = total(spheres, Scene().add().box(center, half, rotation).objects())
+        parts = total(spheres, Scene().add().box_of_tetrahedra(center, half, rotation).objects())
+        mesh = Mesh(CUBE_CORNERS * half, CUBE_TRIANGLES)
+        of_faces = total(spheres, Scene().add().mesh(mesh, center, rotation).objects())
+        assert parts == pytest.approx(whole, rel=1e-9, abs=1e-15)
+        assert of_faces == pytest.approx(whole, rel=1e-9, abs=1e-15)
+
+
+def test_more_spheres_than_are_worked_out_at_a_time_are_all_counted() -> None:
+    rng = np.random.default_rng(4)
+    objects, spheres = random_scene(rng, 2, 0.4), any_spheres(rng, 700)
+    one_by_one = sum(total(sphere[None], objects) for sphere in spheres)
+    assert total(spheres, objects) == pytest.approx(one_by_one, rel=1e-9)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_sphere_that_is_not_finite_is_named_and_never_silently_far_away(bad: float) -> None:
+    spheres = any_spheres(np.random.default_rng(5), 3)
+    spheres[1, 3] = bad
+    with pytest.raises(ValueError, match="spheres holds NaN or infinity"):
+        total(spheres, random_scene(np.random.default_rng(6), 1))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_many_objects_none_is_passed_over(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene, spheres = Scene(), any_spheres(rng, 5)
+    centers_m, radii_m = rng.uniform(-2.0, 2.0, (10_000, 3)), rng.uniform(0.005, 0.05, 10_000)
+    for center, radius in zip(centers_m, radii_m, strict=True):
+        scene.add().sphere(center, float(radius))
+    expected = sum(sphere_sphere(sphere[None, :3], sphere[3:], centers_m, radii_m).sum() for sphere in spheres)
+    assert expected > 0.0
+    assert total(spheres, scene.objects()) == pytest.approx(float(expected), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ways_among_many_objects_are_those_among_the_near_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centers_m, half_sizes_m = rng.uniform(-2.0, 2.0, (10_000, 3)), rng.uniform(0.005, 0.05, (10_000, 3))
+    near = np.linalg.norm(centers_m, axis=1) < 2.0 * REACH_M
+    scenes = []
+    for kept in (np.ones_like(near), near):
+        scene = Scene()
+        for center, half in zip(centers_m[kept], half_sizes_m[kept], strict=True):
+            scene.add().box(center, half)
+        scenes.append(scene.objects())
+    direction = rng.normal(size=3)
+    looked = along(direction / np.linalg.norm(direction), 0.003)
+    ways_m = [ways_of(ball_pose(0.05), objects, looked) for objects in scenes]
+    assert np.isfinite(ways_m[0]).any()
+    np.testing.assert_allclose(ways_m[0], ways_m[1], rtol=1e-12)

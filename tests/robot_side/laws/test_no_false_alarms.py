@@ -1,0 +1,170 @@
+"""What lies beside, behind, between or along is not felt, however near; what is ahead within is, at its own way."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra
+from robot_side.overlap import Mesh
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look, ways_of
+from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation
+
+INFLATED_M = 0.007
+GRIPPER = gripper_pose()
+SIDE_M = float((GRIPPER.sphere_centers_m[:, 0] + GRIPPER.sphere_radii_m).max())
+ALONG_X = np.array([1.0, 0.0, 0.0])
+seeds = st.integers(0, 2**32 - 1)
+repeatable = settings(derandomize=True, deadline=None, max_examples=40)
+
+
+def bench(made_of: str, top_m: float, rotation: FloatArray) -> PerceivedObjects:
+    """A bench of 0.8 x 0.8 m, 40 mm thick, its top `top_m` along x: one solid, in several ways of telling it."""
+    center, half = np.array([top_m + 0.02, 0.0, 0.1]), np.array([0.02, 0.4, 0.4])
+    halves = [(center + side * np.array([0.0, 0.0, 0.2]), half * [1.0, 1.0, 0.5]) for side in (-1.0, 1.0)]
+    scene = Scene().add()
+    if made_of == "1 box":
+        scene.box(rotation @ center, half, rotation)
+    elif made_of == "mesh":
+        scene.mesh(Mesh(CUBE_CORNERS * half, CUBE_TRIANGLES), rotation @ center, rotation)
+    for part, size in halves:
+        if made_of == "2 boxes":
+            scene.box(rotation @ part, size, rotation)
+        elif made_of == "12 tetrahedra":
+            places, tetrahedra = grid_tetrahedra(1)
+            for corners in (part + (2.0 * places - 1.0) * size)[tetrahedra]:
+                scene.tetrahedron(corners @ rotation.T)
+    return scene.objects()
+
+
+MADE_OF = ("1 box", "2 boxes", "12 tetrahedra", "mesh")
+
+
+@pytest.mark.parametrize("made_of", MADE_OF)
+@pytest.mark.parametrize("gap_m", [0.0, 0.001, 0.003, 0.0069, 0.0071, 0.01, 0.02, 0.03])
+def test_along_a_bench_there_is_no_way_however_it_is_told(made_of: str, gap_m: float) -> None:
+    rotation = random_rotation(np.random.default_rng(3))
+    pose = gripper_pose((0.0, 0.0, 0.0), rotation)
+    objects = bench(made_of, SIDE_M + gap_m, rotation)
+    for direction in (AHEAD, -AHEAD, [0.0, 1.0, 0.0], [0.0, 0.6, -0.8]):
+        found = look(pose, objects, along(rotation @ direction, INFLATED_M))
+        assert np.isinf(found.fast_m).all()
+        assert np.isinf(found.slow_m).all()
+
+
+@pytest.mark.parametrize("made_of", MADE_OF[1:])
+@pytest.mark.parametrize("gap_m", [0.0, 0.003, 0.01, 0.05])
+@pytest.mark.parametrize("degrees", [0, 20, 60])
+def test_towards_a_bench_all_ways_are_equal_however_it_is_told(made_of: str, gap_m: float, degrees: int) -> None:
+    rotation = random_rotation(np.random.default_rng(4))
+    pose = gripper_pose((0.0, 0.0, 0.0), rotation)
+    angle = np.radians(degrees)
+    looked = along(rotation @ (np.cos(angle) * ALONG_X + np.sin(angle) * AHEAD), INFLATED_M)
+    whole = ways_of(pose, bench("1 box", SIDE_M + gap_m, rotation), looked)
+    assert np.isfinite(whole).all()
+    np.testing.assert_allclose(ways_of(pose, bench(made_of, SIDE_M + gap_m, rotation), looked), whole, atol=1e-4)
+
+
+@repeatable
+@given(seed=seeds, gap_m=st.floats(0.0, 0.03))
+def test_surfaces_beside_the_way_are_not_felt_in_either_direction(seed: int, gap_m: float) -> None:
+    """Planes, boxes and rods along the way, all about it, no nearer than the gripper is wide."""
+    rng = np.random.default_rng(seed)
+    scene, width_m = Scene(), float(rng.uniform(0.005, 0.05))
+    for _ in range(5):
+        angle = float(rng.uniform(0.0, 2.0 * np.pi))
+        away = np.array([np.cos(angle), np.sin(angle), 0.0])
+        turned = np.stack([away, np.cross(AHEAD, away), AHEAD], axis=1)
+        nearest = width_m + gap_m
+        scene.add().half_space(-away, -nearest)
+        half = np.array([*rng.uniform(0.001, 0.05, 2), 1.0])
+        scene.add().box((nearest + half[0]) * away, half, turned)
+    # Every sphere just touches the hull of the gripper, wherever along it.
+    angles, radii = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6) * width_m
+    centers = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1) * (width_m - radii)[:, None]
+    pose = free_pose(centers + rng.uniform(-0.1, 0.1, (6, 1)) * AHEAD, radii)
+    for direction in (AHEAD, -AHEAD):
+        assert np.isinf(ways_of(pose, scene.objects(), along(direction, INFLATED_M))).all()
+
+
+@pytest.mark.parametrize("kind", ["wall", "half-space", "ball", "tetrahedron", "mesh"])
+@pytest.mark.parametrize("depth_m", [-0.01, 0.0, 0.005, 0.012, 0.03])
+def test_the_way_back_out_is_free(kind: str, depth_m: float) -> None:
+    """From before a wall, at it and from within: nothing gets worse."""
+    face_m = RADIUS_M - depth_m
+    scene = Scene().add()
+    if kind == "wall":
+        scene.box([0.0, 0.0, face_m + 0.05], [0.3, 0.3, 0.05])
+    elif kind == "half-space":
+        scene.half_space(-AHEAD, -face_m)
+    elif kind == "ball":
+        scene.sphere([0.0, 0.0, face_m + 0.03], 0.03)
+    elif kind == "mesh":
+        scene.mesh(Mesh(0.05 * CUBE_CORNERS, CUBE_TRIANGLES), [0.0, 0.0, face_m + 0.05])
+    else:
+        corners = np.array([[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+        scene.tetrahedron(corners + face_m * AHEAD)
+    assert np.isinf(ways_of(ball_pose(), scene.objects(), along(-AHEAD, INFLATED_M))).all()
+
+
+@pytest.mark.parametrize("made_of", ["boxes", "tetrahedra"])
+@pytest.mark.parametrize("inside_m", [-0.004, 0.0, 0.006, 0.02])
+def test_a_seam_within_an_object_is_no_surface(made_of: str, inside_m: float) -> None:
+    """Two blocks side by side across the way, the sphere as deep in them as is said."""
+    scene, half = Scene().add(), np.array([0.1, 0.2, 0.05])
+    center = np.array([RADIUS_M + 0.1 - inside_m, 0.0, 0.0])
+    for place in (-0.05, 0.05):
+        if made_of == "boxes":
+            scene.box(center + place * AHEAD, half)
+        else:
+            scene.box_of_tetrahedra(center + place * AHEAD, half, np.eye(3))
+    for start_m in (-0.04, -0.01, -0.001, 0.0, 0.01):
+        pose = ball_pose(tool_position_m=start_m * AHEAD)
+        assert np.isinf(ways_of(pose, scene.objects(), along(AHEAD, INFLATED_M, reach_m=0.3))).all()
+
+
+@pytest.mark.parametrize("side_gap_m", [0.0005, 0.002, 0.0069, 0.01])
+@pytest.mark.parametrize("seamless", [True, False])
+def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless: bool) -> None:
+    """The inflated sphere is in both sides from the start, and they are one object with the bottom."""
+    free_m = 0.06
+    bottom_m = RADIUS_M + INFLATED_M + free_m
+    alone = ways_of(ball_pose(), Scene().add().half_space(-AHEAD, -bottom_m).objects(), along(AHEAD, INFLATED_M))
+    side_m = RADIUS_M + side_gap_m
+    scene = Scene().add()
+    for side in (-1.0, 1.0):
+        length = 0.5 * (bottom_m + 0.1) + (0.01 if seamless else 0.0)
+        scene.box([side * (side_m + 0.02), 0.0, bottom_m + (0.02 if seamless else 0.0) - length], [0.02, 0.1, length])
+    scene.box([0.0, 0.0, bottom_m + 0.01], [side_m + (0.0 if seamless else 0.04), 0.1, 0.01])
+    ways = ways_of(ball_pose(), scene.objects(), along(AHEAD, INFLATED_M))
+    # In a narrow U less of the bottom is met, so that strengths are due a little earlier.
+    assert free_m - 0.012 < ways[0] <= alone[0] + 1e-5
+    assert free_m - 0.0015 < ways[7] <= free_m
+
+
+def test_what_is_passed_over_is_not_felt() -> None:
+    scene = Scene().add().box([0.0, 0.0, 0.1], [0.1, 0.1, 0.01]).add().sphere([0.0, 0.0, 0.06], 0.02)
+    obstacle, passed_over = 0, 3
+    looked = along(AHEAD, INFLATED_M)
+    box, ball = (
+        look(ball_pose(), scene.objects(), looked, classes=classes).fast_m
+        for classes in ([obstacle, passed_over], [passed_over, obstacle])
+    )
+    np.testing.assert_allclose(box - ball, 0.05, atol=4e-4)
+    neither = look(ball_pose(), scene.objects(), looked, classes=[passed_over, passed_over])
+    assert np.isinf(neither.fast_m).all()
+    ignored = Scene().add(Role.IGNORED).box([0.0, 0.0, 0.1], [0.1, 0.1, 0.01]).objects()
+    assert np.isinf(ways_of(ball_pose(), ignored, looked)).all()
+
+
+def test_a_closed_gripper_before_a_wall_has_the_ways_of_an_open_one() -> None:
+    fingers = [[0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]]
+    wall = Scene().add().box([0.0, 0.0, 0.1], [0.2, 0.2, 0.02]).objects()
+    opened, closed = (
+        look(free_pose(np.array(fingers) * [[share], [share]], [0.008] * 2, [True] * 2), wall, looked, widest_m=widest)
+        for share, widest, looked in ((1.0, 0.032, along(AHEAD, 0.01)), (0.2, 0.0, along(AHEAD, 0.01)))
+    )
+    np.testing.assert_allclose(closed.fast_m, opened.fast_m, atol=1e-12)

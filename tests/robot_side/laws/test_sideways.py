@@ -1,0 +1,247 @@
+"""What drift, turning, fingers and moving things bring into the way is felt before it is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from common.reaction import HORIZON_S
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from robot_side.arm.port import GripperPose
+from robot_side.laws.schedule import FIELD_PERIOD_S
+from robot_side.laws.sideways import SPACING_M, FingerMotion, Sideways
+from robot_side.overlap import Mesh
+from robot_side.surroundings.perceived import PerceivedObjects
+from tests.helpers.field.fields import RADIUS_M, ball_pose
+from tests.helpers.field.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
+from tests.helpers.gripper_poses import free_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation
+
+LOOP_S = 0.1
+STOPPING_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
+
+
+def post(x_m: float, z_m: float, half_m: float = 0.01) -> PerceivedObjects:
+    """Upright, so far to the side and ahead of the tool's point."""
+    return Scene().add().box([x_m, 0.0, z_m], [half_m, 0.3, half_m]).objects()
+
+
+def first_ways(objects: PerceivedObjects, velocity: list[float], turning: list[float]) -> tuple[FloatArray, FloatArray]:
+    """L2's and R2's ways of full strength as a ball moves so."""
+    rates = np.array([*velocity, *turning])
+    sensed = swept().sense(situation(ball_pose(), objects, joint_velocities_rad_s=rates, loop_age_s=LOOP_S), 0.0)
+    return np.array(sensed.l2.fast_m), np.array(sensed.r2.fast_m)
+
+
+def felt(objects: PerceivedObjects, velocity: list[float], turning: list[float] | None = None) -> bool:
+    return bool(first_ways(objects, velocity, turning or [0.0, 0.0, 0.0])[1][7] < 0.1)
+
+
+def test_a_post_beside_the_way_is_felt_by_who_drifts_towards_it_and_by_nobody_else() -> None:
+    for x_m in (0.04, 0.055):
+        assert not felt(post(x_m, 0.08), [0.0, 0.0, 0.2])
+        assert felt(post(x_m, 0.08), [0.1, 0.0, 0.2])
+        assert not felt(post(x_m, 0.08), [-0.1, 0.0, 0.2])
+        assert not felt(post(x_m, 0.08), [0.0, 0.1, 0.2])
+    # Farther than it gets before it stands.
+    assert not felt(post(0.1 * STOPPING_S + 0.04, 0.08), [0.1, 0.0, 0.2])
+
+
+def test_a_thin_post_is_not_passed_over_between_two_places() -> None:
+    for x_m in np.arange(0.03, 0.05, 0.001):
+        assert felt(post(float(x_m), 0.08, half_m=0.001), [0.1, 0.0, 0.2])
+
+
+def test_a_post_that_a_turn_brings_into_the_way_is_felt() -> None:
+    """A turn about y by ω takes what lies ahead along z towards +x."""
+    assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2])
+    assert felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, 1.0, 0.0])
+    assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, -1.0, 0.0])
+
+
+def test_what_is_ahead_is_felt_as_before_by_who_drifts() -> None:
+    wall = Scene().add().box([0.0, 0.0, 0.15], [0.5, 0.5, 0.05]).objects()
+    straight, drifting = (first_ways(wall, [drift, 0.0, 0.2], [0.0, 0.0, 0.0])[1] for drift in (0.0, 0.1))
+    np.testing.assert_allclose(drifting, straight, atol=2e-4)
+
+
+def test_a_wall_that_is_drifted_along_or_towards_is_not_ahead() -> None:
+    wall = Scene().add().box([0.06, 0.0, 0.0], [0.05, 0.5, 0.5]).objects()
+    for drift in (0.1, -0.1, 0.0):
+        back, forth = first_ways(wall, [drift, 0.0, 0.2], [0.0, 0.0, 0.0])
+        assert back[0] > 0.1
+        assert forth[0] > 0.1
+
+
+# Objects that move by themselves
+
+
+def moving_wall(ahead_m: float, velocity: list[float]) -> PerceivedObjects:
+    wall = Scene().add().box([0.0, 0.0, RADIUS_M + ahead_m + 0.05], [0.5, 0.5, 0.05]).objects()
+    return replace(wall, velocities_m_s=np.array([velocity]))
+
+
+@pytest.mark.parametrize("speed_m_s", [0.02, 0.1, 0.3])
+def test_what_comes_nearer_shortens_its_ways_by_what_it_covers_until_the_arm_stands(speed_m_s: float) -> None:
+    still = first_ways(moving_wall(0.12, [0.0, 0.0, 0.0]), [0.0] * 3, [0.0] * 3)[1]
+    nearing = first_ways(moving_wall(0.12, [0.0, 0.0, -speed_m_s]), [0.0] * 3, [0.0] * 3)[1]
+    np.testing.assert_allclose(nearing, still - speed_m_s * STOPPING_S, atol=1e-6)
+    for away in ([0.0, 0.0, speed_m_s], [speed_m_s, 0.0, 0.0]):
+        np.testing.assert_allclose(first_ways(moving_wall(0.12, away), [0.0] * 3, [0.0] * 3)[1], still, atol=1e-9)
+
+
+def test_it_is_felt_from_beyond_the_reach() -> None:
+    """What stands there still is not: nobody gets so far."""
+    far_m = FULL_SPEED_M_S * STOPPING_S + 0.15
+    still, nearing = (
+        first_ways(moving_wall(far_m, [0.0, 0.0, -speed]), [0.0] * 3, [0.0] * 3)[1] for speed in (0.0, 0.4)
+    )
+    assert nearing[7] == pytest.approx(far_m - 0.4 * STOPPING_S, abs=0.012)
+    assert still[7] > nearing[7]
+
+
+def test_only_the_object_that_moves_comes_nearer() -> None:
+    scene = Scene().add().box([0.0, 0.0, 0.15], [0.5, 0.5, 0.05]).add().box([0.2, 0.0, 0.0], [0.05, 0.5, 0.5])
+    objects = scene.objects()
+    still = first_ways(objects, [0.0] * 3, [0.0] * 3)[1]
+    other = replace(objects, velocities_m_s=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -0.3]]))
+    np.testing.assert_allclose(first_ways(other, [0.0] * 3, [0.0] * 3)[1], still, atol=1e-9)
+
+
+@pytest.mark.parametrize("velocities", [np.zeros((2, 3)), np.full((1, 3), np.nan)])
+def test_velocities_that_cannot_be_are_refused(velocities: FloatArray) -> None:
+    with pytest.raises(ValueError, match=r"objects\.velocities_m_s"):
+        first_ways(replace(moving_wall(0.1, [0.0] * 3), velocities_m_s=velocities), [0.0] * 3, [0.0] * 3)
+
+
+# Fingers
+
+
+def test_what_the_fingers_close_towards_is_felt() -> None:
+    """Two fingers 80 mm apart that close at 70 mm/s, and a rod that stands 20 mm ahead of them, 20 mm inwards."""
+    objects, law = post(0.02, 0.03, half_m=0.003), swept()
+    for tick in range(12):
+        time_s = tick * FIELD_PERIOD_S
+        apart_m = 0.05 - 0.07 * time_s
+        pose = free_pose([[apart_m, 0.0, 0.0], [-apart_m, 0.0, 0.0]], [RADIUS_M, RADIUS_M])
+        sensed = law.sense(situation(pose, objects, loop_age_s=LOOP_S), time_s)
+        if tick == 0:
+            assert sensed.r2.fast_m[7] > 0.1
+    assert sensed.r2.fast_m[7] < 0.03
+
+
+def test_fingers_that_rest_do_not_move_however_their_readings_shake() -> None:
+    rng, fingers = np.random.default_rng(1), FingerMotion()
+    for tick in range(100):
+        centers = np.array([[0.05, 0.0, 0.0], [-0.05, 0.0, 0.0]]) + 5e-5 * rng.standard_normal((2, 3))
+        assert (fingers.see(free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01) == 0.0).all()
+
+
+def test_what_is_gripped_or_let_go_while_the_gripper_drifts_changes_nothing_but_the_spheres() -> None:
+    law, objects = swept(), post(0.04, 0.08)
+    rates = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
+    one, two = free_pose([[0.0] * 3], [RADIUS_M]), free_pose([[0.0] * 3, [0.0, 0.0, -0.02]], [RADIUS_M, RADIUS_M])
+    for tick, pose in enumerate([one, one, two, two, one, two] * 8):
+        situation_ = situation(pose, objects, joint_velocities_rad_s=rates, loop_age_s=LOOP_S)
+        assert law.sense(situation_, tick * 0.001).r2.fast_m[7] < 0.1
+
+
+# Places
+
+
+def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.0, 0.1]], [RADIUS_M, RADIUS_M])
+    for drift, turn in ((0.1, 0.0), (0.0, 0.5), (0.08, 0.2), (0.001, 0.0)):
+        sideways = Sideways(np.array([drift, 0.0, 0.0]), np.array([0.0, turn, 0.0]), np.zeros((2, 3)))
+        moments = sideways.moments(pose, 0.8)
+        if drift == 0.001:
+            assert moments == ()
+            continue
+        assert moments[-1] == pytest.approx(0.8)
+        centers = [pose.sphere_centers_m, *(sideways.moved(pose, moment).sphere_centers_m for moment in moments)]
+        # Along an arc the chord is shorter, and the arc about a moving point a little longer, than reckoned.
+        assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
+
+
+def test_there_are_no_more_than_eight_places_however_far_apart_they_are() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0]], [RADIUS_M])
+    for until_s, count in ((1.19, 8), (3.0, 8), (1.04, 7)):
+        sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.zeros(3), np.zeros((1, 3)))
+        moments = sideways.moments(pose, until_s)
+        assert len(moments) == count
+        np.testing.assert_allclose(np.diff(moments), until_s / count)
+
+
+def test_a_turned_gripper_keeps_its_shape_and_looks_where_it_points() -> None:
+    pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.02, 0.1]], [RADIUS_M, RADIUS_M])
+    sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.5, 0.0]), np.zeros((2, 3)))
+    moved = sideways.moved(pose, 1.0)
+    np.testing.assert_allclose(moved.tool_position_m, pose.tool_position_m + np.array([0.1, 0.0, 0.0]))
+    np.testing.assert_allclose(moved.tool_rotation[:, 2], [np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
+    in_tool = [(one.sphere_centers_m - one.tool_position_m) @ one.tool_rotation for one in (pose, moved)]
+    np.testing.assert_allclose(in_tool[0], in_tool[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("speed_m_s", [1e-15, 0.05])
+def test_a_mesh_that_moves_is_felt_like_a_box_that_does(speed_m_s: float) -> None:
+    """Measured velocities are hardly ever exactly 0."""
+    wall = (
+        Scene()
+        .add()
+        .mesh(Mesh(CUBE_CORNERS * [0.5, 0.5, 0.05], CUBE_TRIANGLES), [0.0, 0.0, RADIUS_M + 0.12 + 0.05])
+        .objects()
+    )
+    meshed = replace(wall, velocities_m_s=np.array([[0.0, 0.0, -speed_m_s]]))
+    boxed = moving_wall(0.12, [0.0, 0.0, -speed_m_s])
+    as_mesh, as_box = (first_ways(objects, [0.0] * 3, [0.0] * 3)[1] for objects in (meshed, boxed))
+    np.testing.assert_allclose(as_mesh, as_box, atol=1e-4)
+    far_m = FULL_SPEED_M_S * STOPPING_S + 0.15
+    beyond = (
+        Scene()
+        .add()
+        .mesh(Mesh(CUBE_CORNERS * [0.5, 0.5, 0.05], CUBE_TRIANGLES), [0.0, 0.0, RADIUS_M + far_m + 0.05])
+        .objects()
+    )
+    fast = replace(beyond, velocities_m_s=np.array([[0.0, 0.0, -0.4]]))
+    assert first_ways(fast, [0.0] * 3, [0.0] * 3)[1][7] == pytest.approx(far_m - 0.4 * STOPPING_S, abs=0.012)
+
+
+def random_pose(rng: np.random.Generator, count: int) -> GripperPose:
+    pose = free_pose(rng.normal(size=(count, 3)), np.full(count, RADIUS_M))
+    return replace(pose, tool_position_m=rng.normal(size=3), tool_rotation=random_rotation(rng))
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 20), after_s=st.floats(0.0, 3.0))
+def test_drift_is_what_rotations_of_scipy_and_sums_of_vectors_make_it(seed: int, count: int, after_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    pose, turning = random_pose(rng, count), rng.normal(size=3) * (seed % 4 > 0)
+    sideways = Sideways(rng.normal(size=3), turning, rng.normal(size=(count, 3)))
+    moved, turn = sideways.moved(pose, after_s), Rotation.from_rotvec(turning * after_s).as_matrix()
+    tool_m = pose.tool_position_m + sideways.linear_m_s * after_s
+    lever = pose.sphere_centers_m - pose.tool_position_m
+    np.testing.assert_allclose(moved.tool_position_m, tool_m, atol=1e-12)
+    np.testing.assert_allclose(moved.tool_rotation, turn @ pose.tool_rotation, atol=1e-12)
+    centers_m = tool_m + (lever + sideways.own_m_s * after_s) @ turn.T
+    np.testing.assert_allclose(moved.sphere_centers_m, centers_m, atol=1e-12)
+    speeds = [
+        sideways.linear_m_s + np.cross(turning, one) + sideways.own_m_s
+        for one in (lever, lever + 0.3 * pose.tool_rotation[:, 2])
+    ]
+    farthest_m = after_s * np.linalg.norm(speeds, axis=2).max()
+    assert sideways.farthest_m(pose, after_s, 0.3) == pytest.approx(farthest_m, abs=1e-12)
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_fingers_move_by_the_difference_in_the_tool_frame(seed: int) -> None:
+    rng, fingers = np.random.default_rng(seed), FingerMotion()
+    then, now = random_pose(rng, 5), random_pose(rng, 5)
+    assert not fingers.see(then, 1.0).any()
+    in_tool = [(pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation for pose in (then, now)]
+    expected = (in_tool[1] - in_tool[0]) / 0.05 @ now.tool_rotation.T
+    np.testing.assert_allclose(fingers.see(now, 1.05), expected, atol=1e-11)

@@ -1,0 +1,209 @@
+"""What the swept law streams and says: how far it looks, its own displacement, and eq. 9-10 as it applies them."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.reaction import HORIZON_S
+from robot_side.enlargement.prediction_errors import PredictionErrors
+from robot_side.laws.felt import BEYOND_M
+from robot_side.laws.schedule import FIELD_PERIOD_S
+from robot_side.overlap import sphere_box
+from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
+from tests.helpers.field.situations import (
+    ACCELERATION_M_S2,
+    EXACT,
+    FULL_SPEED_M_S,
+    SIGMA_M,
+    Senses,
+    at,
+    moving,
+    swept,
+    walls,
+)
+from tests.helpers.gripper_poses import FRONT_M, gripper_pose
+from tests.helpers.perceived_scenes import Scene, random_rotation
+
+GRIPPER = gripper_pose()
+
+
+def horizon_m(loop_age_s: float) -> float:
+    braking_m = FULL_SPEED_M_S**2 / (2.0 * ACCELERATION_M_S2)
+    return FULL_SPEED_M_S * (loop_age_s + HORIZON_S) + braking_m + BEYOND_M
+
+
+# How far it looks
+
+
+@pytest.mark.parametrize("loop_age_s", [0.001, 0.1, 0.4, 1.0])
+def test_the_horizon_is_what_a_reaction_the_loop_age_and_braking_take_and_a_little_more(loop_age_s: float) -> None:
+    sensed = Senses().sense(GRIPPER, walls(None), loop_age_s=loop_age_s)
+    assert sensed.horizon_m == pytest.approx(horizon_m(loop_age_s), rel=1e-12)
+    for felt in (sensed.l2, sensed.r2):
+        assert felt.fast_m == felt.slow_m == (sensed.horizon_m,) * 8
+        assert felt.full_speed_m_s == pytest.approx(FULL_SPEED_M_S)
+        assert felt.acceleration_m_s2 == pytest.approx(ACCELERATION_M_S2)
+        assert felt.stiffness == 0.0
+
+
+@pytest.mark.parametrize("loop_age_s", [0.0, 0.1, 0.5])
+def test_ways_end_at_the_horizon(loop_age_s: float) -> None:
+    inside = horizon_m(loop_age_s) + SIGMA_M - 0.001
+    sensed = Senses().sense(GRIPPER, walls(inside, front_m=FRONT_M), loop_age_s=loop_age_s)
+    assert all(way < sensed.horizon_m for way in sensed.r2.fast_m)
+    beyond = Senses().sense(GRIPPER, walls(inside + 0.014, front_m=FRONT_M), loop_age_s=loop_age_s)
+    assert beyond.r2.fast_m == (beyond.horizon_m,) * 8
+
+
+def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:
+    """The loop age may jump up, and the tool move, between two looks."""
+    senses = Senses(step_s=0.001)
+    near = senses.sense(at(0.0), walls(0.2), loop_age_s=0.1)
+    jumped = senses.sense(at(0.004), walls(0.2), loop_age_s=1.0)
+    reach_m = horizon_m(0.1) + 2.0 * FIELD_PERIOD_S * FULL_SPEED_M_S
+    assert near.horizon_m == pytest.approx(horizon_m(0.1))
+    assert jumped.horizon_m == pytest.approx(reach_m - 0.004)
+    assert jumped.r2.fast_m == (jumped.horizon_m,) * 8
+    senses.step_s = 0.011
+    for _ in range(2):
+        looked = senses.sense(at(0.004), walls(0.2), loop_age_s=1.0)
+    assert looked.horizon_m == pytest.approx(horizon_m(1.0))
+    assert looked.r2.fast_m[7] < 0.2
+
+
+def test_the_ways_are_the_same_at_every_loop_age() -> None:
+    """The delay moves the gripper along the ways, on whichever side reckons with it; it does not swell the gripper."""
+    expected = Senses().sense(GRIPPER, walls(0.05, front_m=FRONT_M), loop_age_s=0.0)
+    for loop_age_s in (0.05, 0.2, 0.8):
+        ahead = moving(0.2 * AHEAD)
+        found = Senses().sense(
+            GRIPPER, walls(0.05, front_m=FRONT_M), loop_age_s=loop_age_s, joint_velocities_rad_s=ahead
+        )
+        np.testing.assert_allclose(found.r2.fast_m, expected.r2.fast_m, atol=1e-9)
+
+
+# The displacement by the robot side's own reckoning
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.2, -0.15])
+def test_the_displacement_is_the_speed_along_each_trigger_in_the_loop_age(speed_m_s: float) -> None:
+    rotation = random_rotation(np.random.default_rng(1))
+    velocity = speed_m_s * rotation[:, 2] + 0.05 * rotation[:, 0]
+    pose = gripper_pose((0.1, 0.2, 0.3), rotation)
+    sensed = Senses().sense(pose, joint_velocities_rad_s=moving(velocity), loop_age_s=0.3)
+    assert sensed.speed_m_s == pytest.approx(speed_m_s)
+    assert sensed.r2.displacement_m == pytest.approx(0.3 * speed_m_s)
+    assert sensed.l2.displacement_m == pytest.approx(-0.3 * speed_m_s)
+
+
+def test_while_it_is_not_known_what_is_under_way_full_speed_is() -> None:
+    for speed_m_s in (0.0, 0.1, -0.1):
+        velocity = moving(speed_m_s * AHEAD)
+        sensed = Senses().sense(GRIPPER, joint_velocities_rad_s=velocity, loop_age_s=0.5, loop_age_known=False)
+        assert sensed.r2.displacement_m == pytest.approx(0.5 * FULL_SPEED_M_S)
+        assert sensed.l2.displacement_m == pytest.approx(0.5 * FULL_SPEED_M_S)
+
+
+def test_the_stiffness_is_that_of_the_fast_list_at_the_displacement() -> None:
+    wall = walls(0.05)
+    found = []
+    for speed_m_s in np.linspace(0.0, 0.25, 26):
+        velocity = moving(speed_m_s * AHEAD)
+        sensed = Senses().sense(ball_pose(), wall, joint_velocities_rad_s=velocity, loop_age_s=0.2)
+        expected = sum(way <= 0.2 * speed_m_s for way in sensed.r2.fast_m) / 8
+        assert sensed.r2.stiffness == expected
+        assert sensed.l2.stiffness == 0.0
+        found.append(expected)
+    assert found == sorted(found)
+    assert len(set(found)) > 6
+
+
+# Eq. 9-10 as the law applies it
+
+
+def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_shortens_the_others() -> None:
+    """μ_c is true minus perceived: 5 mm along the approach, and all there is is 5 mm farther ahead."""
+    rotation = random_rotation(np.random.default_rng(2))
+    approach = rotation[:, 2]
+    # A large sphere goes into a wall as a larger one does.
+    pose = ball_pose(0.1, tool_rotation=rotation)
+    scene = Scene()
+    for side in (-1.0, 1.0):
+        scene.add().half_space(-side * approach, -0.17)
+    plain, known = (
+        Senses(swept(camera_mean_m=tuple(mean_m * approach), camera_sd_m=0.01)).sense(pose, scene.objects())
+        for mean_m in (0.0, 0.005)
+    )
+    np.testing.assert_allclose(np.array(known.r2.fast_m) - plain.r2.fast_m, 0.005, atol=1e-4)
+    np.testing.assert_allclose(np.array(known.l2.fast_m) - plain.l2.fast_m, -0.005, atol=1e-4)
+    # An arm that is 5 mm farther along than it reckons is the same from the other side.
+    arm = Senses(swept(kinematic_mean_m=tuple(-0.005 * approach), camera_sd_m=0.01)).sense(pose, scene.objects())
+    np.testing.assert_allclose(arm.r2.fast_m, known.r2.fast_m, atol=1e-9)
+    np.testing.assert_allclose(arm.l2.fast_m, known.l2.fast_m, atol=1e-9)
+
+
+def test_what_the_prediction_misses_is_that_of_whoever_predicts() -> None:
+    missed = PredictionErrors({"operator": ((0.2, 0.001, 0.0),), "robot": ((0.2, 0.0, 0.02),)})
+    pose, wall = ball_pose(0.1), walls(0.15, front_m=0.1)
+
+    def ways(prediction: PredictionErrors, **changes: Any) -> FloatArray:
+        return np.array(Senses(swept(prediction=prediction)).sense(pose, wall, loop_age_s=0.2, **changes).r2.fast_m)
+
+    exact = ways(EXACT)
+    np.testing.assert_allclose(exact - ways(missed, compensation="operator"), 0.001, atol=1e-4)
+    robot = 2.3263478740408408 * math.hypot(0.003, 0.02)
+    np.testing.assert_allclose(exact - ways(missed, compensation="robot"), robot - SIGMA_M, atol=6e-4)
+    # Without a table, a fifth of the way that full speed goes in the loop age.
+    np.testing.assert_allclose(exact - ways(PredictionErrors()), 0.2 * FULL_SPEED_M_S * 0.2, atol=3e-4)
+
+
+# The figures of the summary
+
+
+def test_the_enlargement_and_the_overlap_by_hand() -> None:
+    velocity_m_s, loop_age_s = 0.2, 0.3
+    for sign, ahead_m, behind_m in ((1.0, 0.05, None), (-1.0, None, 0.05)):
+        senses = Senses()
+        velocity = moving(sign * velocity_m_s * AHEAD + [0.05, 0.0, 0.0])
+        sensed = senses.sense(
+            ball_pose(), walls(ahead_m, behind_m), joint_velocities_rad_s=velocity, loop_age_s=loop_age_s
+        )
+        assert sensed.enlargement_m == pytest.approx(loop_age_s * math.hypot(velocity_m_s, 0.05) + SIGMA_M)
+        moved = np.array([[0.0, 0.0, velocity_m_s * loop_age_s]])
+        wall = np.array([[0.0, 0.0, RADIUS_M + 0.05 + 0.05]]), np.eye(3)[None], np.array([[0.5, 0.5, 0.05]])
+        expected = sphere_box(moved, np.array([RADIUS_M + SIGMA_M]), *wall)[0]
+        assert expected > 1e-7
+        assert sensed.overlap_m3 == pytest.approx(expected, rel=1e-9)
+    still = Senses().sense(ball_pose(), walls(0.05), loop_age_s=loop_age_s)
+    assert still.overlap_m3 == 0.0
+
+
+def test_the_summary_counts_the_work() -> None:
+    senses = Senses()
+    senses.sense(GRIPPER, walls(0.05, front_m=FRONT_M))
+    senses.sense(GRIPPER, walls(None))
+    summary = senses.law.summary()
+    assert (summary["fields"], summary["with_nothing_near"]) == (4, 3)
+    assert summary["pairs"] > 0
+    assert summary["overlaps"] > 0
+    assert summary["limited"] == 0
+
+
+# What cannot be
+
+
+@pytest.mark.parametrize("name", ["tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m"])
+def test_a_pose_that_is_not_finite_is_an_error_and_no_field(name: str) -> None:
+    values = getattr(GRIPPER, name).copy()
+    values.reshape(-1)[-1] = math.nan
+    with pytest.raises(ValueError, match="valid: "):
+        Senses().sense(dataclasses.replace(GRIPPER, **{name: values}), walls(0.1))
+
+
+def test_velocities_that_are_not_finite_are_an_error() -> None:
+    with pytest.raises(ValueError, match="valid: "):
+        Senses().sense(GRIPPER, walls(0.1), joint_velocities_rad_s=np.full(6, math.nan))

@@ -1,0 +1,150 @@
+"""When the swept law looks, tick by tick in virtual time, and what holds until it looks again."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
+from robot_side.laws.recent_looks import STEADY_S
+from robot_side.laws.schedule import FIELD_PERIOD_S
+from tests.helpers.field.fields import EQUAL_M, ball_pose
+from tests.helpers.field.situations import Senses, at, situation, swept, walls
+from tests.helpers.perceived_scenes import Scene
+
+# When it looks
+
+
+class Watched:
+    """A law that is used tick by tick, and where it looked in each."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.law = swept()
+        self.looks: list[tuple[float, str]] = []
+        self.now_s = 7.0
+        look: Callable[..., Any] = self.law.ahead.look
+
+        def watched(pose: GripperPose, scene: Any, classes: Any, along: Any, widest_m: float) -> Any:
+            along_z = float(along.direction @ pose.tool_rotation[:, 2])
+            self.looks.append((self.now_s, {1: "r2", -1: "l2"}.get(round(along_z), "stick")))
+            return look(pose, scene, classes, along, widest_m)
+
+        monkeypatch.setattr(self.law.ahead, "look", watched)
+
+    def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
+        """How often it looked in each tick."""
+        numbers = []
+        for _ in range(count):
+            self.now_s += step_s
+            before = len(self.looks)
+            self.law.sense(situation(ball_pose(), walls(0.1), **changes), self.now_s)
+            numbers.append(len(self.looks) - before)
+        return numbers
+
+    def pauses_s(self, side: str) -> FloatArray:
+        times = [when_s for when_s, where in self.looks if where == side]
+        return np.diff(times)
+
+
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch) -> Watched:
+    return Watched(monkeypatch)
+
+
+@pytest.mark.parametrize("lateral", [(0.0, 0.0), (0.5, 0.2)])
+def test_fields_are_looked_at_in_turns_a_hundred_times_a_second(watched: Watched, lateral: tuple[float, float]) -> None:
+    numbers = watched.tick(0.001, 200, lateral=lateral)
+    sides = ["r2", "l2"] + ["stick"] * (lateral != (0.0, 0.0))
+    # The triggers must never be without a field.
+    assert numbers[0] == len(sides)
+    assert max(numbers[1:]) == 1
+    for side in sides:
+        pauses_s = watched.pauses_s(side)
+        assert len(pauses_s) >= 18
+        # The first pause is longer by a tick that measures, and by one for each side before it.
+        assert pauses_s[0] <= FIELD_PERIOD_S + 0.003 + 1e-9
+        np.testing.assert_allclose(pauses_s[1:], FIELD_PERIOD_S, atol=1e-9)
+
+
+@pytest.mark.parametrize("step_s", [0.004, 0.005, 0.012, 0.05])
+def test_no_side_starves_however_late_the_ticks_are(watched: Watched, step_s: float) -> None:
+    watched.tick(step_s, 60, lateral=(1.0, 0.0))
+    for side in ("r2", "l2", "stick"):
+        assert watched.pauses_s(side).max() <= max(3.0 * FIELD_PERIOD_S, step_s) + step_s + 1e-9
+
+
+def test_a_tick_has_two_looks_where_one_has_waited_too_long_and_all_after_a_long_pause(watched: Watched) -> None:
+    assert watched.tick(0.004, 1, lateral=(1.0, 0.0)) == [3]
+    assert set(watched.tick(0.004, 60, lateral=(1.0, 0.0))) == {0, 1, 2}
+    assert watched.tick(0.06, 1, lateral=(1.0, 0.0)) == [3]
+
+
+def test_a_stick_that_is_deflected_is_looked_along_within_a_tick_or_two(watched: Watched) -> None:
+    watched.tick(0.001, 25)
+    assert "stick" not in {side for _, side in watched.looks}
+    watched.tick(0.001, 3, lateral=(0.3, 0.0))
+    assert "stick" in {side for _, side in watched.looks}
+    before = len([1 for _, side in watched.looks if side == "stick"])
+    watched.tick(0.001, 30)
+    assert len([1 for _, side in watched.looks if side == "stick"]) == before
+
+
+def test_a_pose_that_is_refused_changes_nothing_that_was_seen() -> None:
+    law, before = swept(), at(0.0)
+    seen = law.sense(situation(before, walls(0.03, 0.03)), 7.0)
+    broken = replace(before, sphere_centers_m=np.full_like(before.sphere_centers_m, np.nan))
+    with pytest.raises(ValueError, match="sphere_centers_m"):
+        law.sense(situation(broken, walls(0.03, 0.03)), 7.02)
+    again = law.sense(situation(before, walls(0.03, 0.03)), 7.021)
+    np.testing.assert_allclose(again.r2.fast_m, seen.r2.fast_m, rtol=0.0, atol=1e-12)
+
+
+def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
+    law = swept()
+    first = law._classes_of(situation(ball_pose(), walls(0.1, 0.1)))
+    assert law._classes_of(situation(ball_pose(), walls(0.2, 0.1))) is first
+    held = law._classes_of(situation(ball_pose(), walls(0.2, 0.1), held=1))
+    assert held.tolist() != first.tolist()
+
+
+# What holds between two looks
+
+
+def test_ways_are_shortened_by_what_the_tool_has_moved_along() -> None:
+    senses = Senses(step_s=0.001)
+    before = senses.sense(at(0.0), walls(0.08, 0.05))
+    looked = senses.law.summary()["fields"]
+    after = senses.sense(at(0.002, 0.004), walls(0.08, 0.05))
+    assert senses.law.summary()["fields"] == looked
+    np.testing.assert_allclose(after.r2.fast_m, np.array(before.r2.fast_m) - 0.002, atol=1e-12)
+    np.testing.assert_allclose(after.r2.slow_m, np.array(before.r2.slow_m) - 0.002, atol=1e-12)
+    np.testing.assert_allclose(after.l2.fast_m, np.array(before.l2.fast_m) + 0.002, atol=1e-12)
+
+
+def test_a_way_that_was_found_holds_for_a_tenth_of_a_second_and_a_new_one_at_once() -> None:
+    """Strength rises at once and falls slowly: where something is just passed, noise must not make it flicker."""
+    senses = Senses(step_s=0.01)
+    near, far = walls(0.05), walls(0.09)
+    there = senses.sense(at(0.0), near).r2.fast_m
+    for tick in range(1, 30):
+        found = senses.sense(at(0.0), far).r2.fast_m
+        if tick * 0.01 < STEADY_S - 1e-6:
+            np.testing.assert_allclose(found, there, atol=1e-12)
+        elif tick * 0.01 > STEADY_S + 0.01:
+            np.testing.assert_allclose(found, np.array(there) + 0.04, atol=EQUAL_M)
+    for _ in range(2):
+        again = senses.sense(at(0.0), near).r2.fast_m
+    np.testing.assert_allclose(again, there, atol=1e-12)
+
+
+def test_what_was_seen_along_another_direction_holds_no_more() -> None:
+    senses = Senses(step_s=0.01)
+    ball = Scene().add().sphere([0.0, 0.0, 0.1], 0.02).objects()
+    assert senses.sense(at(0.0), ball).r2.fast_m[0] < 0.07
+    turned = ball_pose(tool_rotation=np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]))
+    for _ in range(2):
+        found = senses.sense(turned, ball)
+    assert found.r2.fast_m[0] == found.horizon_m

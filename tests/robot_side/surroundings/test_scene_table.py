@@ -1,0 +1,291 @@
+"""The table of a frame: a row for each primitive, those of an object together; made once, refused where it is bad."""
+
+import dataclasses
+import weakref
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
+from robot_side.field.field import Ahead
+from robot_side.overlap import Mesh
+from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
+from robot_side.surroundings import surroundings as module
+from robot_side.surroundings.blocks import TOGETHER
+from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
+from robot_side.surroundings.movers import Movers
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.scene_table import SceneTable, make, moved_table, scene_table
+from robot_side.surroundings.surroundings import Surroundings
+from robot_side.surroundings.validity import require_valid
+from tests.helpers.field.fields import along, ball_pose, look
+from tests.helpers.field.primitive_rows import object_bound
+from tests.helpers.field.primitive_rows import rows_of as rows_of_primitives
+from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+
+
+def mixed() -> PerceivedObjects:
+    """Objects whose primitives of one kind do not follow each other."""
+    cube = Mesh(0.1 * CUBE_CORNERS, CUBE_TRIANGLES)
+    scene = Scene().add().sphere([1.0, 0.0, 0.0], 0.1).box([1.0, 0.0, 0.2], [0.1, 0.2, 0.3]).mesh(cube, [1.0, 0.5, 0.0])
+    scene.add(Role.IGNORED).add().half_space([0.0, 0.0, 1.0], -1.0)
+    scene.add().box([2.0, 0.0, 0.0], [0.1, 0.1, 0.1]).sphere([2.0, 0.0, 0.3], 0.2)
+    return scene.tetrahedron([[2.0, 0.0, 0.0], [2.1, 0.0, 0.0], [2.0, 0.1, 0.0], [2.0, 0.0, 0.3]]).objects()
+
+
+def rows_of(table: SceneTable, thing: int) -> range:
+    return range(int(table.first_rows[thing]), int(table.first_rows[thing + 1]))
+
+
+def test_the_rows_of_an_object_are_together_and_say_where_they_come_from() -> None:
+    table = scene_table(mixed())
+    kinds = [[int(table.kinds[row]) for row in rows_of(table, thing)] for thing in range(4)]
+    assert kinds == [[SPHERE, BOX, MESH], [], [HALF_SPACE], [SPHERE, BOX, TETRAHEDRON]]
+    assert [int(table.rows_of_kind[row]) for row in rows_of(table, 3)] == [1, 1, 0]
+    assert table.object_index.tolist() == [0, 0, 0, 2, 3, 3, 3]
+    assert table.has_meshes
+    assert table.flat == 0
+    volumes = [4 / 3 * np.pi * 0.1**3 + 8 * 0.1 * 0.2 * 0.3 + 0.2**3, 0.0, np.inf]
+    np.testing.assert_allclose(table.object_volumes, [*volumes, 0.2**3 + 4 / 3 * np.pi * 0.2**3 + 0.003 / 6])
+
+
+def test_what_has_no_volume_is_left_out_and_counted() -> None:
+    scene = Scene().add().sphere([0.0, 0.0, 0.02], 0.0).box([0.0, 0.0, 0.02], [0.1, 0.0, 0.1])
+    scene.tetrahedron([[0.0, 0.0, 0.02], [0.1, 0.0, 0.02], [0.0, 0.1, 0.02], [0.1, 0.1, 0.02]])
+    whole = scene_table(scene.objects())
+    assert whole.flat == 3
+    assert len(whole.kinds) == 0
+    by = Ahead(np.zeros(6))
+    assert np.isinf(look(ball_pose(0.05), whole.objects, along(), by=by).fast_m).all()
+    assert (by.counts.with_nothing_near, by.counts.flat) == (1, 3)
+    beside = scene_table(scene.sphere([0.0, 0.0, 0.1], 0.01).objects())
+    assert beside.flat == 3
+    assert beside.rows_of_kind.tolist() == [1]
+
+
+def surface_points(objects: PerceivedObjects, kind: int, row: int, rng: np.random.Generator) -> FloatArray:
+    """Points (n, 3) of a primitive that reach as far as it does."""
+    units = rng.normal(size=(200, 3))
+    units /= np.linalg.norm(units, axis=1)[:, None]
+    if kind == SPHERE:
+        return np.asarray(objects.sphere_centers_m[row] + objects.sphere_radii_m[row] * units)
+    if kind == BOX:
+        corners = CUBE_CORNERS * objects.box_half_sizes_m[row]
+        return np.asarray(objects.box_centers_m[row] + corners @ objects.box_rotations[row].T)
+    return np.asarray(objects.tetrahedron_vertices_m[row])
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_bounds_contain_their_primitives_and_those_of_objects_their_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    objects = random_scene(rng, 3)
+    table = scene_table(objects)
+    for row in np.flatnonzero(table.kinds != HALF_SPACE):
+        points = surface_points(objects, int(table.kinds[row]), int(table.rows_of_kind[row]), rng)
+        for bounds in (table.bounds[row], table.object_bounds[table.object_index[row]]):
+            assert np.linalg.norm(points - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
+
+
+def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[PerceivedObjects] = []
+
+    def counting(objects: PerceivedObjects) -> None:
+        seen.append(objects)
+        require_valid(objects)
+
+    monkeypatch.setattr(module, "require_valid", counting)
+    first, second = (random_scene(np.random.default_rng(count), count) for count in (2, 8))
+    seeing = Surroundings()
+    tables = [seeing.see(objects) for objects in (first, first, second, first, second)]
+    assert [objects is first for objects in seen] == [True, False]
+    assert tables[0] is tables[1] is tables[3]
+    assert tables[2] is tables[4]
+    assert tables[2].objects is second
+
+
+def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjects:
+    """Every primitive somewhere else and turned, and no larger or smaller."""
+    shift, turn = rng.normal(size=3), random_rotation(rng)
+    return dataclasses.replace(
+        objects,
+        sphere_centers_m=objects.sphere_centers_m @ turn.T + shift,
+        box_centers_m=objects.box_centers_m @ turn.T + shift,
+        box_rotations=turn @ objects.box_rotations,
+        tetrahedron_vertices_m=objects.tetrahedron_vertices_m @ turn.T + shift,
+        half_space_normals=objects.half_space_normals @ turn.T,
+        half_space_offsets_m=objects.half_space_offsets_m + 0.01,
+        mesh_positions_m=objects.mesh_positions_m @ turn.T + shift,
+        mesh_rotations=turn @ objects.mesh_rotations,
+    )
+
+
+def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
+    """The table has what its definitions say of each primitive and each object."""
+    rows = rows_of_primitives(objects)
+    of_thing = [[row for row in rows if row.thing == thing] for thing in range(len(objects.names))]
+    same = partial(np.testing.assert_allclose, rtol=1e-12, atol=1e-12)
+    assert [row.kind for row in rows] == table.kinds.tolist()
+    assert [row.row_of_kind for row in rows] == table.rows_of_kind.tolist()
+    assert np.diff(table.first_rows).tolist() == [len(mine) for mine in of_thing]
+    same(table.bounds, np.reshape([row.bound for row in rows], (-1, 4)))
+    same(table.shapes, np.reshape([row.shape for row in rows], (-1, 15)))
+    same(table.object_bounds, np.reshape([object_bound(mine) for mine in of_thing], (-1, 4)))
+    same(table.object_volumes, [sum(row.volume_m3 for row in mine) for mine in of_thing])
+    if table.placed is not None:
+        np.testing.assert_array_equal(table.placed.positions, objects.mesh_positions_m)
+        np.testing.assert_array_equal(table.placed.rotations, objects.mesh_rotations)
+
+
+def any_objects(seed: int) -> tuple[PerceivedObjects, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    return (mixed() if seed % 3 == 0 else random_scene(rng, 3, meshes=seed % 2)), rng
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_table_has_what_is_defined_of_each_primitive_and_so_has_that_of_the_next_frame(seed: int) -> None:
+    first, rng = any_objects(seed)
+    assert_as_defined(make(first), first)
+    last, objects = scene_table(first), moved(first, rng)
+    found = moved_table(last, objects)
+    assert found is not None
+    assert found.objects is objects
+    assert_as_defined(found, objects)
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed: int) -> None:
+    first, rng = any_objects(seed)
+    some, others = (Movers(first, np.flatnonzero(rng.uniform(size=len(first.names)) < share)) for share in (0.5, 0.5))
+    frames = [movers.frame(moved(movers.at_first, rng), first.roles) for movers in (some, some, others)]
+    seeing = Surroundings()
+    table = seeing.see(first)
+    kept = table.bounds
+    for objects in (*frames, first, frames[0], first):
+        assert seeing.see(objects) is table
+        assert table.objects is objects
+        assert_as_defined(table, objects)
+    assert table.bounds is kept
+
+
+def test_a_frame_that_is_refused_changes_nothing() -> None:
+    first = mixed()
+    movers = Movers(first, np.array([0, 3]))
+    good = moved(movers.at_first, np.random.default_rng(1))
+    frame = movers.frame(good, first.roles)
+    seeing = Surroundings()
+    table = seeing.see(frame)
+    bad = movers.frame(dataclasses.replace(good, box_rotations=1.1 * good.box_rotations), first.roles)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="box_rotations"):
+            seeing.see(bad)
+        assert_as_defined(table, frame)
+    assert seeing.see(frame) is table
+
+
+def test_what_loses_its_volume_has_a_table_of_its_own() -> None:
+    first = mixed()
+    movers = Movers(first, np.array([0, 3]))
+    frame = movers.frame(movers.at_first, first.roles)
+    seeing = Surroundings()
+    table = seeing.see(frame)
+    flat = dataclasses.replace(movers.at_first, box_half_sizes_m=movers.at_first.box_half_sizes_m * [0.0, 1.0, 1.0])
+    without = movers.frame(flat, first.roles)
+    assert seeing.see(without).flat == 2
+    assert_as_defined(seeing.see(without), without)
+    assert_as_defined(table, frame)
+    # And where something had none in the first place.
+    spread = Movers(dataclasses.replace(without), np.array([0, 3]))
+    assert_as_defined(seeing.see(spread.frame(movers.at_first, first.roles)), frame)
+
+
+@pytest.mark.parametrize("unbounded", [0, 3])
+def test_blocks_bound_their_objects_wherever_these_go(unbounded: int) -> None:
+    rng = np.random.default_rng(unbounded)
+    scene = Scene()
+    for _ in range(unbounded):
+        scene.add().half_space([0.0, 0.0, 1.0], -1.0)
+    for center in rng.uniform(-1.0, 1.0, (5000, 3)):
+        scene.add().sphere(center, float(rng.uniform(0.001, 0.01)))
+    first = scene.add(Role.IGNORED).objects()
+    movers = Movers(first, np.sort(rng.choice(5000, 50, replace=False)))
+    seeing = Surroundings()
+    for objects in (first, movers.frame(moved(movers.at_first, rng), first.roles)):
+        table = seeing.see(objects)
+        blocks = table.blocks
+        assert sorted(blocks.order) == list(range(5000 + unbounded))
+        assert set(blocks.order[:unbounded]) == set(range(unbounded))
+        np.testing.assert_array_equal(blocks.bounds, table.object_bounds[blocks.order])
+        places = np.arange(len(blocks.order))
+        for bounds, together in ((blocks.blocks, TOGETHER), (blocks.groups, TOGETHER**2)):
+            assert len(bounds) == -(-len(places) // together)
+            around = bounds[places // together]
+            apart = np.linalg.norm(blocks.bounds[:, :3] - around[:, :3], axis=1) + blocks.bounds[:, 3]
+            assert (apart <= around[:, 3] * (1.0 + 1e-12)).all()
+        if objects is first:
+            # What follows each other is near each other: a block of random ones would be 1.7 m large.
+            assert np.median(blocks.blocks[:, 3]) < 0.7
+
+
+def test_other_objects_and_those_that_lose_their_volume_get_a_table_of_their_own() -> None:
+    objects = mixed()
+    last = scene_table(objects)
+    flat = dataclasses.replace(objects, box_half_sizes_m=objects.box_half_sizes_m * [0.0, 1.0, 1.0])
+    swapped = dataclasses.replace(objects, sphere_object=objects.sphere_object[::-1].copy())
+    for other in (flat, swapped, Scene().add().objects()):
+        assert moved_table(last, other) is None
+    assert scene_table(flat).flat == 2
+    # Whose table leaves rows out has none of the next frame's order, either.
+    assert moved_table(scene_table(flat), objects) is None
+    np.testing.assert_array_equal(scene_table(swapped).kinds, make(swapped).kinds)
+
+
+def test_frames_do_not_pile_up() -> None:
+    frames, seeing = [], Surroundings()
+    for seed in range(100):
+        objects = random_scene(np.random.default_rng(seed), 1)
+        seeing.see(objects)
+        frames.append(weakref.ref(objects))
+    del objects
+    # A tick in real time runs without Python's collector of cycles.
+    assert len([frame for frame in frames if frame() is not None]) <= 10
+
+
+@pytest.mark.parametrize(
+    ("field", "factor"),
+    [
+        ("sphere_centers_m", np.nan),
+        ("sphere_radii_m", -1.0),
+        ("box_half_sizes_m", -1.0),
+        ("box_rotations", 1.1),
+        ("half_space_normals", 2.0),
+        ("tetrahedron_vertices_m", np.inf),
+        ("half_space_offsets_m", np.nan),
+        ("mesh_positions_m", np.nan),
+        ("mesh_rotations", 1.1),
+    ],
+)
+def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: float) -> None:
+    objects = random_scene(np.random.default_rng(0), 2, meshes=1)
+    broken = dataclasses.replace(objects, **{field: getattr(objects, field) * factor})
+    for _ in range(2):
+        with pytest.raises(ValueError, match=field):
+            scene_table(broken)
+
+
+def test_a_mesh_is_bounded_where_it_lies() -> None:
+    rotation, position = random_rotation(np.random.default_rng(3)), np.array([1.0, 2.0, 3.0])
+    vertices, triangles = ellipsoid_mesh(np.array([0.05, 0.1, 0.2]), 8)[:2]
+    # Off its own origin.
+    vertices = vertices + np.array([0.3, 0.0, 0.0])
+    table = scene_table(Scene().add().mesh(Mesh(vertices, triangles), position, rotation).objects())
+    placed = position + vertices @ rotation.T
+    for bounds in (table.bounds[0], table.object_bounds[0]):
+        assert np.linalg.norm(placed - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
+        assert 0.2 <= bounds[3] < 0.25

@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robot_side.surroundings.velocities import WINDOW_S, ObjectVelocities
+
+FRAME_S = 1.0 / 30.0
+
+
+@settings(derandomize=True, deadline=None)
+@given(speed=st.floats(-2.0, 2.0), frames=st.integers(2, 40))
+def test_a_steady_motion_has_its_velocity(speed: float, frames: int) -> None:
+    seen = ObjectVelocities()
+    for frame in range(frames):
+        time_s = 100.0 + frame * FRAME_S
+        found = seen.see(time_s, np.array([[speed * time_s, 0.0, 1.0], [0.0, 2.0, -0.5 * speed * time_s]]))
+    np.testing.assert_allclose(found, [[speed, 0.0, 0.0], [0.0, 0.0, -0.5 * speed]], atol=1e-9)
+
+
+def test_of_one_frame_nothing_is_known_but_that_it_stands() -> None:
+    seen = ObjectVelocities()
+    assert (seen.see(0.0, np.ones((3, 3))) == 0.0).all()
+    assert (seen.see(0.0, np.zeros((3, 3))) == 0.0).all()
+
+
+def test_what_has_stopped_is_at_rest_after_the_window() -> None:
+    seen = ObjectVelocities()
+    for frame in range(60):
+        time_s = frame * FRAME_S
+        found = seen.see(time_s, np.array([[min(time_s, 1.0), 0.0, 0.0]]))
+        if time_s > 1.0 + WINDOW_S + 1e-9:
+            assert (np.abs(found) < 1e-9).all()
+
+
+def test_noise_of_a_frame_counts_little() -> None:
+    rng, seen = np.random.default_rng(3), ObjectVelocities()
+    found = [seen.see(frame * FRAME_S, 1e-3 * rng.standard_normal((1, 3))) for frame in range(400)]
+    assert np.std(found[10:]) < 0.008
+
+
+@pytest.mark.parametrize("window_s", [0.0, -1.0, np.nan])
+def test_a_window_that_is_none_is_refused(window_s: float) -> None:
+    with pytest.raises(ValueError, match=r"window_s = .*; valid: above 0"):
+        ObjectVelocities(window_s)

@@ -1,0 +1,68 @@
+"""Both sides over the kernel's own TCP with delay, rate and queue: no delay of their own making, and nobody's stop."""
+
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.machines.waiting import wait_until
+from tests.helpers.repository import ROOT
+from tests.two_hosts.wide_area.running import run_trial
+from tests.two_hosts.wide_area.trial import Trial
+from tests.two_hosts.wide_area.tunnels import what_is_missing
+
+pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
+
+_QUEUEING_MS = 20.0
+_RESTING_KBIT_S = 200.0
+
+
+@pytest.mark.parametrize(
+    "trial",
+    [
+        pytest.param(Trial(loss=1.0, seconds=15.0), id="another continent, with 1 % of loss"),
+        pytest.param(Trial(delay=5.0, rate=0.5, queue=1000.0, seconds=12.0), id="0.5 Mbit/s before a large buffer"),
+        pytest.param(Trial(delay=5.0, observer="stops", seconds=12.0), id="an observer that no longer reads"),
+    ],
+)
+def test_armed_without_a_stop_and_without_a_queue(trial: Trial) -> None:
+    if (missing := what_is_missing()) is not None:
+        pytest.skip(missing)
+    outcome = run_trial(trial)
+    print({name: round(value, 2) if isinstance(value, float) else value for name, value in asdict(outcome).items()})
+    assert (outcome.armed, outcome.stops) == (1.0, 0), outcome.why
+    assert outcome.queueing_p95_ms is not None
+    assert outcome.queueing_p95_ms <= _QUEUEING_MS
+    if trial.loss:
+        assert outcome.to_operator_p99_ms is not None
+        assert outcome.to_operator_p99_ms <= trial.delay + _QUEUEING_MS
+
+
+def test_hands_that_rest_take_little_of_a_link() -> None:
+    if (missing := what_is_missing()) is not None:
+        pytest.skip(missing)
+    outcome = run_trial(Trial(delay=5.0, person="rests", seconds=8.0))
+    assert 0.0 < outcome.to_operator_kbit_s < _RESTING_KBIT_S
+
+
+_OPENS = """
+from tests.two_hosts.wide_area.tunnels import WideArea
+with WideArea({}) as wide:
+    print(wide.surroundings("robot")[3], flush=True)
+    input()
+"""
+
+
+def test_killed_it_leaves_nothing() -> None:
+    if (missing := what_is_missing()) is not None:
+        pytest.skip(missing)
+    command = [sys.executable, "-c", _OPENS]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as opened:
+        assert opened.stdout is not None
+        namespace = Path("/run/netns", opened.stdout.readline().strip())
+        assert namespace.exists()
+        assert namespace.name.startswith("feelahead-wide-robot-")
+        opened.kill()
+    wait_until("deleted", lambda: not namespace.exists(), 10.0)

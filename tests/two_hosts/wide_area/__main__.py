@@ -1,0 +1,15 @@
+"""The command `make wide-area`, also `python -m tests.two_hosts.wide_area`; with `stream` first, messages alone."""
+
+from collections.abc import Sequence
+
+from common.command.command_line import run_command
+from feelahead.lab.sweep import ask
+from tests.two_hosts.wide_area import question, stream
+
+
+def command(arguments: Sequence[str]) -> int:
+    """Ask one of both questions."""
+    return ask(stream.QUESTION, arguments[1:]) if arguments[:1] == ["stream"] else ask(question.QUESTION, arguments)
+
+
+run_command("wide-area", command)

@@ -1,0 +1,199 @@
+"""The wide area as a process: two namespaces with a TUN device each, and the packets between them.
+
+It makes the namespaces and deletes them, with all that runs there, when its standard input ends: nothing is left even
+when its parent is killed. A line of JSON in (`Order`) gets a line out: what was counted since the line before.
+"""
+
+import contextlib
+import ctypes
+import fcntl
+import heapq
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from common.realtime.priority import raise_priority, schedule_realtime
+from tests.two_hosts.wide_area.way import Counts, Direction, Way, WayWords
+
+DEVICE: Final = "wan0"
+ADDRESSES: Final[dict[str, str]] = {"robot": "10.78.0.1", "operator": "10.78.0.2"}
+_LEAVING: Final[tuple[Direction, ...]] = ("to_operator", "to_robot")
+"""The direction in which each host sends, in their order."""
+_CLONE_NEWNET: Final = 0x40000000
+_TUNSETIFF: Final = 0x400454CA
+_TUN_WITHOUT_HEADER: Final = 0x1001
+_CONTROLS: Final = Path("/proc/sys/net/ipv4/tcp_available_congestion_control")
+_NETWORK: Final = "10.78.0.0/24"
+_LARGEST: Final = 2048
+_IN_A_ROW: Final = 64
+"""Packets read before the next is looked for that is due."""
+
+
+class Order(msgspec.Struct, frozen=True):
+    """Words for the forwarder: the first at its start, others at any time."""
+
+    ways: dict[Direction, WayWords] | None = None
+    """Directions without words stay as they are."""
+    control: str | None = None
+    """The hosts' TCP congestion control, in the first order; None: the machine's."""
+    seed: int = 0
+
+
+@contextlib.contextmanager
+def _inside(namespace: str) -> Iterator[None]:
+    """Let this thread be in a network namespace."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    with contextlib.ExitStack() as stack:
+        for path in ("/proc/self/ns/net", f"/run/netns/{namespace}"):
+            descriptor = os.open(path, os.O_RDONLY)
+            stack.callback(os.close, descriptor)
+            if path.startswith("/proc"):
+                stack.callback(libc.setns, descriptor, _CLONE_NEWNET)
+            elif libc.setns(descriptor, _CLONE_NEWNET):
+                raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), path)
+        yield
+
+
+def _ip(*words: str) -> None:
+    done = subprocess.run(["ip", *words], capture_output=True, text=True, check=False)  # noqa: S607
+    if done.returncode:
+        raise RuntimeError(f"ip {' '.join(words)}: {done.stderr.strip()}")
+
+
+@contextlib.contextmanager
+def _hosts(control: str | None) -> Iterator[tuple[dict[str, str], list[int]]]:
+    """Yield the namespaces by host, and a descriptor of each one's device."""
+    namespaces = {host: f"feelahead-wide-{host}-{os.getpid()}" for host in ADDRESSES}
+    descriptors = []
+    try:
+        for host, namespace in namespaces.items():
+            _ip("netns", "add", namespace)
+            with _inside(namespace):
+                descriptors.append(descriptor := os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK))
+                fcntl.ioctl(descriptor, _TUNSETIFF, struct.pack("16sH", DEVICE.encode(), _TUN_WITHOUT_HEADER))
+                if control is not None and control not in (here := _CONTROLS.read_text().split()):
+                    raise RuntimeError(f"congestion control {control!r}; valid on this machine: {', '.join(here)}")
+            _ip("-n", namespace, "link", "set", "lo", "up")
+            _ip("-n", namespace, "address", "add", f"{ADDRESSES[host]}/32", "dev", DEVICE)
+            # Without addresses of IPv6 the device says nothing by itself.
+            _ip("-n", namespace, "link", "set", DEVICE, "addrgenmode", "none", "up")
+            route = ("route", "add", _NETWORK, "dev", DEVICE, "src", ADDRESSES[host])
+            # The route decides: a namespace's own default is limited to what all users of the machine may take.
+            _ip("-n", namespace, *route, *(() if control is None else ("congctl", control)))
+        yield namespaces, descriptors
+    finally:
+        for namespace in namespaces.values():
+            _delete(namespace)
+
+
+def _delete(namespace: str) -> None:
+    words = ["ip", "netns", "pids", namespace]
+    found = subprocess.run(words, capture_output=True, text=True, check=False)
+    for pid in map(int, found.stdout.split()):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    subprocess.run(["ip", "netns", "del", namespace], capture_output=True, check=False)  # noqa: S607
+
+
+class _Forwarder:
+    def __init__(self, order: Order, devices: list[int], *, realtime: bool) -> None:
+        now_s, given = time.monotonic(), order.ways or {}
+        self._ways = [Way(given.get(name, WayWords()), order.seed, name, now_s) for name in _LEAVING]
+        self._devices = devices
+        self._realtime = realtime
+        self._due: list[tuple[float, int, int, bytes]] = []
+        self._number = self._failed = 0
+        self._late_s: list[float] = []
+        self._said_s = now_s
+
+    def run(self) -> None:
+        """Forward until the standard input ends."""
+        orders = sys.stdin.fileno()
+        while True:
+            wait_s = max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
+            readable = select.select([*self._devices, orders], [], [], wait_s)[0]
+            self._deliver()
+            for number, device in enumerate(self._devices):
+                if device in readable:
+                    self._read(number)
+            self._deliver()
+            if orders in readable:
+                line = sys.stdin.readline()
+                if not line:
+                    return
+                _say(self._obey(msgspec.json.decode(line, type=Order)))
+
+    def _read(self, number: int) -> None:
+        for _ in range(_IN_A_ROW):
+            try:
+                packet = os.read(self._devices[number], _LARGEST)
+            except BlockingIOError:
+                return
+            due_s = self._ways[number].take(len(packet), time.monotonic())
+            if due_s is not None:
+                self._number += 1
+                heapq.heappush(self._due, (due_s, self._number, self._devices[1 - number], packet))
+
+    def _deliver(self) -> None:
+        while self._due and (late_s := time.monotonic() - self._due[0][0]) >= 0.0:
+            _, _, device, packet = heapq.heappop(self._due)
+            self._late_s.append(late_s)
+            try:
+                os.write(device, packet)
+            except OSError:
+                self._failed += 1
+
+    def _obey(self, order: Order) -> dict[str, Any]:
+        """Count what was since the last order, and change the ways."""
+        now_s = time.monotonic()
+        late_ms = 1e3 * np.array(self._late_s or [0.0])
+        figures: dict[str, Any] = {
+            "seconds": now_s - self._said_s,
+            "late_p99_ms": float(np.quantile(late_ms, 0.99)),
+            "late_max_ms": float(late_ms.max()),
+            "failed": self._failed,
+            "realtime": self._realtime,
+        }
+        for name, way in zip(_LEAVING, self._ways, strict=True):
+            figures[name] = way.counts.summary()
+            way.counts = Counts()
+            if order.ways and name in order.ways:
+                way.change(order.ways[name], now_s)
+        self._said_s, self._late_s, self._failed = now_s, [], 0
+        return figures
+
+
+def _say(what: dict[str, Any]) -> None:
+    sys.stdout.write(msgspec.json.encode(what).decode() + "\n")
+    sys.stdout.flush()
+
+
+def _main() -> None:
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        order = msgspec.json.decode(sys.stdin.readline(), type=Order)
+        with _hosts(order.control) as (namespaces, devices):
+            raise_priority()
+            realtime = True
+            try:
+                schedule_realtime()
+            except OSError:
+                realtime = False
+            _say({"namespaces": namespaces})
+            _Forwarder(order, devices, realtime=realtime).run()
+    except (OSError, RuntimeError, msgspec.MsgspecError) as error:
+        _say({"error": str(error)})
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,128 @@
+"""A wide area under both sides: what do delay, loss, rate and queue do to them over the kernel's own TCP?
+
+python -m tests.two_hosts.wide_area --delay 100 --loss 0 0.1 1 --control reno cubic bbr --csv wide.csv
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from typing import Annotated, Final, Literal
+
+import tyro
+from rich.console import RenderableType
+from rich.text import Text
+
+from feelahead.lab.goals import short
+from feelahead.lab.shown import shown
+from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.table import Row, Table
+from tests.two_hosts.wide_area.running import CONNECTIONS, run_trial
+from tests.two_hosts.wide_area.trial import Trial
+
+_Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
+
+
+@dataclass(frozen=True)
+class WideSweep(Sweep):
+    """Both sides in two network namespaces, with a wide area between them: each value with each other one.
+
+    Needs root, iproute2 and /dev/net/tun. Each run takes --seconds and ten more to start; they take turns.
+    """
+
+    delay: _Numbers = (100.0,)
+    """Milliseconds each way."""
+    loss: _Numbers = (0.0,)
+    """Per cent of packets, each way."""
+    burst: _Numbers = (0.0,)
+    """Milliseconds in which all packets are lost, every 5 s, each way."""
+    rate: _Numbers = (0.0,)
+    """Mbit/s of the robot's uplink; 0: free."""
+    falls_to: _Numbers = (0.0,)
+    """Mbit/s of the robot's uplink from half of the time on; 0: it stays."""
+    queue: _Numbers = (200.0,)
+    """Milliseconds for which a packet may wait for the rate."""
+    control: tuple[str, ...] = ("reno",)
+    """TCP's congestion control: reno, cubic, bbr; those that the machine has."""
+    connections: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N...")] = (0,)
+    """Connections of the operator side; 0: its default."""
+    person: tuple[Literal["drives", "rests"], ...] = ("drives",)
+    """The scripted person, or hands that do nothing."""
+    pictures: tuple[bool, ...] = (False,)
+    """Whether a page looks at both views and the scene."""
+    bulk: tuple[bool, ...] = (False,)
+    """Whether a TCP transfer fills the robot's uplink."""
+    observer: tuple[Literal["none", "reads", "stops"], ...] = ("none",)
+    """A second operator side; stops: stopped (SIGSTOP) after a third of the time."""
+    seconds: float = 20.0
+    """Length of each run, from the operator side's start on."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        list(cells(self))
+
+
+_VARIED: Final = tuple(one.name for one in fields(Trial) if one.name != "seconds")
+
+
+def cells(settings: WideSweep) -> Iterator[Trial]:
+    """Lay out the grid; one number of connections where the operator side knows no other."""
+    values = [getattr(settings, name) for name in _VARIED]
+    if not CONNECTIONS:
+        values[_VARIED.index("connections")] = (0,)
+    for chosen in product(*values):
+        yield Trial(**dict(zip(_VARIED, chosen, strict=True)), seconds=settings.seconds)
+
+
+def run(cell: Trial, seed: int) -> Iterator[Row]:
+    """Run one trial."""
+    yield asdict(run_trial(cell, seed))
+
+
+def show(_: WideSweep, table: Table) -> Iterator[RenderableType]:
+    """Show a line for each run: what varies, and what came of it."""
+    varied = [name for name in (*_VARIED, "seed") if len({row[name] for row in table}) > 1] or ["delay"]
+    columns = {name: parts for name, parts in _COLUMNS.items() if any(table.values(part) for part in parts)}
+    lines = (
+        [*(_said(row[name]) for name in varied)]
+        + [" / ".join(_said(row[part]) for part in parts) for parts in columns.values()]
+        for row in table
+    )
+    yield shown("a wide area", (*varied, *columns), lines)
+    if not CONNECTIONS:
+        yield Text("this operator side has one connection")
+
+
+_COLUMNS: Final[Mapping[str, Sequence[str]]] = {
+    "to operator, ms": ("to_operator_p50_ms", "to_operator_p95_ms", "to_operator_p99_ms"),
+    "to robot, ms": ("to_robot_p50_ms", "to_robot_p95_ms", "to_robot_p99_ms"),
+    "every arrival, p99, ms": ("slowest_to_operator_ms", "slowest_to_robot_ms"),
+    "queueing p95, ms": ("queueing_p95_ms", "link_queue_p95_ms"),
+    "gaps/min": ("to_operator_gaps_min", "to_robot_gaps_min"),
+    "armed after, s": ("armed_after_s",),
+    "armed": ("armed",),
+    "stops": ("stops",),
+    "why": ("why",),
+    "done": ("done",),
+    "kbit/s": ("to_operator_kbit_s", "to_robot_kbit_s"),
+    "packets/s": ("to_operator_packets_s", "to_robot_packets_s"),
+    "pictures/s": ("pictures_s",),
+    "their age, ms": ("picture_p50_ms", "picture_p95_ms"),
+    "bulk, kbit/s": ("bulk_kbit_s",),
+    "late after fall, s": ("late_after_fall_s",),
+    "late, ms": ("late_p99_ms", "late_max_ms"),
+}
+"""Figures that stand in one column; of two the first is to the operator. queueing: in ages, and in the link itself.
+
+late: the forwarder's p99 and most.
+"""
+
+
+def _said(value: object) -> str:
+    if isinstance(value, float):
+        return short(value) if abs(value) < 10.0 else f"{value:.0f}"
+    if value is None or isinstance(value, bool):
+        return {None: "-", True: "yes", False: "no"}[value]
+    return str(value)
+
+
+QUESTION: Final = Question("wide-area", WideSweep, cells, run, show, timed=True)

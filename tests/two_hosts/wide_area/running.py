@@ -1,0 +1,209 @@
+"""Runs a trial: both sides over the wide area for some seconds, and who looks or transfers beside them."""
+
+import contextlib
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+from common.protocol.codec import decode
+from common.recording.entries import Kind, split_text, unpack_block
+from common.recording.reading import open_recording
+from feelahead.both_sides.processes import SideProcess
+from feelahead.both_sides.summary import read_summary
+from operator_side.settings import OperatorSettings
+from tests.two_hosts.wide_area.forwarder import ADDRESSES
+from tests.two_hosts.wide_area.trial import Outcome, Trial
+from tests.two_hosts.wide_area.tunnels import Child, Host, WideArea
+
+CONNECTIONS: Final = "connections" in {one.name for one in fields(OperatorSettings)}
+"""Whether the operator side can be told how many connections to use."""
+_STARTS_S: Final = 120.0
+_LOOKS_S: Final = 0.05
+_LATE_S: Final = 0.1
+_ENDPOINT: Final = f"{ADDRESSES['robot']}:5555"
+_DEVICES: Final = {"drives": "simulated", "rests": "browser"}
+
+
+def run_trial(trial: Trial, seed: int = 0) -> Outcome:
+    """Run it; FeelaheadError where there can be no wide area, or a side fails."""
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="feelahead-wide-")))
+        wide = stack.enter_context(WideArea(trial.ways(), trial.control, seed))
+        sides = _Sides(stack, wide, trial, folder, seed)
+        sides.start()
+        parts = list(sides.watch())
+        # The robot side first: the operator side's end would be one more stop.
+        codes = sides.robot.stop(), sides.operator.stop()
+        assert codes == (0, 0), f"the sides ended with codes {codes}"
+        robot, operator = (read_summary(folder / f"{host}.json") for host in ("robot", "operator"))
+        return sides.outcome(_total(parts), robot, operator)
+
+
+@dataclass
+class _Sides:
+    """The processes of a trial, and what their statuses have said."""
+
+    stack: contextlib.ExitStack
+    wide: WideArea
+    trial: Trial
+    folder: Path
+    seed: int
+    statuses: int = 0
+    """Count of the robot side's, since it was armed first."""
+    armed: int = 0
+    armed_after_s: float | None = None
+    fell_s: float = 0.0
+    """The moment at which the rate fell, on the clock that all processes of a machine share."""
+    beside: dict[str, float] = field(default_factory=dict)
+    """Figures of the page and the bulk transfer."""
+
+    def start(self) -> None:
+        """Start everything; the time counts from when the operator side speaks."""
+        trial = self.trial
+        cameras = () if trial.pictures else ("--no-cameras",)
+        self.robot = self._side("robot", "robot", f"--bind=tcp://{_ENDPOINT}", "--insecure", *cameras)
+        self.robot.wait_for("listening", _STARTS_S)
+        self.wide.figures()
+        more = [*(["--console"] if trial.pictures else ()), *([f"--record={self._record}"] if trial.falls_to else ())]
+        self.operator = self._operator("operator", *more)
+        # Who comes second observes.
+        self.observer = self._operator("observer") if trial.observer != "none" else None
+        self.page: Child | None = None
+        self.sink: Child | None = None
+        self.source: Child | None = None
+        if trial.pictures:
+            address = self.operator.wait_for("console", _STARTS_S)["address"]
+            self.page = self._child("operator", "page", address)
+        if trial.bulk:
+            self.sink = self._child("operator", "bulk", "receive")
+            self.sink.hear()
+            self.source = self._child("robot", "bulk", "send")
+
+    def _side(self, host: Host, name: str, *arguments: str) -> SideProcess:
+        kept = (f"--seed={self.seed}", f"--summary={self.folder / name}.json")
+        side = SideProcess(f"{host}_side", name, [*arguments, *kept], self.wide.surroundings(host))
+        return self.stack.enter_context(side)
+
+    def _operator(self, name: str, *more: str) -> SideProcess:
+        """One that has spoken."""
+        connections = (f"--connections={self.trial.connections}",) if self.trial.connections and CONNECTIONS else ()
+        device = f"--device={_DEVICES[self.trial.person]}"
+        side = self._side("operator", name, f"--connect=tcp://{_ENDPOINT}", device, *connections, *more)
+        side.wait_for("status", _STARTS_S)
+        return side
+
+    def _child(self, host: Host, *words: str) -> Child:
+        return self.stack.enter_context(self.wide.run(host, *words))
+
+    def watch(self) -> Iterator[Mapping[str, Any]]:
+        """Let the time pass; what the forwarder counted until the rate falls, and from then on."""
+        trial = self.trial
+        began_s = time.monotonic()
+        for of_all in (1 / 3, 1 / 2, 1.0):
+            while (passed_s := time.monotonic() - began_s) < of_all * trial.seconds:
+                time.sleep(_LOOKS_S)
+                self._listen(passed_s)
+            if of_all == 1 / 3 and trial.observer == "stops" and self.observer is not None:
+                self.stack.callback(os.kill, self.observer.process_id, signal.SIGCONT)
+                os.kill(self.observer.process_id, signal.SIGSTOP)
+            if of_all == 1 / 2 and trial.falls_to:
+                slower = replace(trial.ways()["to_operator"], rate_bit_s=1e6 * trial.falls_to)
+                self.fell_s = time.monotonic()
+                yield self.wide.figures({"to_operator": slower})
+        yield self.wide.figures()
+        if self.page is not None:
+            self.beside |= self.page.last()
+        if self.source is not None and self.sink is not None:
+            self.source.end()
+            self.beside["bulk_kbit_s"] = 8e-3 * self.sink.last()["bytes"] / (time.monotonic() - began_s)
+
+    def _listen(self, passed_s: float) -> None:
+        for side in (self.robot, self.operator, self.observer):
+            for event in () if side is None else side.events():
+                if side is self.robot and event["event"] == "status":
+                    armed = event["state"] == "armed"
+                    if armed and self.armed_after_s is None:
+                        self.armed_after_s = passed_s
+                    self.statuses += self.armed_after_s is not None
+                    self.armed += armed
+            if side is not None:
+                side.check()
+
+    @property
+    def _record(self) -> Path:
+        return self.folder / "operator.mcap"
+
+    def _late_after_fall_s(self) -> float | None:
+        if not self.trial.falls_to:
+            return None
+        late_s = 0.0
+        for message in open_recording(self._record).messages(("/operator/inputs",)):
+            for entry in unpack_block(message.content).unpacked():
+                if entry.kind == Kind.RECEIVED:
+                    age_s = entry.now_s - decode(split_text(entry.content)[1]).header.sent_s
+                    if age_s > self.trial.delay / 1e3 + _LATE_S:
+                        late_s = max(late_s, entry.now_s - self.fell_s)
+        return late_s
+
+    def outcome(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Outcome:
+        """Make the row of both summaries, the statuses, and what was counted."""
+        there, here = operator["applied_age_ms"]["to_operator"], robot["applied_age_ms"]["to_robot"]
+        up, back = total["to_operator"], total["to_robot"]
+        return Outcome(
+            to_operator_p50_ms=there["p50"],
+            to_operator_p95_ms=there["p95"],
+            to_operator_p99_ms=there["p99"],
+            to_robot_p50_ms=here["p50"],
+            to_robot_p95_ms=here["p95"],
+            to_robot_p99_ms=here["p99"],
+            slowest_to_operator_ms=operator["delay_ms"]["to_operator"]["p99"],
+            slowest_to_robot_ms=robot["delay_ms"]["to_robot"]["p99"],
+            to_operator_gaps_min=60.0 * operator["gaps"]["to_operator"] / total["seconds"],
+            to_robot_gaps_min=60.0 * robot["gaps"]["to_robot"] / total["seconds"],
+            queueing_p95_ms=None if there["p95"] is None else there["p95"] - self.trial.delay,
+            armed=self.armed / max(self.statuses, 1),
+            armed_after_s=self.armed_after_s,
+            stops=len(robot["stops"]),
+            why="; ".join(dict.fromkeys(stop["reason"] for stop in robot["stops"])),
+            done=robot["task"]["placing"]["placed"],
+            to_operator_kbit_s=8e-3 * up["bytes"] / total["seconds"],
+            to_operator_packets_s=up["packets"] / total["seconds"],
+            to_robot_kbit_s=8e-3 * back["bytes"] / total["seconds"],
+            to_robot_packets_s=back["packets"] / total["seconds"],
+            lost=up["lost"] + back["lost"],
+            dropped=up["dropped"] + back["dropped"],
+            link_queue_p95_ms=up["queue_p95_ms"],
+            late_after_fall_s=self._late_after_fall_s(),
+            pictures_s=self.beside.get("pictures_s"),
+            picture_p50_ms=self.beside.get("picture_p50_ms"),
+            picture_p95_ms=self.beside.get("picture_p95_ms"),
+            bulk_kbit_s=self.beside.get("bulk_kbit_s"),
+            late_p99_ms=total["late_p99_ms"],
+            late_max_ms=total["late_max_ms"],
+            realtime=total["realtime"],
+        )
+
+
+_ADDED: Final = ("seconds", "packets", "bytes", "lost", "dropped")
+
+
+def _total(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Counts of all parts together; of other figures the worst, and what the last part says of words and rates."""
+    first, *others = parts
+    total = dict(first)
+    for part in others:
+        for name, value in part.items():
+            if isinstance(value, Mapping):
+                total[name] = _total([total[name], value])
+            elif name in _ADDED:
+                total[name] += value
+            elif name.endswith("_ms"):
+                total[name] = max(total[name], value)
+            else:
+                total[name] = value
+    return total

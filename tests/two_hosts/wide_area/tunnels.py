@@ -1,0 +1,121 @@
+"""The wide area from outside: its hosts, the programs that run there, and what the forwarder counts."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal, Self
+
+import msgspec
+
+from common.errors import FeelaheadError
+from tests.helpers.repository import ROOT
+from tests.two_hosts.wide_area.forwarder import Order
+from tests.two_hosts.wide_area.way import Direction, WayWords
+
+Host = Literal["robot", "operator"]
+_PACKAGE: Final = __package__
+_ENDS_S: Final = 5.0
+
+
+class Child:
+    """A program of ours that reads lines of JSON and writes some; it ends when its standard input does."""
+
+    def __init__(self, module: str, *arguments: str, before: Sequence[str] = ()) -> None:
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        command = [*before, sys.executable, "-P", "-m", f"{_PACKAGE}.{module}", *arguments]
+        self.name = module
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment,
+            # Ctrl-C reaches the parent alone, which then ends it.
+            start_new_session=True,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.end()
+
+    def say(self, line: str) -> None:
+        """Write a line to it; FeelaheadError when it is gone."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except OSError as error:
+            raise FeelaheadError(f"wide area: the {self.name} has ended") from error
+
+    def hear(self) -> dict[str, Any]:
+        """Read the next line that it says; FeelaheadError when it ends first, or names an error."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        said: dict[str, Any] = msgspec.json.decode(line) if line else {"error": f"the {self.name} has ended"}
+        if "error" in said:
+            raise FeelaheadError(f"wide area: {said['error']}")
+        return said
+
+    def last(self) -> dict[str, Any]:
+        """End its input; return the last line that it says."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        return self.hear()
+
+    def end(self) -> None:
+        """End it, by force where it does not by itself."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        try:
+            self._process.wait(_ENDS_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+
+class WideArea(Child):
+    """The forwarder with its hosts, as a context: at its end nothing of them is left."""
+
+    def __init__(self, ways: dict[Direction, WayWords], control: str | None = None, seed: int = 0) -> None:
+        """FeelaheadError without root, `ip`, TUN devices or this congestion control."""
+        if (missing := what_is_missing()) is not None:
+            raise FeelaheadError(f"wide area: {missing}")
+        super().__init__("forwarder")
+        try:
+            self.say(msgspec.json.encode(Order(ways, control, seed)).decode())
+            self._namespaces: dict[str, str] = self.hear()["namespaces"]
+        except BaseException:
+            self.end()
+            raise
+
+    def surroundings(self, host: Host) -> list[str]:
+        """The command that runs a program there."""
+        return ["ip", "netns", "exec", self._namespaces[host], "env", f"PYTHONPATH={ROOT}"]
+
+    def run(self, host: Host, module: str, *arguments: str) -> Child:
+        """Run one of this package's programs there."""
+        return Child(module, *arguments, before=self.surroundings(host))
+
+    def figures(self, ways: dict[Direction, WayWords] | None = None) -> dict[str, Any]:
+        """Return what was counted since the last call; with `ways`, change these from now on."""
+        self.say(msgspec.json.encode(Order(ways)).decode())
+        return self.hear()
+
+
+def what_is_missing() -> str | None:
+    """Say why there can be no wide area on this machine, and what mends it; None where there can."""
+    if os.geteuid() != 0:
+        return "network namespaces need root"
+    if shutil.which("ip") is None:
+        return "no `ip` here (apt install iproute2)"
+    if not Path("/dev/net/tun").exists():
+        return "no /dev/net/tun here (modprobe tun; in a container: --device /dev/net/tun)"
+    return None
