@@ -20,12 +20,13 @@ from robot_side.arm.commanded import commanded
 from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.speed_assist import assisted
-from robot_side.arm.tool_motion import ToolMotionSettings, tool_speed_m_s
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.law import Law, Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry
@@ -159,9 +160,8 @@ class RobotSide:
         )
         sensed = self._law.sense(situation, now_s)
         self.newest = sensed, situation
-        speed_m_s = tool_speed_m_s(pose.tool_jacobian, state.joint_velocities_rad_s)
-        self._record(sensed, speed_m_s, permission.state == "armed", now_s)
-        return self._outgoing(permission, situation, state, sensed, speed_m_s, now_s)
+        self._record(sensed, permission.state == "armed", now_s)
+        return self._outgoing(permission, situation, state, sensed, now_s)
 
     def see(self, now_s: float) -> PerceivedObjects:
         """Take in the camera's newest frame, from the next tick on: no message waits for what is made of it."""
@@ -211,8 +211,8 @@ class RobotSide:
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
-    def _record(self, sensed: Sensed, speed_m_s: float, armed: bool, now_s: float) -> None:
-        self.figures.tick(sensed, speed_m_s, armed=armed)
+    def _record(self, sensed: Sensed, armed: bool, now_s: float) -> None:
+        self.figures.tick(sensed, armed=armed)
         held = self._held is not None and self._held.index == self._target
         self.figures.task(armed, held, self._target_m, now_s)
 
@@ -232,7 +232,6 @@ class RobotSide:
         situation: Situation,
         state: ArmState,
         sensed: Sensed,
-        speed_m_s: float,
         now_s: float,
     ) -> list[Outgoing]:
         session, told_m_s = self.session, self._told_m_s
@@ -248,7 +247,7 @@ class RobotSide:
         holding = self._held is not None
         if self._seen.may_be_due((session.lease.token, permission.state, self._target, holding), now_s):
             target = None if self._target is None else (situation.objects.names[self._target], self._target_m)
-            view = telemetry(permission.state, situation.pose, sensed, speed_m_s, state, target, holding=holding)
+            view = telemetry(permission.state, situation.pose, sensed, state, target, holding=holding)
             if self._seen.due(view, now_s):
                 view = msgspec.structs.replace(view, header=session.view_header(now_s))
                 outgoing.append(Outgoing("telemetry", b"", encode(view)))

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.statistics import BLOCK, RunningStatistics
-from robot_side.laws.law import Sensed
+from robot_side.laws.sensed import (
+    ENLARGEMENT,
+    L2,
+    NUMBERS,
+    OF_A_SIDE,
+    OVERLAP,
+    R2,
+    RUMBLE,
+    STIFFNESS,
+    TOOL_SPEED,
+    Sensed,
+)
 from robot_side.placing import Placing, scaled
 from robot_side.surroundings.perceived import Role
 
@@ -23,6 +33,7 @@ _CONTACT_REST_S = 0.1
 touch chatters, and two fingers do not close at the same instant."""
 
 
+_L2_STIFFNESS, _R2_STIFFNESS = L2 * OF_A_SIDE + STIFFNESS, R2 * OF_A_SIDE + STIFFNESS
 _MOST_ROWS = 8 * BLOCK
 """That many ticks wait at most to be reckoned with, if nobody asks for it between ticks."""
 
@@ -32,8 +43,8 @@ class RunFigures:
 
     def __init__(self, seed: int = 0) -> None:
         self.ticks = 0
-        self._rows: list[tuple[float, float, float, float, bool]] = []
-        """Of the newest ticks: enlargement_m, overlap_m3, stiffness of L2 and of R2, and whether the tool moved."""
+        self._rows: list[tuple[FloatArray, bool]] = []
+        """Of the newest ticks: the numbers of `Sensed`, and whether the arm was armed."""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -51,23 +62,15 @@ class RunFigures:
         self._lifted_m = 0.0
         self._placing = Placing()
         self._held = False
-        self._warned = False
+        self._newest: FloatArray = np.zeros(NUMBERS)
 
-    def tick(self, sensed: Sensed, tool_speed_m_s: float, *, armed: bool = True) -> None:
-        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed.
-
-        ValueError, and nothing is noted, unless all of them are finite.
-        """
-        enlargement_m, l2, r2 = sensed.enlargement_m, sensed.l2.stiffness, sensed.r2.stiffness
-        felt = (l2, r2) if armed else (0.0, 0.0)
-        row = (enlargement_m, sensed.overlap_m3, *felt, tool_speed_m_s > MOVING_M_S)
-        if not math.isfinite(sum(row)):
-            raise ValueError(f"enlargement, overlap and stiffness are {row}; valid: finite numbers")
-        self._rows.append(row)
+    def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
+        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
+        self._newest = sensed.numbers
+        self._rows.append((sensed.numbers, armed))
         self.ticks += 1
         if len(self._rows) == _MOST_ROWS:
             self._take_in()
-        self._warned = max(sensed.rumble, l2, r2) > 0.0
 
     def reckon(self) -> None:
         """Between ticks: reckon with those of a block at once, which costs each of them less."""
@@ -75,12 +78,16 @@ class RunFigures:
             self._take_in()
 
     def _take_in(self) -> None:
-        columns = list(zip(*self._rows, strict=True)) or [()] * 5
-        moving = [enlargement_m for enlargement_m, *_, moves in self._rows if moves]
+        if not self._rows:
+            return
+        numbers, armed = np.array([row for row, _ in self._rows]), np.array([armed for _, armed in self._rows])
         self._rows.clear()
-        statistics = (self._enlargement, self._overlap, self._l2, self._r2, self._enlargement_moving)
-        for statistic, values in zip(statistics, (*columns[:4], moving), strict=True):
-            statistic.extend(values)
+        enlargement_m = numbers[:, ENLARGEMENT]
+        self._enlargement.extend(enlargement_m.tolist())
+        self._enlargement_moving.extend(enlargement_m[numbers[:, TOOL_SPEED] > MOVING_M_S].tolist())
+        self._overlap.extend(numbers[:, OVERLAP].tolist())
+        self._l2.extend((armed * numbers[:, _L2_STIFFNESS]).tolist())
+        self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""
@@ -92,7 +99,8 @@ class RunFigures:
                 self._obstacle_contacts += roles[name] is Role.OBSTACLE
             self._touched_s[name] = now_s
         if truth.target is not None:
-            self._placing.observe(truth.target, self._held, self._warned, now_s)
+            warned = self._newest[[RUMBLE, _L2_STIFFNESS, _R2_STIFFNESS]].max() > 0.0
+            self._placing.observe(truth.target, self._held, bool(warned), now_s)
 
     @property
     def touched(self) -> bool:

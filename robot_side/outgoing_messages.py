@@ -9,7 +9,7 @@ from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
 from robot_side.arm.port import ArmState, GripperPose
-from robot_side.laws.law import Sensed
+from robot_side.laws.sensed import L2, R2, Sensed
 from robot_side.operators.operator_session import Receiver
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
@@ -52,7 +52,6 @@ def telemetry(
     state: MotionState,
     pose: GripperPose,
     sensed: Sensed,
-    speed_m_s: float,
     arm: ArmState,
     target: tuple[str, FloatArray | None] | None,
     *,
@@ -69,15 +68,15 @@ def telemetry(
         _NO_HEADER,
         state=state,
         tool_position_m=_vector3(pose.tool_position_m),
-        tool_speed_m_s=min(speed_m_s, _FASTEST_M_S),
+        tool_speed_m_s=min(sensed.tool_speed_m_s, _FASTEST_M_S),
         target=None if target is None else target[0][:SHOWN_NAME],
         target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
         up_in_tool=_vector3(pose.tool_rotation[2]),
         gripper_opening_m=max(0.0, arm.gripper_opening_m),
         holding=holding,
         enlargement_m=min(sensed.enlargement_m, _LARGEST_M),
-        l2=sensed.l2.stiffness,
-        r2=sensed.r2.stiffness,
+        l2=sensed.stiffness(L2),
+        r2=sensed.stiffness(R2),
     )
 
 

@@ -13,13 +13,31 @@ A way counts as wrong by more than 1 mm, or 2 % of it: fingers stop an arm to a 
 """
 
 import math
-from typing import Any, Final
+from typing import Any, Final, get_args
 
+import numpy as np
+
+from common.arrays import FloatArray
 from common.following import follow
-from common.protocol.messages import Compensation, MotionCommand, MotionState, Telemetry, TriggerField
+from common.protocol.messages import MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
-from robot_side.laws.law import Sensed
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array, output_array, record_array
+from robot_side.field.scratch import STRENGTHS
+from robot_side.laws.sensed import (
+    ACCELERATION,
+    DISPLACEMENT,
+    FULL_SPEED,
+    HORIZON,
+    L2,
+    NUMBERS,
+    OF_A_SIDE,
+    R2,
+    RUMBLE,
+    SPEED,
+    STIFFNESS,
+    Sensed,
+)
 
 _DEADBAND_M: Final = 1e-3
 _DEADBAND_SHARE: Final = 0.02
@@ -28,6 +46,18 @@ _NEARER: Final = 0.25
 _HALF_A_TICK_S: Final = 0.5e-3
 """The tick that is nearest to a deadline counts."""
 _EIGHTHS: Final = 8.0
+_STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
+_ARMED: Final = _STATES["armed"]
+_BELIEF: Final = np.dtype(
+    [
+        *((name, np.float64) for name in ("sent", "now", "way", "speed", "target", "told")),
+        *((name, np.int64) for name in ("known", "state", "obeyed")),
+    ]
+)
+"""What the receiver takes for true. sent, now: times (s). way, speed, target: along R2, since the message, by commands.
+told: what the message says that the arm was told (m/s). known: a message has been sent. obeyed: the newest command."""
+
+_follow = inlined(follow)
 
 
 class StiffnessDeadband:
@@ -38,15 +68,12 @@ class StiffnessDeadband:
         self._full_rate = full_rate
         self.interval_s = 0.0
         """At least this lies between two that leave, where the link carries no more; a change of state never waits."""
+        self._sent: FloatArray = np.zeros(NUMBERS)
         self.forget()
 
     def forget(self) -> None:
         """Another receiver, which knows nothing yet."""
-        self._sent: Sensed | None = None
-        self._state: MotionState = "disarmed"
-        self._sent_s = self._now_s = -math.inf
-        self._way_m = self._speed_m_s = self._target_m_s = self._told_m_s = 0.0
-        self._obeyed = 0
+        self._belief: np.ndarray = np.zeros(1, dtype=_BELIEF)
 
     def due(
         self, sensed: Sensed, told_m_s: float, state: MotionState, command: MotionCommand | None, now_s: float
@@ -56,71 +83,108 @@ class StiffnessDeadband:
         told_m_s: the speed that the arm is commanded from this tick on, along the direction in which R2 advances, by
         `command`; None: nothing moves.
         """
-        sent = self._sent
-        if sent is not None:
-            self._way_m, self._speed_m_s = follow(
-                self._way_m, self._speed_m_s, self._target_m_s, sent.r2.acceleration_m_s2, now_s - self._now_s
-            )
-        self._now_s = now_s
-        obeyed = 0 if command is None else command.header.sequence
-        compensation: Compensation = "operator" if command is None else command.compensation
-        if sent is not None and not self._full_rate and not self._matters(sent, sensed, state, compensation):
-            # The receiver does not know yet how fast a later command lets the arm go.
-            travel = 0.0 if command is None else command.r2 - command.l2
-            self._target_m_s = self._told_m_s if obeyed == self._obeyed else travel * sent.r2.full_speed_m_s
-            return False
-        self._sent, self._state, self._sent_s, self._obeyed = sensed, state, now_s, obeyed
-        self._way_m, self._speed_m_s, self._told_m_s, self._target_m_s = 0.0, sensed.speed_m_s, told_m_s, told_m_s
-        return True
-
-    def _matters(self, sent: Sensed, sensed: Sensed, state: MotionState, compensation: Compensation) -> bool:
-        since_s = self._now_s - self._sent_s + _HALF_A_TICK_S
-        if state != self._state or since_s >= KEEP_ALIVE_S:
-            return True
-        if state != "armed" or since_s < self.interval_s:  # not armed: triggers are released
-            return False
-        if sensed.rumble > sent.rumble:
-            return True
-        if compensation == "operator":
-            back_m, forth_m = -self._way_m, self._way_m
-        else:
-            # The receiver adds δ of the message, and reckons no further.
-            back_m = sent.l2.displacement_m - sensed.l2.displacement_m
-            forth_m = sent.r2.displacement_m - sensed.r2.displacement_m
-        # The way to brake from a speed above the trigger's comes on top of δ: at most this.
-        back_m += _braking_m(-self._speed_m_s, sent.l2) - _braking_m(-sensed.speed_m_s, sensed.l2)
-        forth_m += _braking_m(self._speed_m_s, sent.r2) - _braking_m(sensed.speed_m_s, sensed.r2)
-        patient, horizon_m = since_s < WRITE_S, sensed.horizon_m
-        if _wrong(sensed.l2, sent.l2, back_m, horizon_m, patient) or _wrong(
-            sensed.r2, sent.r2, forth_m, horizon_m, patient
-        ):
-            return True
-        return not patient and _shown(sensed) != _shown(sent)
+        obeyed, travel, by_operator = 0, 0.0, True
+        if command is not None:
+            obeyed, travel = command.header.sequence, command.r2 - command.l2
+            by_operator = command.compensation == "operator"
+        due: bool = _due(
+            *(self._belief, self._sent, sensed.numbers, told_m_s, _STATES[state], obeyed, travel, by_operator),
+            *(self.interval_s, self._full_rate, now_s),
+        )
+        return due
 
 
-def _braking_m(speed_m_s: float, along: TriggerField) -> float:
-    return float(max(0.0, speed_m_s) ** 2 / (2.0 * along.acceleration_m_s2))
+@inlined
+def _braking_m(speed: float, acceleration: float) -> float:
+    return max(0.0, speed) ** 2 / (2.0 * acceleration)
 
 
-def _wrong(now: TriggerField, sent: TriggerField, moved_m: float, horizon_m: float, patient: bool) -> bool:
-    """Compare the ways with those that were sent, less `moved_m`; `patient`: none that is farther counts.
+@inlined
+def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patient: bool) -> bool:
+    """Compare the ways with those that were sent, less `moved` (m); `patient`: none that is farther counts.
 
     A way at the horizon is no nearer: nothing is known from there on, and the last message still holds.
     """
-    for ways, before in ((now.fast_m, sent.fast_m), (now.slow_m, sent.slow_m)):
-        for way, was in zip(ways, before, strict=True):
-            apart_m = way - was + moved_m
-            if apart_m < -_NEARER * _DEADBAND_M:
-                if apart_m < -_NEARER * _DEADBAND_SHARE * way and way < horizon_m:
-                    return True
-            elif apart_m > _DEADBAND_M and not patient and apart_m > _DEADBAND_SHARE * way:
+    for place in range(side * OF_A_SIDE, side * OF_A_SIDE + 2 * STRENGTHS):
+        way = numbers[place]
+        apart = way - sent[place] + moved
+        if apart < -_NEARER * _DEADBAND_M:
+            if apart < -_NEARER * _DEADBAND_SHARE * way and way < numbers[HORIZON]:
                 return True
+        elif apart > _DEADBAND_M and not patient and apart > _DEADBAND_SHARE * way:
+            return True
     return False
 
 
-def _shown(sensed: Sensed) -> tuple[int, int, float]:
-    """Both strengths in eighths, and the rumble."""
-    return int(_EIGHTHS * sensed.l2.stiffness), int(_EIGHTHS * sensed.r2.stiffness), sensed.rumble
+@inlined
+def _matters(
+    belief: Any, sent: FloatArray, numbers: FloatArray, state: int, by_operator: bool, interval: float, now: float
+) -> bool:
+    since = now - belief.sent + _HALF_A_TICK_S
+    if state != belief.state or since >= KEEP_ALIVE_S:
+        return True
+    if state != _ARMED or since < interval:  # not armed: triggers are released
+        return False
+    if numbers[RUMBLE] > sent[RUMBLE]:
+        return True
+    patient, shown = since < WRITE_S, numbers[RUMBLE] != sent[RUMBLE]
+    for side in (R2, L2):
+        first, sign = side * OF_A_SIDE, 1.0 if side == R2 else -1.0
+        # A receiver that does not reckon adds δ of the message.
+        moved = sign * belief.way if by_operator else sent[first + DISPLACEMENT] - numbers[first + DISPLACEMENT]
+        # The way to brake from a speed above the trigger's comes on top of δ: at most this.
+        moved += _braking_m(sign * belief.speed, sent[first + ACCELERATION])
+        moved -= _braking_m(sign * numbers[SPEED], numbers[first + ACCELERATION])
+        if _wrong(numbers, sent, side, moved, patient):
+            return True
+        shown |= int(_EIGHTHS * numbers[first + STIFFNESS]) != int(_EIGHTHS * sent[first + STIFFNESS])
+    return not patient and shown
+
+
+@compiled(
+    *(
+        record_array(_BELIEF),
+        output_array(1),
+        input_array(1),
+        NUMBER,
+        COUNT,
+        COUNT,
+        NUMBER,
+        TRUTH,
+        NUMBER,
+        TRUTH,
+        NUMBER,
+    ),
+    returns=TRUTH,
+)
+def _due(
+    beliefs: np.ndarray,
+    sent: FloatArray,
+    numbers: FloatArray,
+    told: float,
+    state: int,
+    obeyed: int,
+    travel: float,
+    by_operator: bool,
+    interval: float,
+    full_rate: bool,
+    now: float,
+) -> bool:
+    """Decide, and note what the receiver believes from now on; sent, numbers (NUMBERS,): of `Sensed`."""
+    belief = beliefs[0]
+    if belief.known == 1:
+        acceleration = sent[R2 * OF_A_SIDE + ACCELERATION]
+        belief.way, belief.speed = _follow(belief.way, belief.speed, belief.target, acceleration, now - belief.now)
+    belief.now = now
+    if belief.known == 1 and not full_rate and not _matters(belief, sent, numbers, state, by_operator, interval, now):
+        # The receiver does not know yet how fast a later command lets the arm go.
+        later = travel * sent[R2 * OF_A_SIDE + FULL_SPEED]
+        belief.target = belief.told if obeyed == belief.obeyed else later
+        return False
+    sent[:] = numbers
+    belief.known, belief.state, belief.sent, belief.obeyed = 1, state, now, obeyed
+    belief.way, belief.speed, belief.told, belief.target = 0.0, numbers[SPEED], told, told
+    return True
 
 
 _SEEN_M: Final = 0.5e-3

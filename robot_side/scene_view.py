@@ -13,7 +13,8 @@ from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from robot_side.cameras.shapes import SceneModel, bytes_of
 from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
-from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 

@@ -12,7 +12,8 @@ from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
-from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.law import Law, Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.main import TICK_PERIOD_S
 from robot_side.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
@@ -57,7 +58,7 @@ class _Silent:
         """Nothing ahead."""
         del situation, now_s
         free = uniform_field(0)
-        return Sensed(l2=free, r2=free, speed_m_s=0.0, horizon_m=0.0, rumble=0.0, enlargement_m=0.0, overlap_m3=0.0)
+        return Sensed.of(free, free)
 
     def summary(self) -> dict[str, int]:
         """No work at all."""

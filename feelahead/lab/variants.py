@@ -86,7 +86,7 @@ def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Re
             ways_m=felt[number, :, :-1],
             horizon_m=felt[number, :, -1],
             spheres=len(own[0].situation.pose.sphere_radii_m),
-            looks_per_s=float(law.ahead.counts.fields) / passed_s,
+            looks_per_s=law.summary()["fields"] / passed_s,
         )
         for number, (law, own) in enumerate(zip(laws, ticks, strict=True))
     ]

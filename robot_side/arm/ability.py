@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
     """
     found = np.empty(3)
     direction = np.ascontiguousarray(direction)
-    usable = _ability_loop(
+    usable = find_ability(
         *(pose.tool_jacobian, direction, full_speed_m_s, limits.velocity_rad_s, limits.acceleration_rad_s2, found)
     )
     if not usable:
@@ -64,11 +65,12 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
     return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
 
 
-@compiled(
-    *(input_array(2), input_array(1), NUMBER, input_array(1), input_array(1), output_array(1)),
-    returns=TRUTH,
-)
-def _ability_loop(
+ABILITY: Final = (*(input_array(2), input_array(1), NUMBER, input_array(1), input_array(1), output_array(1)),)
+"""What `find_ability` takes, for who calls it by its address."""
+
+
+@compiled(*ABILITY, returns=TRUTH)
+def find_ability(
     jacobian: FloatArray,
     direction: FloatArray,
     full_speed: float,
@@ -76,7 +78,10 @@ def _ability_loop(
     accelerations: FloatArray,
     found: FloatArray,
 ) -> bool:
-    """Fill `found` (3,): the speed, the least acceleration, and by how much the tool's motion differs at most."""
+    """Fill `found` (3,): the speed, the least acceleration, and by how much the tool's motion differs at most.
+
+    jacobian (6, n), direction (3,), limits and accelerations (n,). False where `resolve` can use none of them.
+    """
     twist, rates = np.zeros(6), np.empty(limits.size)
     for i in range(3):
         twist[i] = full_speed * direction[i]

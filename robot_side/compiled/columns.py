@@ -1,5 +1,6 @@
 """Columns that go to a kernel together: declared once, from which the view in kernels and the addresses follow."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar, cast
 
@@ -21,6 +22,7 @@ BUNDLED: View = bundle.bundled
 """(n, 2) another bundle"""
 
 
+@functools.cache
 def rows(width: int) -> View:
     """(n, width) floats."""
 
@@ -31,6 +33,7 @@ def rows(width: int) -> View:
     return view
 
 
+@functools.cache
 def matrices(height: int, width: int) -> View:
     """(n, height, width) floats."""
 
@@ -41,6 +44,7 @@ def matrices(height: int, width: int) -> View:
     return view
 
 
+@functools.cache
 def records(dtype: Any) -> View:
     """(n,) records of `dtype`."""
 
@@ -68,30 +72,9 @@ class Declared(Generic[_Columns]):
 
 
 def _view(columns: Any, views: tuple[View, ...]) -> Any:
-    every = _joined(views)
-
-    @inlined
-    def at(found: IntArray) -> Any:
-        return columns(*every(found))
-
-    return at
-
-
-def _joined(views: tuple[View, ...]) -> Any:
-    """Make the tuple of all views; Numba takes a tuple of several types only piece by piece."""
-    *before, last = views
-    place = len(before)
-    if not before:
-
-        @inlined
-        def one(found: IntArray) -> Any:
-            return (last(found, place),)
-
-        return one
-    rest = _joined(tuple(before))
-
-    @inlined
-    def more(found: IntArray) -> Any:
-        return (*rest(found), last(found, place))
-
-    return more
+    # Numba takes no loop over views of several types. Written out as source they are one call; joined a view at a time
+    # they would be a tuple of each length, which takes 20 s to compile for 30 columns.
+    scope = {"__name__": __name__, "columns": columns} | {f"view_{place}": view for place, view in enumerate(views)}
+    given = ", ".join(f"view_{place}(found, {place})" for place in range(len(views)))
+    exec(compile(f"def at(found):\n    return columns({given})\n", __file__, "exec"), scope)  # noqa: S102
+    return inlined(cast(Any, scope["at"]))

@@ -11,7 +11,6 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray, require_finite
 from common.errors import ConfigurationError
-from common.protocol.messages import Compensation
 from robot_side.compiled.kernel import compiled, inlined, input_array, output_array
 from robot_side.enlargement.prediction_errors import PredictionErrors
 
@@ -115,18 +114,14 @@ class Uncertainty:
         return float(standard_quantile(self.probability))
 
     @cached_property
-    def _mean_m(self) -> FloatArray:
+    def mean_m(self) -> FloatArray:
         """μ_ee - μ_c (3,)."""
         mean_m: FloatArray = np.asarray(self.kinematic_mean_m) - np.asarray(self.camera_mean_m)
         return mean_m
 
     def mean_along_m(self, direction: FloatArray) -> float:
-        """û·(μ_ee - μ_c) along unit vectors `direction` (3,): how much nearer than it seems a thing is on average."""
-        return float(direction @ self._mean_m)
-
-    def predicted_m(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-        """μ_δ and σ_δ at a loop age, for one kind of compensation."""
-        return self.prediction.at(kind, loop_age_s, full_speed_m_s)
+        """û·(μ_ee - μ_c) along a unit vector `direction` (3,): how much nearer than it seems a thing is on average."""
+        return float(direction @ self.mean_m)
 
 
 def plain_enlargements_m(

@@ -1,7 +1,6 @@
 """What the prediction of the delay's displacement misses: μ_δ and σ_δ of eq. 10, over loop age and who predicts."""
 
 import tomllib
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
+from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
 
@@ -30,19 +30,29 @@ class PredictionErrors:
     arm: str | None = None
     """The fingerprint of the arm that they were measured on."""
 
+    def table(self, kind: Compensation) -> FloatArray:
+        """The rows (k, 3) of one kind of compensation, none where nothing is known."""
+        return np.array(self.rows.get(kind, ()), dtype=np.float64).reshape(-1, 3)
+
     def at(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-        """μ_δ and σ_δ in metres at a loop age, between the rows; beyond the last one they grow with the loop age."""
-        rows = self.rows.get(kind, ())
-        if not rows:
-            return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
-        after = bisect_right(rows, loop_age_s, key=lambda row: row[0])
-        if after in (0, len(rows)):
-            age_s, mean_m, sd_m = rows[max(after - 1, 0)]
-            beyond = max(1.0, loop_age_s / age_s)
-            return beyond * mean_m, beyond * sd_m
-        (age_s, mean_m, sd_m), (next_age_s, next_mean_m, next_sd_m) = rows[after - 1 : after + 1]
-        share = (loop_age_s - age_s) / (next_age_s - age_s)
-        return mean_m + share * (next_mean_m - mean_m), sd_m + share * (next_sd_m - sd_m)
+        """μ_δ and σ_δ in metres at a loop age, as `prediction_error` has them."""
+        return prediction_error(self.table(kind), loop_age_s, full_speed_m_s)
+
+
+def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
+    """μ_δ and σ_δ in metres at a loop age, between the rows (k, 3); beyond the last one they grow with the loop age."""
+    count, after = rows.shape[0], 0
+    if count == 0:
+        return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
+    while after < count and rows[after, 0] <= loop_age_s:
+        after += 1
+    if after in (0, count):
+        last = max(after - 1, 0)
+        beyond = max(1.0, loop_age_s / rows[last, 0])
+        return beyond * rows[last, 1], beyond * rows[last, 2]
+    share = (loop_age_s - rows[after - 1, 0]) / (rows[after, 0] - rows[after - 1, 0])
+    mean_m, sd_m = rows[after - 1, 1], rows[after - 1, 2]
+    return mean_m + share * (rows[after, 1] - mean_m), sd_m + share * (rows[after, 2] - sd_m)
 
 
 def load_prediction_errors(path: Path) -> PredictionErrors:

@@ -209,11 +209,14 @@ def _look_at(
     scratch.counts[Count.PAIRS] += pairs
 
 
-@compiled(
+LOOK: Final = (
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
     *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
-    returns=TRUTH,
 )
+"""What `look` takes, for who calls it by its address."""
+
+
+@compiled(*LOOK, returns=TRUTH)
 def look(
     centers: FloatArray,
     radii: FloatArray,

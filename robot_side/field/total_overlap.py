@@ -1,6 +1,7 @@
 """The overlap of a gripper's spheres with all objects, and with each (eq. 11-12)."""
 
 import math
+from typing import Final
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def total_overlap_m3(
     ValueError for a sphere that is not finite, which would compare as far away from everything.
     """
     by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m
-    total = _sum(
+    total = sum_overlaps(
         spheres, by_m, np.zeros(3) if moved_m is None else moved_m, classes, scene.bundle, np.empty(3), of_objects_m3
     )
     if math.isnan(total):
@@ -42,11 +43,14 @@ def total_overlap_m3(
     return float(total)
 
 
-@compiled(
+SUM_OVERLAPS: Final = (
     *(input_array(2), input_array(2), input_array(1), input_indices(), BUNDLE, output_array(1), output_array(1)),
-    returns=NUMBER,
 )
-def _sum(
+"""What `sum_overlaps` takes, for who calls it by its address."""
+
+
+@compiled(*SUM_OVERLAPS, returns=NUMBER)
+def sum_overlaps(
     spheres: FloatArray,
     inflated: FloatArray,
     moved: FloatArray,
@@ -55,7 +59,7 @@ def _sum(
     push: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """NaN for what is not finite."""
+    """Add up V_ij in m³ as `total_overlap_m3` has it; NaN for what is not finite. push (3,): room for a gradient."""
     scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
     check = shift[0] + shift[1] + shift[2]
     for i in range(count):

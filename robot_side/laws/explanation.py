@@ -11,7 +11,8 @@ from robot_side.arm.port import GripperPose
 from robot_side.field.field import Along
 from robot_side.field.inflation import explain_inflation
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.scene_table import SceneTable
 
 Trigger = Literal["l2", "r2"]

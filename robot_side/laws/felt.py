@@ -10,52 +10,41 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.reaction import HORIZON_S
-from robot_side.compiled.kernel import (
-    NUMBER,
-    TRUTH,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    input_indices,
-    output_array,
-    record_array,
-)
-from robot_side.compiled.vectors import Vector, dot, load, norm
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, dot, norm
 from robot_side.field.scratch import STRENGTHS
-from robot_side.laws.recent_looks import L2, NEWEST, R2, ROOM, SEEN, STICK
+from robot_side.laws.memory import ROOM, memory_at
+from robot_side.laws.prospect import horizon_m
+from robot_side.laws.sensed import (
+    ACCELERATION,
+    DISPLACEMENT,
+    ENLARGEMENT,
+    FULL_SPEED,
+    HORIZON,
+    L2,
+    NUMBERS,
+    OF_A_SIDE,
+    OVERLAP,
+    R2,
+    RUMBLE,
+    SPEED,
+    STICK,
+    STIFFNESS,
+    TOOL_SPEED,
+)
 
-BEYOND_M: Final = 0.05
-"""So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
 MOST_M: Final = 100.0
 """What a message can say; a simulation about to become unstable shows wild figures, and must get to say so."""
-DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, OF_A_SIDE = (2 * STRENGTHS + k for k in range(5))
-"""Of one side's numbers, after eight fast and eight slow ways: δ in m, s(δ), v_max, a."""
-SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, NUMBERS = (2 * OF_A_SIDE + k for k in range(6))
-"""After those of R2 and L2: m/s along R2, m, 0 to 1, m, m³; and how many numbers there are in all."""
 
 
 def room_to_feel() -> FloatArray:
-    """Room for the numbers, and for the stick's ways after them."""
+    """Room for the numbers of `Sensed`, and for the stick's ways after them."""
     return np.zeros(NUMBERS + 2 * STRENGTHS)
 
 
 @inlined
 def _bounded(value: float, least: float, most: float) -> float:
-    """What is no number stays none: the message refuses it."""
-    if value < least:
-        return least
-    return most if value > most else value
-
-
-def horizon_m(speed_m_s: float, acceleration_m_s2: float, loop_age_s: float) -> float:
-    """How far full speed gets before anything felt stops it, and a little more."""
-    braking_m = speed_m_s * speed_m_s / (2.0 * acceleration_m_s2)
-    return speed_m_s * (loop_age_s + HORIZON_S) + braking_m + BEYOND_M
-
-
-_horizon = inlined(horizon_m)
-"""The same in kernels."""
+    return min(max(value, least), most)
 
 
 @inlined
@@ -88,57 +77,42 @@ def _reached(ways: FloatArray, first: int, reach: float) -> int:
 
 
 @inlined
-def _known(seen: np.ndarray, newest: np.ndarray, side: int, count: int, tool: Vector) -> float:
+def _known(bundle: IntArray, side: int, tool: Vector) -> float:
     """How far ahead of the tool anything is known: as far as the newest look reached from where the gripper is."""
+    memory = memory_at(bundle)
     known = -math.inf
     latest = -math.inf
-    for k in range(ROOM * side, ROOM * side + count):
-        if seen[k].place == 0 and seen[k].at >= latest:
-            latest = seen[k].at
-            known = newest[side].reach - _moved(seen[k], tool)
+    for k in range(ROOM * side, ROOM * side + memory.counts[side]):
+        one = memory.seen[k]
+        if one.place == 0 and one.at >= latest:
+            latest = one.at
+            known = memory.newest[side].reach - _moved(one, tool)
     return known
 
 
-@compiled(
-    *(record_array(SEEN), input_indices(), record_array(NEWEST), input_array(1), input_array(2), input_array(2)),
-    *(input_array(1), NUMBER, TRUTH, NUMBER, NUMBER, output_array(1)),
-)
+@building_block
 def feel(
-    seen: np.ndarray,
-    counts: IntArray,
-    newest: np.ndarray,
-    tool_position: FloatArray,
-    tool_rotation: FloatArray,
-    jacobian: FloatArray,
-    rates: FloatArray,
+    bundle: IntArray,
+    tool: Vector,
+    approach: Vector,
+    velocity: Vector,
     loop_age: float,
     is_known: bool,
-    stick_speed: float,
-    touch_speed: float,
+    deflection: float,
     felt: FloatArray,
 ) -> None:
-    """Fill `felt`, that of `room_to_feel`, from the tables of `Looks` for a tool at (3,), turned by (3, 3), rates (n,).
+    """Fill `felt`, that of `room_to_feel`, for a tool there that moves with this velocity.
 
-    jacobian (6, n). loop_age: t_d, known or at worst. stick_speed: that the stick commands, of which it is felt by the
-    slow ways below touch_speed. Both in m/s.
+    loop_age: t_d, known or at worst. deflection: of the stick, 0 to 1; its speed is felt by the slow ways below the
+    speed of touching.
     """
-    tool = load(tool_position.reshape(1, 3), 0)
-    approach = tool_rotation[0, 2], tool_rotation[1, 2], tool_rotation[2, 2]
-    velocity = 0.0, 0.0, 0.0
-    for k in range(rates.size):
-        velocity = (
-            velocity[0] + jacobian[0, k] * rates[k],
-            velocity[1] + jacobian[1, k] * rates[k],
-            velocity[2] + jacobian[2, k] * rates[k],
-        )
-    speed = dot(velocity, approach)
-    # A minimum may hide what is no number.
-    check = 0.0 if math.isfinite(tool[0] + tool[1] + tool[2]) else math.nan
-    ahead = math.inf
+    memory = memory_at(bundle)
+    seen, counts, newest, settings = memory.seen, memory.counts, memory.newest, memory.settings[0]
+    speed, ahead = dot(velocity, approach), math.inf
     for side in (R2, L2):
         able = newest[side]
-        ahead = min(ahead, _horizon(able.speed, able.acceleration, loop_age))
-        ahead = min(ahead, _known(seen, newest, side, counts[side], tool))
+        ahead = min(ahead, horizon_m(able.speed, able.acceleration, loop_age))
+        ahead = min(ahead, _known(bundle, side, tool))
     for side in (R2, L2):
         mine, able = felt[side * OF_A_SIDE :], newest[side]
         _shortest(seen, side, counts[side], tool, mine)
@@ -148,16 +122,21 @@ def feel(
             under_way = max(under_way, able.speed)
         displacement = _bounded(under_way * loop_age, -MOST_M, MOST_M)
         for place in range(2 * STRENGTHS):
-            mine[place] = check + _bounded(mine[place], -MOST_M, min(ahead, MOST_M))
+            mine[place] = _bounded(mine[place], -MOST_M, min(ahead, MOST_M))
         mine[FULL_SPEED], mine[ACCELERATION] = able.speed, able.acceleration
         mine[DISPLACEMENT], mine[STIFFNESS] = displacement, _reached(mine, 0, displacement) / STRENGTHS
     felt[RUMBLE] = 0.0
     if counts[STICK] > 0:
         # D = u (t_d + h) + u²/2a (eq. 8).
+        stick_speed = settings.stick_speed * min(deflection, 1.0)
         reach = stick_speed * (loop_age + HORIZON_S) + stick_speed * stick_speed / (2.0 * newest[STICK].acceleration)
         ways = felt[NUMBERS:]
         _shortest(seen, STICK, counts[STICK], tool, ways)
-        felt[RUMBLE] = _reached(ways, STRENGTHS if stick_speed < touch_speed else 0, reach) / STRENGTHS
-    leading = newest[R2 if speed >= 0.0 else L2]
+        felt[RUMBLE] = _reached(ways, STRENGTHS if stick_speed < settings.touch_speed else 0, reach) / STRENGTHS
+    leading, tool_speed = newest[R2 if speed >= 0.0 else L2], norm(velocity)
     felt[SPEED], felt[HORIZON] = _bounded(speed, -MOST_M, MOST_M), _bounded(ahead, 0.0, MOST_M)
-    felt[ENLARGEMENT], felt[OVERLAP] = norm(velocity) * loop_age + leading.sigma, leading.overlap
+    felt[ENLARGEMENT], felt[OVERLAP], felt[TOOL_SPEED] = (
+        tool_speed * loop_age + leading.sigma,
+        leading.overlap,
+        tool_speed,
+    )

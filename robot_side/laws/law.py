@@ -4,15 +4,16 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from common.arrays import FloatArray
-from common.protocol.messages import Compensation, TriggerField, Vector2
+from common.protocol.messages import Compensation, Vector2
 from robot_side.arm.port import GripperPose
+from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.perceived import PerceivedObjects
 
 LawName = Literal["swept", "paper"]
 """swept: ways along each trigger, for its own zones. paper: the plain law of §4.2, one number for both triggers."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Situation:
     """Where the gripper is among what, and what is known of the link."""
 
@@ -33,24 +34,6 @@ class Situation:
     """The object that the gripper holds"""
     lateral: Vector2
     """Deflection of the stick that moves across, as commanded"""
-
-
-@dataclass(frozen=True)
-class Sensed:
-    """What one tick found out about the surroundings."""
-
-    l2: TriggerField
-    r2: TriggerField
-    speed_m_s: float
-    """v along the direction in which R2 advances"""
-    horizon_m: float
-    """So far the fields look ahead."""
-    rumble: float
-    """Danger where the stick leads, in eighths, 0 to 1"""
-    enlargement_m: float
-    """D_incr of eq. 10 along the motion: |v| t_d + D_σ, the largest of the gripper's spheres"""
-    overlap_m3: float
-    """Σ V_ij of the enlarged gripper (eq. 11-12)"""
 
 
 class Law(Protocol):

@@ -19,7 +19,8 @@ from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
-from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.surroundings import Surroundings
 
@@ -101,12 +102,13 @@ class PaperLaw:
         stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii**3).sum())))
         able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
         felt = uniform_field(round(STRENGTHS * stiffness), able.full_speed_m_s, able.acceleration_m_s2)
-        return Sensed(
-            l2=felt,
-            r2=felt,
-            speed_m_s=float(pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s)),
+        velocity_m_s = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
+        return Sensed.of(
+            felt,
+            felt,
+            speed_m_s=float(pose.tool_rotation[:, 2] @ velocity_m_s),
+            tool_speed_m_s=float(np.linalg.norm(velocity_m_s)),
             horizon_m=FAR_M,
-            rumble=0.0,
             enlargement_m=float(enlargement_m.max()),
             overlap_m3=overlap_m3,
         )

@@ -7,25 +7,39 @@ where the gripper just passes something, encoder noise alone can flip no strengt
 While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from where that will have brought it,
 too, at several moments until a command that is sent now has stopped it: the shortest ways hold. What comes towards the
 gripper by itself shortens its ways by what it covers in that time.
+
+    measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep ─▶ feel        one compiled call a tick
 """
 
 import math
 from dataclasses import replace
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from common.protocol.messages import TriggerField, Ways
+from common.arrays import BoolArray, FloatArray, IntArray, require_finite
 from common.touch_speed import touch_speed_m_s
-from robot_side.arm.ability import Ability, JointLimits, ability
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
-from robot_side.arm.tool_motion import ToolMotionSettings, deflected
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
-from robot_side.compiled.vectors import dot, load
+from robot_side.arm.resolved_rate import refuse
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import (
+    NUMBER,
+    TRUTH,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_flags,
+    input_indices,
+    output_array,
+)
+from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.enlargement.distance import Uncertainty
-from robot_side.field.field import Ahead, Along
+from robot_side.field.field import Along
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
-from robot_side.field.scratch import STRENGTHS
+from robot_side.field.scratch import Count, Scratch
 from robot_side.laws.explanation import (
     Trigger,
     TriggerExplained,
@@ -33,27 +47,30 @@ from robot_side.laws.explanation import (
     moved_and_inflated,
     overlaps_by_object,
 )
-from robot_side.laws.felt import (
-    ACCELERATION,
-    DISPLACEMENT,
-    ENLARGEMENT,
-    FULL_SPEED,
-    HORIZON,
-    MOST_M,
-    OF_A_SIDE,
-    OVERLAP,
-    RUMBLE,
-    SPEED,
-    STIFFNESS,
-    feel,
-    horizon_m,
-    room_to_feel,
-)
-from robot_side.laws.law import Sensed, Situation
-from robot_side.laws.recent_looks import L2, R2, STICK
-from robot_side.laws.schedule import FIELD_PERIOD_S, Prospect, Turns, stopping_s
+from robot_side.laws.felt import feel, room_to_feel
+from robot_side.laws.law import Situation
+from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
+from robot_side.laws.memory import Memory, Total, memory_at
+from robot_side.laws.prospect import FIELD_PERIOD_S, fill_prospect, find_prospect, stopping, stopping_s
+from robot_side.laws.recent_looks import longest_ago, look_from
+from robot_side.laws.sensed import ENLARGEMENT, L2, NUMBERS, OVERLAP, R2, STICK, Sensed
+from robot_side.laws.sideways import measure_fingers, plan_moments
 from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
+
+_NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
+
+
+class Asked(NamedTuple):
+    """What one look is asked; the first fields are those of `Ahead.look`."""
+
+    pose: GripperPose
+    classes: IntArray
+    along: Along
+    widest_m: float
+    prediction_sd_m: float
+    """σ_δ of the errors"""
 
 
 class SweptLaw:
@@ -69,132 +86,221 @@ class SweptLaw:
     ) -> None:
         """encoder_sigma_rad (n,): eq. 3. surroundings: the owner of what is perceived; one of its own by default."""
         self.surroundings = surroundings or Surroundings()
-        self.ahead = Ahead(encoder_sigma_rad)
+        self.encoder_sigma_rad = encoder_sigma_rad
         self._uncertainty = uncertainty
         self._limits = limits
-        self._motion = motion
-        self._touch_speed_m_s = touch_speed_m_s(motion.trigger_speed_m_s)
+        missed = [uncertainty.prediction.table(kind) for kind in ("operator", "robot")]
+        self.memory = Memory(limits, encoder_sigma_rad, missed)
+        settings = self.memory.settings[0]
+        settings["trigger_speed"], settings["stick_speed"] = motion.trigger_speed_m_s, motion.stick_speed_m_s
+        settings["touch_speed"] = touch_speed_m_s(motion.trigger_speed_m_s)
+        settings["camera_variance"], settings["mean"] = uncertainty.camera_sd_m**2, uncertainty.mean_m
+        settings["quantile"] = uncertainty.quantile
+        self._scratch = Scratch(0, 0, 0)
         self._felt = room_to_feel()
-        self._classes: tuple[object, IntArray] | None = None
-        self.turns = Turns(self.ahead, self.surroundings, self._prospect, limits, motion.trigger_speed_m_s)
+        self._classes: tuple[object, IntArray, IntArray] | None = None
+        self._flat = 0
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick."""
-        pose, stick = situation.pose, math.hypot(*situation.lateral)
-        looks = self.turns.take(situation, now_s)
-        feel(
-            *(looks.seen, looks.counts, looks.newest),
-            *(pose.tool_position_m, np.ascontiguousarray(pose.tool_rotation), np.ascontiguousarray(pose.tool_jacobian)),
-            *(situation.joint_velocities_rad_s, situation.loop_age_s, situation.loop_age_known),
-            *(self._motion.stick_speed_m_s * min(stick, 1.0), self._touch_speed_m_s, self._felt),
-        )
-        felt = self._felt.tolist()
-        return Sensed(
-            l2=_trigger_field(felt, L2),
-            r2=_trigger_field(felt, R2),
-            speed_m_s=felt[SPEED],
-            horizon_m=felt[HORIZON],
-            rumble=felt[RUMBLE],
-            enlargement_m=felt[ENLARGEMENT],
-            overlap_m3=felt[OVERLAP],
-        )
+        """Work out one tick; ValueError that says what is not finite, and nothing that was seen is changed."""
+        pose, scene = situation.pose, self.surroundings.see(situation.objects)
+        self._make_room(len(pose.sphere_radii_m), scene)
+        _, classes, closing = self._classes_of(situation)
+        velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
+        if not sense(
+            *(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m),
+            *(pose.sphere_radii_m, pose.sphere_on_finger, situation.joint_velocities_rad_s),
+            *(now_s, situation.loop_age_s, situation.loop_age_known, situation.compensation == "operator"),
+            *(_widest_m(situation), right, up, classes, closing),
+            *(_NO_VELOCITIES if velocities is None else velocities, scene.bundle),
+            *(self._scratch.bundle, self.memory.bundle, self._felt),
+        ):
+            self._refuse(situation)
+        self._flat = scene.flat
+        return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
         """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
+        self.memory.settings["quantile"] = self._uncertainty.quantile
 
     def summary(self) -> dict[str, int]:
         """How much work there was and was not, over the run."""
-        return vars(self.ahead.counts)
+        totals = self.memory.totals.tolist()
+        counts = {"fields": totals[Total.LOOKS]} | {one.name.lower(): totals[one] for one in Count}
+        # Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them.
+        return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": self._flat}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """What D_σ is made of along one trigger, and what overlaps at the robot side's δ."""
-        felt = sensed.l2 if trigger == "l2" else sensed.r2
-        along, _, prediction_sd_m = self._along(L2 if trigger == "l2" else R2, situation, situation.pose)
-        camera_sd_m = self._uncertainty.camera_sd_m
+        felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
+        asked, camera_sd_m = self.asked(side, situation), self._uncertainty.camera_sd_m
         terms, sigma_m = enlargement_terms(
-            *(situation, along, self.ahead.encoder_sigma_rad, camera_sd_m, prediction_sd_m, felt.displacement_m)
+            *(situation, asked.along, self.encoder_sigma_rad, camera_sd_m, asked.prediction_sd_m, felt.displacement_m)
         )
-        spheres = moved_and_inflated(situation.pose, felt.displacement_m * along.direction, sigma_m)
-        classes = self._classes_of(situation)
-        found = overlaps_by_object(spheres, self.surroundings.see(situation.objects), classes)
+        spheres = moved_and_inflated(situation.pose, felt.displacement_m * asked.along.direction, sigma_m)
+        found = overlaps_by_object(spheres, self.surroundings.see(situation.objects), asked.classes)
         return TriggerExplained(terms, found)
 
-    def _prospect(self, side: int, situation: Situation, pose: GripperPose) -> Prospect:
-        along, able, _ = self._along(side, situation, pose)
-        return Prospect(along, able, self._classes_of(situation))
-
-    def _along(self, side: int, situation: Situation, pose: GripperPose) -> tuple[Along, Ability, float]:
-        """What the errors are along one side, what the joints give there, and σ_δ."""
-        if side == STICK:
-            full_speed_m_s = self._motion.stick_speed_m_s
-            direction = deflected(situation.lateral, pose.tool_rotation)[0]
-        else:
-            full_speed_m_s = self._motion.trigger_speed_m_s
-            direction = np.ascontiguousarray((1.0 if side == R2 else -1.0) * pose.tool_rotation[:, 2])
-        able = ability(pose, self._limits, direction, full_speed_m_s)
-        # The stick is felt where it leads with the speed that it commands: nothing is predicted.
-        mean_m, sd_m = (
-            (0.0, 0.0)
-            if side == STICK
-            else self._uncertainty.predicted_m(situation.compensation, situation.loop_age_s, able.full_speed_m_s)
-        )
-        reach_m = horizon_m(able.full_speed_m_s, able.acceleration_m_s2, situation.loop_age_s)
+    def asked(self, side: int, situation: Situation, place: int = 0) -> Asked:
+        """What a look along one side is asked, where the gripper is or at a place that it is yet to come to."""
+        pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
+        where = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m
+        by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
+        if not fill_prospect(memory.bundle, side, place, *where, right, up, age_s, by_operator):
+            self._refuse(situation)
+        found, early_m, velocities = memory.prospect[0], None, situation.objects.velocities_m_s
+        if velocities is not None:
+            until_s = stopping_s(found["speed"], found["acceleration"], age_s)
+            early_m = np.clip(-velocities @ found["direction"], 0.0, None) * until_s
         along = Along(
-            direction,
-            self._uncertainty.mean_along_m(direction) + mean_m,
-            self._uncertainty.camera_sd_m**2 + sd_m**2,
-            self._uncertainty.quantile,
-            reach_m + 2.0 * FIELD_PERIOD_S * full_speed_m_s,
-            _early_m(situation, direction, able),
+            direction=found["direction"].copy(),
+            mean_m=float(found["mean"]),
+            variance_m2=float(found["variance"]),
+            quantile=self._uncertainty.quantile,
+            reach_m=float(found["reach"]),
+            early_m=early_m,
         )
-        return along, able, sd_m
+        there = replace(
+            pose,
+            tool_position_m=memory.tool_m.copy(),
+            tool_rotation=memory.rotation.copy(),
+            sphere_centers_m=memory.centers_m[: len(pose.sphere_centers_m)].copy(),
+        )
+        _, classes, closing = self._classes_of(situation)
+        closes = place > 0 and bool(memory.state["moves_fingers"][0])
+        return Asked(there, closing if closes else classes, along, _widest_m(situation), float(found["prediction_sd"]))
 
-    def _classes_of(self, situation: Situation) -> IntArray:
-        """(k,) what each object is to the field."""
-        key = situation.objects.roles, situation.held
-        if self._classes is None or self._classes[0] != key:
+    def _make_room(self, spheres: int, scene: SceneTable) -> None:
+        needed = spheres, len(scene.kinds), len(scene.first_rows)
+        if not self._scratch.fits(*needed):
+            self._scratch = Scratch(*needed)
+        if not self.memory.fits(spheres, len(scene.first_rows)):
+            self.memory.make_room(spheres, len(scene.first_rows))
+
+    def _classes_of(self, situation: Situation) -> tuple[object, IntArray, IntArray]:
+        """What each object is to the field (k,), and what while the fingers move: what they close on, they touch."""
+        roles, held = situation.objects.roles, situation.held
+        if self._classes is None or self._classes[0] != (roles, held):
             of_role = {
                 Role.TARGET: TARGET,
                 Role.IGNORED: PASSED_OVER,
-                Role.SUPPORT: OBSTACLE if situation.held is None else TOUCHABLE,
+                Role.SUPPORT: OBSTACLE if held is None else TOUCHABLE,
             }
-            classes = np.array([of_role.get(role, OBSTACLE) for role in key[0]], dtype=np.int64)
-            if situation.held is not None:
-                classes[situation.held] = PASSED_OVER
-            self._classes = key, classes
-        return self._classes[1]
+            classes = np.array([of_role.get(role, OBSTACLE) for role in roles], dtype=np.int64)
+            if held is not None:
+                classes[held] = PASSED_OVER
+            self._classes = (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
+        return self._classes
+
+    def _refuse(self, situation: Situation) -> NoReturn:
+        """Raise the ValueError that says what is not finite."""
+        pose, limits_rad_s = situation.pose, self._limits.velocity_rad_s
+        for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
+            require_finite(f"pose.{name}", getattr(pose, name))
+        require_finite("joint_velocities_rad_s", situation.joint_velocities_rad_s)
+        require_finite("loop_age_s", np.array([situation.loop_age_s]))
+        refuse(pose.tool_jacobian, np.ones(6), limits_rad_s)
 
 
-def _early_m(situation: Situation, direction: FloatArray, able: Ability) -> FloatArray | None:
-    """By how much each object's ways (k,) are shorter: what it comes nearer by until the arm stands."""
-    velocities = situation.objects.velocities_m_s
-    if velocities is None:
-        return None
-    early: FloatArray = np.empty(len(velocities))
-    _nearing(np.ascontiguousarray(velocities), direction, stopping_s(situation, able), early)
-    return early
+def _widest_m(situation: Situation) -> float:
+    """Half the gap between the fingers, the most by which their spheres are inflated towards the target (§3.4)."""
+    return math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)
 
 
-@compiled(input_array(2), input_array(1), NUMBER, output_array(1))
-def _nearing(velocities: FloatArray, direction: FloatArray, stopping: float, early: FloatArray) -> None:
-    along = load(direction.reshape(1, 3), 0)
-    for thing in range(early.size):
-        early[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
+@inlined
+def _sum(values: FloatArray) -> float:
+    """The sum of all elements, which is no number where one is none."""
+    total = 0.0
+    for value in values.reshape(-1):
+        total += value
+    return total
 
 
-def _trigger_field(felt: list[float], side: int) -> TriggerField:
-    mine = felt[side * OF_A_SIDE : (side + 1) * OF_A_SIDE]
-    return TriggerField(
-        fast_m=_eight(mine, 0),
-        slow_m=_eight(mine, STRENGTHS),
-        full_speed_m_s=mine[FULL_SPEED],
-        acceleration_m_s2=mine[ACCELERATION],
-        displacement_m=mine[DISPLACEMENT],
-        stiffness=mine[STIFFNESS],
-    )
+@inlined
+def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
+    """What three rows of the Jacobian make of joint rates (n,)."""
+    found = 0.0, 0.0, 0.0
+    for joint in range(rates.size):
+        column = jacobian[first, joint], jacobian[first + 1, joint], jacobian[first + 2, joint]
+        found = add(found, scale(rates[joint], column))
+    return found
 
 
-def _eight(numbers: list[float], first: int) -> Ways:
-    one, two, three, four, five, six, seven, eight = numbers[first : first + STRENGTHS]
-    return one, two, three, four, five, six, seven, eight
+@building_block
+def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector, changed: bool) -> bool:
+    """Measure what moves the gripper besides the triggers; False for a Jacobian by which nothing can be resolved."""
+    memory = memory_at(bundle)
+    state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
+    for axis in range(3):
+        memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
+    measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
+    if not find_prospect(bundle, R2, moment.rotation, moment.jacobian, 0.0, 0.0, moment.loop_age, moment.by_operator):
+        return False
+    able = memory.prospect[0]
+    until = stopping(able.speed, able.acceleration, moment.loop_age)
+    plan_moments(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
+    state.measured, state.spheres = moment.now, moment.radii.size
+    return True
+
+
+@compiled(
+    *(input_array(1), input_array(2), input_array(2), input_array(2), input_array(1), input_flags(), input_array(1)),
+    *(NUMBER, NUMBER, TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, input_indices(), input_indices(), input_array(2)),
+    *(BUNDLE, BUNDLE, BUNDLE, output_array(1)),
+    returns=TRUTH,
+)
+def sense(
+    tool_position: FloatArray,
+    rotation: FloatArray,
+    jacobian: FloatArray,
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
+    rates: FloatArray,
+    now: float,
+    loop_age: float,
+    is_known: bool,
+    by_operator: bool,
+    widest: float,
+    right: float,
+    up: float,
+    classes: IntArray,
+    closing: IntArray,
+    velocities: FloatArray,
+    scene_bundle: IntArray,
+    scratch_bundle: IntArray,
+    bundle: IntArray,
+    felt: FloatArray,
+) -> bool:
+    """Fill `felt`, that of `room_to_feel`; False for what is not finite, which would compare as far away.
+
+    tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
+    others are those of `Moment`; is_known: the loop age is.
+    """
+    memory = memory_at(bundle)
+    state, tool = memory.state[0], load(tool_position.reshape(1, 3), 0)
+    check = _sum(tool_position) + _sum(rotation) + _sum(jacobian) + _sum(centers) + _sum(radii) + _sum(rates)
+    if not math.isfinite(check + now + loop_age + right + up):
+        return False
+    approach, velocity = (rotation[0, 2], rotation[1, 2], rotation[2, 2]), _velocity(jacobian, 0, rates)
+    deflected, changed = right != 0.0 or up != 0.0, state.spheres != radii.size
+    if now >= state.next or changed or deflected != (memory.places[STICK] > 0):
+        moment = Moment(
+            *(rotation, jacobian, centers, radii, on_finger, tool, approach, dot(velocity, approach), now, loop_age),
+            *(by_operator, widest, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
+        )
+        at_most = 1
+        # What is gripped or let go changes which spheres there are.
+        if changed or now - state.measured >= FIELD_PERIOD_S - ROUNDING_S:
+            if not _measure(bundle, moment, velocity, _velocity(jacobian, 3, rates), changed):
+                return False
+            at_most = 0
+        for side in (R2, L2):
+            look_from(bundle, side, 1 + state.moments)
+        look_from(bundle, STICK, 1 if deflected else 0)
+        if not look_at_due(bundle, moment, at_most):
+            return False
+        state.next = min(state.measured, longest_ago(bundle)) + FIELD_PERIOD_S - ROUNDING_S
+    feel(bundle, tool, approach, velocity, loop_age, is_known, math.hypot(right, up), felt)
+    return math.isfinite(felt[ENLARGEMENT] + felt[OVERLAP])

@@ -10,7 +10,8 @@ from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
 from robot_side.assembly import assemble
 from robot_side.gripper.held_object import grip
-from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.law import Law, Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import load_scene
 from robot_side.surroundings.perceived import Role

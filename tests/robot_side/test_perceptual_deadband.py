@@ -1,7 +1,6 @@
 """Enough leaves: a receiver that extrapolates the last message is never wrong by more than can be felt."""
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +12,7 @@ from common.following import follow
 from common.protocol.messages import Compensation, Header, MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
-from robot_side.laws.law import Sensed
+from robot_side.laws.sensed import Sensed
 from robot_side.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
 from tests.helpers.felt import field, ways
 
@@ -25,11 +24,16 @@ FAR_M = 0.4
 ABLE: dict[str, Any] = {"full_speed_m_s": FULL_M_S, "acceleration_m_s2": A_M_S2}
 
 
+def changed(found: Sensed, **changes: Any) -> Sensed:
+    same = {name: getattr(found, name) for name in ("l2", "r2", "speed_m_s", "horizon_m", "rumble")}
+    return Sensed.of(**same | changes)
+
+
 def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
     """A wall so far ahead of R2, and nothing behind."""
     wall = field(ways(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
     free = field(ways(*[FAR_M] * 8), **ABLE)
-    return replace(Sensed(free, wall, speed_m_s, FAR_M, 0.0, 0.01, 0.0), **changes)
+    return changed(Sensed.of(free, wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
 
 
 class Run:
@@ -160,7 +164,7 @@ def test_while_nothing_is_felt_only_the_state_and_the_keep_alive_count() -> None
 
 def test_a_receiver_that_does_not_reckon_is_told_of_the_robot_sides_displacement() -> None:
     before, after = (
-        replace(one, r2=field(one.r2.fast_m, displacement_m=displacement_m, **ABLE))
+        changed(one, r2=field(one.r2.fast_m, displacement_m=displacement_m, **ABLE))
         for one, displacement_m in ((sensed(0.1), 0.0), (sensed(0.1), 0.01))
     )
     for compensation, due in (("robot", True), ("operator", False)):
@@ -173,7 +177,7 @@ def test_a_horizon_that_shrinks_is_nothing_that_comes_nearer() -> None:
     run = Run(1.0)
     run.tick()
     shrunken = field(ways(*[0.3] * 8), **ABLE)
-    assert not run.tick(now=replace(sensed(1.0), l2=shrunken, r2=shrunken, horizon_m=0.3))
+    assert not run.tick(now=changed(sensed(1.0), l2=shrunken, r2=shrunken, horizon_m=0.3))
 
 
 def test_another_receiver_is_told_at_once_and_at_full_rate_everything_is_said() -> None:

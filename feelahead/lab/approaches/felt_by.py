@@ -20,8 +20,9 @@ from operator_side.hands.travel_calibration import TravelCalibration, TriggerTra
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.law import Law as RobotLaw
-from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.law import Situation
 from robot_side.laws.paper import PaperLaw
+from robot_side.laws.sensed import Sensed
 from robot_side.laws.swept import SweptLaw
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.surroundings.perceived import PerceivedObjects

@@ -16,7 +16,8 @@ from operator_side.simulated_person.pulling_hands import PullingHands, constant_
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.assembly import assemble
 from robot_side.core import RobotSide
-from robot_side.laws.law import Law, Sensed, Situation
+from robot_side.laws.law import Law, Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
 from robot_side.simulation.kinematics import MujocoKinematics

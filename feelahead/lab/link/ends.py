@@ -22,7 +22,7 @@ from operator_side.commanding import ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
-from robot_side.laws.law import Sensed
+from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.outgoing_messages import Outgoing, stiffness_message
@@ -79,7 +79,7 @@ class RobotEnd(_Side):
         self._sockets, epoch = sockets, secrets.randbits(53)
         self._session = OperatorSession(lambda: LinkEnd("robot", epoch, clock_domain()), Safety(SafetySettings()))
         self._admission, self._loop_age = Admission(), LoopAge(0.2)
-        self._sensed = Sensed(uniform_field(3), uniform_field(0), 0.01, FAR_M, 0.0, 0.01, 1e-9)
+        self._sensed = Sensed.of(uniform_field(3), uniform_field(0), speed_m_s=0.01, horizon_m=FAR_M)
 
     def _received(self) -> Any:
         return self._sockets.receive()

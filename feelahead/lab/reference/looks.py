@@ -2,54 +2,29 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray
 from feelahead.lab.approaches.ticks import Recorded
 from feelahead.lab.reference.ways_by_definition import defined_ways
-from robot_side.arm.port import GripperPose
-from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.field import Ahead
+from robot_side.laws.swept import Asked
 from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.scene_table import SceneTable, scene_table
+from robot_side.surroundings.scene_table import scene_table
 
 LATE_M = 1e-4
 """No way may be later than its definition by more."""
 
 
-class Asked(NamedTuple):
-    """What `Ahead.look` was asked; the fields are its arguments."""
-
-    pose: GripperPose
-    objects: PerceivedObjects
-    classes: IntArray
-    along: Along
-    widest_m: float
-
-
-class _Noting(Ahead):
-    """Looks, and notes what is asked."""
-
-    def __init__(self, encoder_sigma_rad: FloatArray) -> None:
-        super().__init__(encoder_sigma_rad)
-        self.asked: list[Asked] = []
-
-    def look(
-        self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
-    ) -> Field:
-        """Look along a direction."""
-        self.asked.append(Asked(pose, scene.objects, classes, along, widest_m))
-        return super().look(pose, scene, classes, along, widest_m)
-
-
-def looks_of(recorded: Recorded, most: int) -> tuple[list[Asked], FloatArray]:
+def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, PerceivedObjects]], FloatArray]:
     """Go through the ticks of a run once more; its looks, `most` from all over it, and the encoders' errors (n,)."""
-    law = recorded.new_law()
-    law.ahead = law.turns.ahead = noting = _Noting(law.ahead.encoder_sigma_rad)
+    law, asked = recorded.new_law(), list[tuple[Asked, PerceivedObjects]]()
     for tick in recorded.ticks:
         law.sense(tick.situation, tick.now_s)
-    return noting.asked[:: max(1, -(-len(noting.asked) // most))], noting.encoder_sigma_rad
+        for side, place in np.argwhere(law.memory.looked_s == tick.now_s).tolist():
+            asked.append((law.asked(side, tick.situation, place), tick.situation.objects))
+    return asked[:: max(1, -(-len(asked) // most))], law.encoder_sigma_rad
 
 
 @dataclass(frozen=True)
@@ -79,11 +54,11 @@ class Apart:
         }
 
 
-def compare(asked: Iterable[Asked], encoder_sigma_rad: FloatArray) -> Apart:
+def compare(looks: Iterable[tuple[Asked, PerceivedObjects]], encoder_sigma_rad: FloatArray) -> Apart:
     """Look, and define what should be found."""
     ahead = Ahead(encoder_sigma_rad)
     off_m, grazes, sigma_off_m = [np.zeros(0)], [np.zeros(0, dtype=np.bool_)], [0.0]
-    for pose, objects, classes, along, widest_m in asked:
+    for (pose, classes, along, widest_m, _), objects in looks:
         found = ahead.look(pose, scene_table(objects), classes, along, widest_m)
         defined = defined_ways(pose, objects, classes, along, widest_m, encoder_sigma_rad)
         judged = defined.judge(found.ways_m, along.reach_m)

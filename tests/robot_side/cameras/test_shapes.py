@@ -12,7 +12,8 @@ from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from robot_side import scene_view
 from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.shapes import SceneModel
-from robot_side.laws.law import Sensed, Situation
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
 from robot_side.scene_view import SceneView, TickFigures
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene, load_scene

@@ -12,13 +12,15 @@ from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.arm.port import GripperPose
-from robot_side.laws.schedule import FIELD_PERIOD_S
-from robot_side.laws.sideways import SPACING_M, FingerMotion, Sideways
+from robot_side.laws.memory import Memory
+from robot_side.laws.prospect import FIELD_PERIOD_S
+from robot_side.laws.sideways import SPACING_M
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import RADIUS_M, ball_pose
 from tests.helpers.field.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
+from tests.helpers.laws import farthest_m_s, fingers_m_s, memory, moments, moved
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOP_S = 0.1
@@ -135,10 +137,10 @@ def test_what_the_fingers_close_towards_is_felt() -> None:
 
 
 def test_fingers_that_rest_do_not_move_however_their_readings_shake() -> None:
-    rng, fingers = np.random.default_rng(1), FingerMotion()
+    rng, kept = np.random.default_rng(1), memory(2)
     for tick in range(100):
         centers = np.array([[0.05, 0.0, 0.0], [-0.05, 0.0, 0.0]]) + 5e-5 * rng.standard_normal((2, 3))
-        assert (fingers.see(free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01) == 0.0).all()
+        assert not fingers_m_s(kept, free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01).any()
 
 
 def test_what_is_gripped_or_let_go_while_the_gripper_drifts_changes_nothing_but_the_spheres() -> None:
@@ -153,16 +155,22 @@ def test_what_is_gripped_or_let_go_while_the_gripper_drifts_changes_nothing_but_
 # Places
 
 
+def moving(linear: list[float], turning: list[float], own: FloatArray) -> Memory:
+    kept = memory(len(own))
+    kept.velocity[:], kept.own_m_s[:] = [linear, turning], own
+    return kept
+
+
 def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.0, 0.1]], [RADIUS_M, RADIUS_M])
     for drift, turn in ((0.1, 0.0), (0.0, 0.5), (0.08, 0.2), (0.001, 0.0)):
-        sideways = Sideways(np.array([drift, 0.0, 0.0]), np.array([0.0, turn, 0.0]), np.zeros((2, 3)))
-        moments = sideways.moments(pose, 0.8)
+        kept = moving([drift, 0.0, 0.0], [0.0, turn, 0.0], np.zeros((2, 3)))
+        when_s = moments(kept, pose, 0.8)
         if drift == 0.001:
-            assert moments == ()
+            assert when_s == ()
             continue
-        assert moments[-1] == pytest.approx(0.8)
-        centers = [pose.sphere_centers_m, *(sideways.moved(pose, moment).sphere_centers_m for moment in moments)]
+        assert when_s[-1] == pytest.approx(0.8)
+        centers = [pose.sphere_centers_m, *(moved(kept, pose, one_s)[2] for one_s in when_s)]
         # Along an arc the chord is shorter, and the arc about a moving point a little longer, than reckoned.
         assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
 
@@ -170,20 +178,18 @@ def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
 def test_there_are_no_more_than_eight_places_however_far_apart_they_are() -> None:
     pose = free_pose([[0.0, 0.0, 0.0]], [RADIUS_M])
     for until_s, count in ((1.19, 8), (3.0, 8), (1.04, 7)):
-        sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.zeros(3), np.zeros((1, 3)))
-        moments = sideways.moments(pose, until_s)
-        assert len(moments) == count
-        np.testing.assert_allclose(np.diff(moments), until_s / count)
+        when_s = moments(moving([0.1, 0.0, 0.0], [0.0] * 3, np.zeros((1, 3))), pose, until_s)
+        assert len(when_s) == count
+        np.testing.assert_allclose(np.diff(when_s), until_s / count)
 
 
 def test_a_turned_gripper_keeps_its_shape_and_looks_where_it_points() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.02, 0.1]], [RADIUS_M, RADIUS_M])
-    sideways = Sideways(np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.5, 0.0]), np.zeros((2, 3)))
-    moved = sideways.moved(pose, 1.0)
-    np.testing.assert_allclose(moved.tool_position_m, pose.tool_position_m + np.array([0.1, 0.0, 0.0]))
-    np.testing.assert_allclose(moved.tool_rotation[:, 2], [np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
-    in_tool = [(one.sphere_centers_m - one.tool_position_m) @ one.tool_rotation for one in (pose, moved)]
-    np.testing.assert_allclose(in_tool[0], in_tool[1], atol=1e-12)
+    tool_m, rotation, centers_m = moved(moving([0.1, 0.0, 0.0], [0.0, 0.5, 0.0], np.zeros((2, 3))), pose, 1.0)
+    np.testing.assert_allclose(tool_m, pose.tool_position_m + np.array([0.1, 0.0, 0.0]))
+    np.testing.assert_allclose(rotation[:, 2], [np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
+    before = (pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation
+    np.testing.assert_allclose((centers_m - tool_m) @ rotation, before, atol=1e-12)
 
 
 @pytest.mark.parametrize("speed_m_s", [1e-15, 0.05])
@@ -220,28 +226,24 @@ def random_pose(rng: np.random.Generator, count: int) -> GripperPose:
 def test_drift_is_what_rotations_of_scipy_and_sums_of_vectors_make_it(seed: int, count: int, after_s: float) -> None:
     rng = np.random.default_rng(seed)
     pose, turning = random_pose(rng, count), rng.normal(size=3) * (seed % 4 > 0)
-    sideways = Sideways(rng.normal(size=3), turning, rng.normal(size=(count, 3)))
-    moved, turn = sideways.moved(pose, after_s), Rotation.from_rotvec(turning * after_s).as_matrix()
-    tool_m = pose.tool_position_m + sideways.linear_m_s * after_s
-    lever = pose.sphere_centers_m - pose.tool_position_m
-    np.testing.assert_allclose(moved.tool_position_m, tool_m, atol=1e-12)
-    np.testing.assert_allclose(moved.tool_rotation, turn @ pose.tool_rotation, atol=1e-12)
-    centers_m = tool_m + (lever + sideways.own_m_s * after_s) @ turn.T
-    np.testing.assert_allclose(moved.sphere_centers_m, centers_m, atol=1e-12)
-    speeds = [
-        sideways.linear_m_s + np.cross(turning, one) + sideways.own_m_s
-        for one in (lever, lever + 0.3 * pose.tool_rotation[:, 2])
-    ]
-    farthest_m = after_s * np.linalg.norm(speeds, axis=2).max()
-    assert sideways.farthest_m(pose, after_s, 0.3) == pytest.approx(farthest_m, abs=1e-12)
+    linear, own = rng.normal(size=3), rng.normal(size=(count, 3))
+    kept = moving(linear.tolist(), turning.tolist(), own)
+    tool_m, rotation, centers_m = moved(kept, pose, after_s)
+    turn, lever = Rotation.from_rotvec(turning * after_s).as_matrix(), pose.sphere_centers_m - pose.tool_position_m
+    np.testing.assert_allclose(tool_m, pose.tool_position_m + linear * after_s, atol=1e-12)
+    np.testing.assert_allclose(rotation, turn @ pose.tool_rotation, atol=1e-12)
+    np.testing.assert_allclose(centers_m, tool_m + (lever + own * after_s) @ turn.T, atol=1e-12)
+    speeds = [linear + np.cross(turning, one) + own for one in (lever, lever + 0.3 * pose.tool_rotation[:, 2])]
+    assert farthest_m_s(kept, pose, 0.3) == pytest.approx(np.linalg.norm(speeds, axis=2).max(), abs=1e-12)
 
 
 @settings(derandomize=True, deadline=None, max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_fingers_move_by_the_difference_in_the_tool_frame(seed: int) -> None:
-    rng, fingers = np.random.default_rng(seed), FingerMotion()
+    rng, kept = np.random.default_rng(seed), memory(5)
     then, now = random_pose(rng, 5), random_pose(rng, 5)
-    assert not fingers.see(then, 1.0).any()
+    assert not fingers_m_s(kept, then, 1.0).any()
     in_tool = [(pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation for pose in (then, now)]
     expected = (in_tool[1] - in_tool[0]) / 0.05 @ now.tool_rotation.T
-    np.testing.assert_allclose(fingers.see(now, 1.05), expected, atol=1e-11)
+    np.testing.assert_allclose(fingers_m_s(kept, now, 1.05), expected, atol=1e-11)
+    assert not fingers_m_s(kept, then, 1.06, changed=True).any()

@@ -9,7 +9,7 @@ from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from robot_side.gripper.held_object import grip, with_held
-from robot_side.laws.law import Sensed
+from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
 from tests.helpers.field.situations import ACCELERATION_M_S2, SIGMA_M, STICK_SPEED_M_S, Senses

@@ -10,8 +10,7 @@ import pytest
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.enlargement.prediction_errors import PredictionErrors
-from robot_side.laws.felt import BEYOND_M
-from robot_side.laws.schedule import FIELD_PERIOD_S
+from robot_side.laws.prospect import BEYOND_M, FIELD_PERIOD_S
 from robot_side.overlap import sphere_box
 from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
 from tests.helpers.field.situations import (

@@ -1,6 +1,5 @@
 """When the swept law looks, tick by tick in virtual time, and what holds until it looks again."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -8,9 +7,9 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.arm.port import GripperPose
+from robot_side.laws.prospect import FIELD_PERIOD_S
 from robot_side.laws.recent_looks import STEADY_S
-from robot_side.laws.schedule import FIELD_PERIOD_S
+from robot_side.laws.sensed import L2, R2, STICK
 from tests.helpers.field.fields import EQUAL_M, ball_pose
 from tests.helpers.field.situations import Senses, at, situation, swept, walls
 from tests.helpers.perceived_scenes import Scene
@@ -21,27 +20,22 @@ from tests.helpers.perceived_scenes import Scene
 class Watched:
     """A law that is used tick by tick, and where it looked in each."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self) -> None:
         self.law = swept()
         self.looks: list[tuple[float, str]] = []
         self.now_s = 7.0
-        look: Callable[..., Any] = self.law.ahead.look
-
-        def watched(pose: GripperPose, scene: Any, classes: Any, along: Any, widest_m: float) -> Any:
-            along_z = float(along.direction @ pose.tool_rotation[:, 2])
-            self.looks.append((self.now_s, {1: "r2", -1: "l2"}.get(round(along_z), "stick")))
-            return look(pose, scene, classes, along, widest_m)
-
-        monkeypatch.setattr(self.law.ahead, "look", watched)
 
     def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
         """How often it looked in each tick."""
         numbers = []
         for _ in range(count):
             self.now_s += step_s
-            before = len(self.looks)
+            before = self.law.summary()["fields"]
             self.law.sense(situation(ball_pose(), walls(0.1), **changes), self.now_s)
-            numbers.append(len(self.looks) - before)
+            numbers.append(self.law.summary()["fields"] - before)
+            looked = np.argwhere(self.law.memory.looked_s == self.now_s)[:, 0].tolist()
+            self.looks += [(self.now_s, {R2: "r2", L2: "l2", STICK: "stick"}[side]) for side in looked]
+            assert len(looked) == numbers[-1]
         return numbers
 
     def pauses_s(self, side: str) -> FloatArray:
@@ -50,8 +44,8 @@ class Watched:
 
 
 @pytest.fixture
-def watched(monkeypatch: pytest.MonkeyPatch) -> Watched:
-    return Watched(monkeypatch)
+def watched() -> Watched:
+    return Watched()
 
 
 @pytest.mark.parametrize("lateral", [(0.0, 0.0), (0.5, 0.2)])
@@ -104,9 +98,9 @@ def test_a_pose_that_is_refused_changes_nothing_that_was_seen() -> None:
 
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
     law = swept()
-    first = law._classes_of(situation(ball_pose(), walls(0.1, 0.1)))
-    assert law._classes_of(situation(ball_pose(), walls(0.2, 0.1))) is first
-    held = law._classes_of(situation(ball_pose(), walls(0.2, 0.1), held=1))
+    first = law.asked(R2, situation(ball_pose(), walls(0.1, 0.1))).classes
+    assert law.asked(R2, situation(ball_pose(), walls(0.2, 0.1))).classes is first
+    held = law.asked(R2, situation(ball_pose(), walls(0.2, 0.1), held=1)).classes
     assert held.tolist() != first.tolist()
 
 

@@ -1,0 +1,131 @@
+"""Which field is looked at in a tick: they take turns, the one that has waited longest first.
+
+R2, L2, and the stick while it is deflected, each from where the gripper is and from where it will have drifted, turned
+or closed its fingers to. A look takes one tick. A tick has one look, two while a field is 1.5 periods old, and all that
+are due after 5 periods, or where a place is new.
+"""
+
+from typing import Final, NamedTuple
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, inlined
+from robot_side.compiled.vectors import Vector, dot, load
+from robot_side.field.look import LOOK
+from robot_side.field.scratch import SCRATCH, Count
+from robot_side.field.total_overlap import SUM_OVERLAPS
+from robot_side.laws.felt import MOST_M
+from robot_side.laws.memory import Kernel, Total, memory_at
+from robot_side.laws.prospect import find_prospect, stopping
+from robot_side.laws.recent_looks import keep, longest_waiting
+from robot_side.laws.sensed import L2, R2
+from robot_side.laws.sideways import move
+
+OVERLAP_PERIOD_S: Final = 0.02
+"""The overlap at δ is a figure that people read."""
+ROUNDING_S: Final = 1e-9
+_ROUNDING: Final = 1e-6
+_OVERDUE: Final = 1.5
+"""While a field is this many periods old, a tick has two looks;"""
+_FAR_BEHIND: Final = 5.0
+"""and while one is this old, or was never looked at, a tick has all that are due."""
+_ALL: Final = 1000
+
+scratch_at = SCRATCH.at
+_look = call_at_address(TRUTH, LOOK)
+_sum_overlaps = call_at_address(NUMBER, SUM_OVERLAPS)
+
+
+class Moment(NamedTuple):
+    """What the kernel is told of one tick, handed on as one."""
+
+    rotation: FloatArray
+    jacobian: FloatArray
+    centers: FloatArray
+    radii: FloatArray
+    on_finger: BoolArray
+    tool: Vector
+    approach: Vector
+    speed: float
+    """m/s along the approach axis"""
+    now: float
+    loop_age: float
+    by_operator: bool
+    """The operator side predicts what is under way."""
+    widest: float
+    """Half the gap between the fingers (§3.4)"""
+    right: float
+    up: float
+    """The stick's deflection"""
+    classes: IntArray
+    closing: IntArray
+    """The same while the fingers move: what they close on is what they are to touch."""
+    velocities: FloatArray
+    """(k, 3) of the objects; empty where all stand still"""
+    scene: IntArray
+    scratch: IntArray
+
+
+@inlined
+def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> None:
+    """By how much each object's ways are shorter: what it comes nearer by until the arm stands."""
+    memory = memory_at(bundle)
+    along = load(memory.direction.reshape(1, 3), 0)
+    for thing in range(velocities.shape[0]):
+        memory.early_m[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
+
+
+@building_block
+def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool:
+    """Look along one side from one place, and keep what was seen; False for what is not finite."""
+    memory = memory_at(bundle)
+    state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
+    after = memory.moments_s[place - 1] if place > 0 else 0.0
+    move(bundle, moment.tool, moment.rotation, moment.centers, after)
+    where = memory.rotation, moment.jacobian, moment.right, moment.up, moment.loop_age, moment.by_operator
+    if not find_prospect(bundle, side, *where):
+        return False
+    _fill_early(bundle, moment.velocities, stopping(prospect.speed, prospect.acceleration, moment.loop_age))
+    classes = moment.closing if place > 0 and state.moves_fingers == 1 else moment.classes
+    gripper = memory.centers_m[:count], moment.radii, moment.on_finger, memory.tool_m, moment.jacobian
+    errors = memory.encoder_variance, memory.direction, prospect.mean, prospect.variance, memory.settings[0].quantile
+    early = memory.early_m[: moment.velocities.shape[0]]
+    around = moment.widest, prospect.reach, classes, early, moment.scene, moment.scratch
+    if not _look(memory.kernels[Kernel.LOOK], (*gripper, *errors, *around)):
+        return False
+    scratch, totals = scratch_at(moment.scratch), memory.totals
+    for counted in range(scratch.counts.size):
+        totals[counted] += scratch.counts[counted]
+    totals[Total.LOOKS] += 1
+    totals[Total.WITH_NOTHING_NEAR] += 1 if scratch.counts[Count.PAIRS] == 0 else 0
+    leads = place == 0 and side == (R2 if moment.speed >= 0.0 else L2)
+    if leads and moment.now >= state.next_overlap:
+        state.next_overlap = moment.now + OVERLAP_PERIOD_S - ROUNDING_S
+        for axis in range(3):
+            memory.displacement_m[axis] = abs(moment.speed) * moment.loop_age * memory.direction[axis]
+        spheres = scratch.spheres[:count], scratch.sigma_m[:count], memory.displacement_m
+        state.overlap = _sum_overlaps(
+            memory.kernels[Kernel.OVERLAPS], (*spheres, classes, moment.scene, memory.push, memory.nothing)
+        )
+    keep(bundle, side, place, moment.now, load(memory.tool_m.reshape(1, 3), 0), scratch.distances_m)
+    if place == 0:
+        newest = memory.newest[side]
+        newest.reach, newest.speed, newest.acceleration = prospect.reach, prospect.speed, prospect.acceleration
+        newest.sigma, newest.overlap = scratch.largest_m[0], state.overlap if leads else 0.0
+    return True
+
+
+@inlined
+def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
+    """Look at what has waited longest; at more than `at_most` fields where they have waited too long."""
+    waited, side, place = longest_waiting(bundle, moment.now)
+    if waited >= _FAR_BEHIND:
+        at_most = _ALL
+    elif waited >= _OVERDUE:
+        at_most = 2
+    while at_most > 0 and waited >= 1.0 - _ROUNDING:
+        if not _look_along(bundle, moment, side, place):
+            return False
+        at_most -= 1
+        waited, side, place = longest_waiting(bundle, moment.now)
+    return True

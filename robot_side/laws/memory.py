@@ -1,0 +1,182 @@
+"""What the swept law keeps from tick to tick, and the room it works in: columns that its one call reads and fills."""
+
+from collections.abc import Iterable
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.arm.ability import JointLimits, find_ability
+from robot_side.compiled.columns import INDICES, NUMBERS, Declared, records, rows
+from robot_side.field.look import look
+from robot_side.field.scratch import STRENGTHS, Count
+from robot_side.field.total_overlap import sum_overlaps
+
+SIDES: Final = 3
+MOST_PLACES: Final = 8
+"""Places besides the gripper's own from which a side is looked at."""
+ROOM: Final = 12 * (1 + MOST_PLACES)
+"""Looks of one side: a place is looked from a hundred times a second at most."""
+FINGER_POSES: Final = 8
+"""So many are kept of the last 0.06 s."""
+
+
+class Kernel(IntEnum):
+    """Kernels that are called by their addresses: compiled in anew, each would cost seconds at the start."""
+
+    ABILITY = 0
+    LOOK = 1
+    OVERLAPS = 2
+
+
+class Total(IntEnum):
+    """Counts over the run, after those of `Count`."""
+
+    LOOKS = len(Count)
+    WITH_NOTHING_NEAR = len(Count) + 1
+    """Looks within the reach of which no sphere met anything"""
+
+
+STATE: Final = np.dtype(
+    [
+        *((name, np.int64) for name in ("spheres", "moments", "finger_poses", "moves_fingers")),
+        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap")),
+    ]
+)
+"""spheres: how many the gripper had, -1 before the first tick. moments: how many places besides the gripper's own are
+looked from. finger_poses: how many are kept. measured, next, next_overlap: when the motion was measured, when something
+is due again at the earliest, when the overlap at δ is (s). overlap: that one (m³)."""
+SEEN: Final = np.dtype(
+    [
+        ("place", np.int64),
+        ("at", np.float64),
+        ("direction", np.float64, (3,)),
+        ("began", np.float64),
+        ("ways", np.float64, (2, STRENGTHS)),
+    ]
+)
+"""One look: when, from which place, the ways that it found, fast and slow. began: where the tool was along it (m)."""
+NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
+"""Of the newest look from where the gripper is: how far it looked, what the arm can do there, D_σ, and Σ V_ij (m³)."""
+SETTINGS: Final = np.dtype(
+    [
+        *(
+            (name, np.float64)
+            for name in ("trigger_speed", "stick_speed", "touch_speed", "camera_variance", "quantile")
+        ),
+        ("mean", np.float64, (3,)),
+    ]
+)
+"""Speeds in m/s; σ_c² (m²), Φ⁻¹(P), and μ_ee - μ_c (m) of eq. 10."""
+PROSPECT: Final = np.dtype(
+    [
+        ("direction", np.float64, (3,)),
+        *((name, np.float64) for name in ("mean", "variance", "prediction_sd", "reach", "speed", "acceleration")),
+    ]
+)
+"""How to look along one side: û, μ and σ² of eq. 10 without the joints' part, σ_δ, how far, the arm's v_max and a."""
+
+
+class MemoryColumns(NamedTuple):
+    """The columns; the fields are those of Memory."""
+
+    state: np.ndarray
+    seen: np.ndarray
+    counts: IntArray
+    newest: np.ndarray
+    looked_s: FloatArray
+    places: IntArray
+    moments_s: FloatArray
+    velocity: FloatArray
+    own_m_s: FloatArray
+    finger_poses_s: FloatArray
+    finger_poses_m: FloatArray
+    tool_m: FloatArray
+    rotation: FloatArray
+    centers_m: FloatArray
+    early_m: FloatArray
+    prospect: np.ndarray
+    direction: FloatArray
+    able: FloatArray
+    displacement_m: FloatArray
+    push: FloatArray
+    nothing: FloatArray
+    settings: np.ndarray
+    missed_by_operator: FloatArray
+    missed_by_robot: FloatArray
+    limits_rad_s: FloatArray
+    accelerations_rad_s2: FloatArray
+    encoder_variance: FloatArray
+    kernels: IntArray
+    totals: IntArray
+
+
+MEMORY: Final = Declared(
+    MemoryColumns,
+    *(records(STATE), records(SEEN), INDICES, records(NEWEST), rows(1 + MOST_PLACES), INDICES, NUMBERS, rows(3)),
+    *(rows(3), NUMBERS, rows(3), NUMBERS, rows(3), rows(3), NUMBERS, records(PROSPECT), NUMBERS, NUMBERS, NUMBERS),
+    *(NUMBERS, NUMBERS, records(SETTINGS), rows(3), rows(3), NUMBERS, NUMBERS, NUMBERS, INDICES, INDICES),
+)
+
+memory_at = MEMORY.at
+
+
+class Memory:
+    """What is kept; `bundle` is what kernels take."""
+
+    def __init__(self, limits: JointLimits, encoder_sigma_rad: FloatArray, missed: Iterable[FloatArray]) -> None:
+        """missed: rows (k, 3) of loop age, μ_δ, σ_δ, for the operator side's prediction and for the robot side's."""
+        self.state: np.ndarray = np.zeros(1, dtype=STATE)
+        self.state["spheres"] = -1
+        for name in ("measured", "next", "next_overlap"):
+            self.state[name] = -np.inf
+        self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
+        """Those of one side together, from `ROOM` times the side on"""
+        self.counts: IntArray = np.zeros(SIDES, dtype=np.int64)
+        """How many there are of each side"""
+        self.newest: np.ndarray = np.zeros(SIDES, dtype=NEWEST)
+        self.looked_s: FloatArray = np.full((SIDES, 1 + MOST_PLACES), -np.inf)
+        """By side and place: when it was last looked from there, minus infinity where it never was."""
+        self.places: IntArray = np.zeros(SIDES, dtype=np.int64)
+        """From how many places each side is looked at. Place 0 is where the gripper is."""
+        self.moments_s: FloatArray = np.zeros(MOST_PLACES)
+        """After which the gripper will be at the other places"""
+        self.velocity: FloatArray = np.zeros((2, 3))
+        """Linear and angular, of the tool, without that along its approach axis"""
+        self.finger_poses_s: FloatArray = np.zeros(FINGER_POSES)
+        self.tool_m: FloatArray = np.zeros(3)
+        self.rotation: FloatArray = np.zeros((3, 3))
+        """Of the tool at the place that is looked from"""
+        self.prospect: np.ndarray = np.zeros(1, dtype=PROSPECT)
+        self.direction: FloatArray = np.zeros(3)
+        self.able: FloatArray = np.zeros(3)
+        """Speed and acceleration there, and by how much the motion is off"""
+        self.displacement_m: FloatArray = np.zeros(3)
+        """δ of the overlap that is looked at"""
+        self.push: FloatArray = np.zeros(3)
+        self.nothing: FloatArray = np.zeros(0)
+        self.settings: np.ndarray = np.zeros(1, dtype=SETTINGS)
+        self.missed_by_operator, self.missed_by_robot = missed
+        self.limits_rad_s = np.ascontiguousarray(limits.velocity_rad_s)
+        self.accelerations_rad_s2 = np.ascontiguousarray(limits.acceleration_rad_s2)
+        self.encoder_variance: FloatArray = encoder_sigma_rad * encoder_sigma_rad
+        self.kernels: IntArray = np.array([find_ability.address, look.address, sum_overlaps.address])
+        self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
+        self.make_room(0, 0)
+
+    def make_room(self, spheres: int, objects: int) -> None:
+        """Have room for a gripper of m spheres among k objects."""
+        self.own_m_s: FloatArray = np.zeros((spheres, 3))
+        """(m, 3) of each sphere against the tool: the fingers', in the world frame"""
+        self.finger_poses_m: FloatArray = np.zeros((FINGER_POSES * spheres, 3))
+        """Where the spheres were in the tool frame, pose after pose"""
+        self.centers_m: FloatArray = np.zeros((spheres, 3))
+        """Of the spheres at the place that is looked from"""
+        self.early_m: FloatArray = np.zeros(objects)
+        """By how much each object's ways are shorter, as it comes nearer"""
+        self.bundle = MEMORY.bundle(self)
+
+    def fits(self, spheres: int, objects: int) -> bool:
+        """Whether there is room for so many."""
+        return spheres <= len(self.own_m_s) and objects <= len(self.early_m)

@@ -1,0 +1,116 @@
+"""How to look along one side: where it leads, what the arm can do there, how wrong what is known may be (eq. 9-10)."""
+
+import math
+from typing import Final
+
+from common.arrays import FloatArray, IntArray
+from common.reaction import HORIZON_S
+from robot_side.arm.ability import ABILITY
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array
+from robot_side.compiled.vectors import load
+from robot_side.enlargement.prediction_errors import prediction_error
+from robot_side.laws.memory import Kernel, memory_at
+from robot_side.laws.sensed import R2, STICK
+from robot_side.laws.sideways import move
+
+BEYOND_M: Final = 0.05
+"""So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
+FIELD_PERIOD_S: Final = 0.01
+"""A controller is written to no more often. From where the gripper is yet to come, it is looked half as often."""
+
+_find_ability = call_at_address(TRUTH, ABILITY)
+_prediction_error = inlined(prediction_error)
+
+
+def stopping_s(speed: float, acceleration: float, loop_age: float) -> float:
+    """The time from a report until the arm stands. It goes at full speed; a person feels the report and lets go."""
+    return loop_age + HORIZON_S + speed / acceleration
+
+
+stopping = inlined(stopping_s)
+"""The same in kernels."""
+
+
+@inlined
+def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
+    """How far full speed gets before anything felt stops it, and a little more."""
+    return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
+
+
+@inlined
+def find_prospect(
+    bundle: IntArray,
+    side: int,
+    rotation: FloatArray,
+    jacobian: FloatArray,
+    right: float,
+    up: float,
+    loop_age: float,
+    by_operator: bool,
+) -> bool:
+    """Fill the memory's prospect and direction for one side; False for a Jacobian by which nothing can be resolved.
+
+    rotation (3, 3), jacobian (6, n): of the tool at the place that is looked from. right, up: the stick's deflection.
+    by_operator: the operator side predicts what is under way.
+    """
+    memory = memory_at(bundle)
+    settings, found, able = memory.settings[0], memory.prospect[0], memory.able
+    for axis in range(3):
+        x, y, z = rotation[axis, 0], rotation[axis, 1], rotation[axis, 2]
+        memory.direction[axis] = z if side == R2 else -z
+        if side == STICK:
+            memory.direction[axis] = (right * x - up * y) / math.hypot(right, up)
+        found.direction[axis] = memory.direction[axis]
+    full_speed = settings.stick_speed if side == STICK else settings.trigger_speed
+    given = jacobian, memory.direction, full_speed, memory.limits_rad_s, memory.accelerations_rad_s2, able
+    if not _find_ability(memory.kernels[Kernel.ABILITY], given):
+        return False
+    found.speed, found.acceleration = able[0], able[1]
+    mean, sd = 0.0, 0.0
+    # The stick is felt where it leads with the speed that it commands: nothing is predicted.
+    if side != STICK:
+        rows = memory.missed_by_operator if by_operator else memory.missed_by_robot
+        mean, sd = _prediction_error(rows, loop_age, found.speed)
+    for axis in range(3):
+        mean += found.direction[axis] * settings.mean[axis]
+    found.mean, found.prediction_sd, found.variance = mean, sd, settings.camera_variance + sd * sd
+    found.reach = horizon_m(found.speed, found.acceleration, loop_age) + 2.0 * FIELD_PERIOD_S * full_speed
+    return True
+
+
+@compiled(
+    *(
+        BUNDLE,
+        COUNT,
+        COUNT,
+        input_array(1),
+        input_array(2),
+        input_array(2),
+        input_array(2),
+        NUMBER,
+        NUMBER,
+        NUMBER,
+        TRUTH,
+    ),
+    returns=TRUTH,
+)
+def fill_prospect(
+    bundle: IntArray,
+    side: int,
+    place: int,
+    tool: FloatArray,
+    rotation: FloatArray,
+    jacobian: FloatArray,
+    centers: FloatArray,
+    right: float,
+    up: float,
+    loop_age: float,
+    by_operator: bool,
+) -> bool:
+    """Go to a place and do the same, for people who look; bundle: the memory's; tool (3,), centers (m, 3)."""
+    memory = memory_at(bundle)
+    after = memory.moments_s[place - 1] if place > 0 else 0.0
+    move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after)
+    return find_prospect(bundle, side, memory.rotation, jacobian, right, up, loop_age, by_operator)

@@ -1,0 +1,110 @@
+"""What one tick found out about the surroundings: numbers in one array, of which messages are made when they leave."""
+
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, require_finite
+from common.protocol.messages import TriggerField, Ways
+from robot_side.field.scratch import STRENGTHS
+
+R2, L2, STICK = 0, 1, 2
+"""The sides along which a law looks."""
+DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, OF_A_SIDE = (2 * STRENGTHS + k for k in range(5))
+"""Of the numbers of R2, and then of L2: after eight fast and eight slow ways, δ in m, s(δ), v_max, a."""
+SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * OF_A_SIDE + k for k in range(7))
+"""After those of R2 and L2; and how many numbers there are in all."""
+
+
+class Sensed:
+    """What one tick found out."""
+
+    def __init__(self, numbers: FloatArray) -> None:
+        """numbers (NUMBERS,): SI units, at the places above; they must not change from now on."""
+        self.numbers: Final = numbers
+
+    @classmethod
+    def of(cls, l2: TriggerField, r2: TriggerField, **others: float) -> "Sensed":
+        """Make one of two fields and the properties below, 0 where they are not given; ValueError for no number."""
+        numbers: FloatArray = np.zeros(NUMBERS)
+        for side, field in ((R2, r2), (L2, l2)):
+            numbers[side * OF_A_SIDE : (side + 1) * OF_A_SIDE] = (
+                *(*field.fast_m, *field.slow_m, field.displacement_m, field.stiffness),
+                *(field.full_speed_m_s, field.acceleration_m_s2),
+            )
+        for name, value in others.items():
+            require_finite(name, np.array([value]))
+            numbers[_PLACES[name]] = value
+        return cls(numbers)
+
+    @cached_property
+    def l2(self) -> TriggerField:
+        """What lies ahead along L2."""
+        return _trigger_field(self.numbers, L2)
+
+    @cached_property
+    def r2(self) -> TriggerField:
+        """What lies ahead along R2."""
+        return _trigger_field(self.numbers, R2)
+
+    def stiffness(self, side: int) -> float:
+        """s(δ) of R2 or L2, 0 to 1"""
+        return float(self.numbers[side * OF_A_SIDE + STIFFNESS])
+
+    @property
+    def speed_m_s(self) -> float:
+        """v along the direction in which R2 advances"""
+        return float(self.numbers[SPEED])
+
+    @property
+    def horizon_m(self) -> float:
+        """So far the fields look ahead."""
+        return float(self.numbers[HORIZON])
+
+    @property
+    def rumble(self) -> float:
+        """Danger where the stick leads, in eighths, 0 to 1"""
+        return float(self.numbers[RUMBLE])
+
+    @property
+    def enlargement_m(self) -> float:
+        """D_incr of eq. 10 along the motion: |v| t_d + D_σ, the largest of the gripper's spheres"""
+        return float(self.numbers[ENLARGEMENT])
+
+    @property
+    def overlap_m3(self) -> float:
+        """Σ V_ij of the enlarged gripper (eq. 11-12)"""
+        return float(self.numbers[OVERLAP])
+
+    @property
+    def tool_speed_m_s(self) -> float:
+        """|v| of the tool's point"""
+        return float(self.numbers[TOOL_SPEED])
+
+
+_PLACES: Final = {
+    "speed_m_s": SPEED,
+    "horizon_m": HORIZON,
+    "rumble": RUMBLE,
+    "enlargement_m": ENLARGEMENT,
+    "overlap_m3": OVERLAP,
+    "tool_speed_m_s": TOOL_SPEED,
+}
+
+
+def _trigger_field(numbers: FloatArray, side: int) -> TriggerField:
+    mine = numbers[side * OF_A_SIDE : (side + 1) * OF_A_SIDE].tolist()
+    return TriggerField(
+        fast_m=_eight(mine, 0),
+        slow_m=_eight(mine, STRENGTHS),
+        full_speed_m_s=mine[FULL_SPEED],
+        acceleration_m_s2=mine[ACCELERATION],
+        displacement_m=mine[DISPLACEMENT],
+        stiffness=mine[STIFFNESS],
+    )
+
+
+def _eight(numbers: list[float], first: int) -> Ways:
+    one, two, three, four, five, six, seven, eight = numbers[first : first + STRENGTHS]
+    return one, two, three, four, five, six, seven, eight

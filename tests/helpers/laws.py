@@ -1,0 +1,88 @@
+"""A law's memory alone, and its kernels one by one, which the law itself runs in one call."""
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.arm.ability import JointLimits
+from robot_side.arm.port import GripperPose
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.vectors import load
+from robot_side.laws import felt, recent_looks, sideways
+from robot_side.laws.memory import Memory
+
+
+def memory(spheres: int = 0) -> Memory:
+    """One as at the start, with room for a gripper of so many spheres."""
+    made = Memory(JointLimits(np.ones(6), np.ones(6)), np.zeros(6), [np.zeros((0, 3))] * 2)
+    made.make_room(spheres, 0)
+    return made
+
+
+def moved(kept: Memory, pose: GripperPose, after_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The tool's position (3,) and rotation (3, 3), and the spheres' centres (m, 3), then."""
+    _move(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, after_s)
+    return kept.tool_m.copy(), kept.rotation.copy(), kept.centers_m.copy()
+
+
+def moments(kept: Memory, pose: GripperPose, until_s: float, ahead_m: float = 0.0) -> tuple[float, ...]:
+    """After which to look from where the gripper will be."""
+    _plan(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, until_s, ahead_m)
+    return tuple(kept.moments_s[: kept.state["moments"][0]].tolist())
+
+
+def farthest_m_s(kept: Memory, pose: GripperPose, ahead_m: float) -> float:
+    """The speed of the fastest sphere, or of one so much farther ahead."""
+    found: float = _farthest(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, ahead_m)
+    return found
+
+
+def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool = False) -> FloatArray:
+    """The velocities (m, 3) of the spheres against the tool, measured at one more pose."""
+    _measure(kept.bundle, pose.sphere_centers_m, pose.tool_position_m, pose.tool_rotation, now_s, changed)
+    return kept.own_m_s.copy()
+
+
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER)
+def _move(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, after: float) -> None:
+    sideways.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after)
+
+
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)
+def _plan(
+    bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, until: float, ahead: float
+) -> None:
+    approach = rotation[0, 2], rotation[1, 2], rotation[2, 2]
+    sideways.plan_moments(bundle, centers, load(tool.reshape(1, 3), 0), approach, until, ahead)
+
+
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, returns=NUMBER)
+def _farthest(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, ahead: float) -> float:
+    farther = ahead * rotation[0, 2], ahead * rotation[1, 2], ahead * rotation[2, 2]
+    return sideways.fastest_m_s(bundle, centers, load(tool.reshape(1, 3), 0), farther)
+
+
+@compiled(BUNDLE, input_array(2), input_array(1), input_array(2), NUMBER, TRUTH)
+def _measure(
+    bundle: IntArray, centers: FloatArray, tool: FloatArray, rotation: FloatArray, now: float, changed: bool
+) -> None:
+    sideways.measure_fingers(bundle, centers, load(tool.reshape(1, 3), 0), rotation, now, changed)
+
+
+@compiled(BUNDLE, COUNT, COUNT)
+def look_from(bundle: IntArray, side: int, places: int) -> None:
+    recent_looks.look_from(bundle, side, places)
+
+
+@compiled(BUNDLE, COUNT, COUNT, NUMBER, input_array(1), input_array(2))
+def keep(bundle: IntArray, side: int, place: int, now: float, tool: FloatArray, ways: FloatArray) -> None:
+    recent_looks.keep(bundle, side, place, now, load(tool.reshape(1, 3), 0), ways)
+
+
+@compiled(BUNDLE, input_array(2), NUMBER, TRUTH, NUMBER, output_array(1))
+def feel(
+    bundle: IntArray, where: FloatArray, loop_age: float, is_known: bool, deflection: float, numbers: FloatArray
+) -> None:
+    """where (3, 3): the tool's position, its approach axis, and its velocity."""
+    tool = load(where, 0), load(where, 1), load(where, 2)
+    felt.feel(bundle, *tool, loop_age, is_known, deflection, numbers)
