@@ -39,7 +39,7 @@ class LoopAge:
         before_s = self.value(now_s)
         self._held_s = max(before_s, self._quantile.update(age_s))
         self._held_since_s = now_s
-        return self.value(now_s)
+        return self._held_s
 
     def reset(self) -> None:
         """Forget every sample: the worst case holds until there is one again."""

@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass
 class ArmState:
     """What the arm measures of itself: never the truth, always what its sensors say. Its arrays are contiguous."""
 
@@ -51,7 +51,7 @@ class Arm(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass
 class GripperPose:
     """Where forward kinematics puts the tool and the gripper's spheres, in the world frame (eq. 4).
 

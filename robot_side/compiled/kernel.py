@@ -6,6 +6,7 @@ Numba is imported untyped; everything else in this package sees ordinary typed f
 import contextlib
 import functools
 import gc
+import operator
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, cast
@@ -144,7 +145,12 @@ class Compiled:
         self._preparing = threading.Lock()
         self.ready = False
         """Whether it is compiled, so that the next call takes no longer than any other."""
+        self._run: Callable[..., Any] = self._prepare_and_run
         _kernels.append(self)
+
+    __call__: Any = property(operator.attrgetter("_run"))
+    """Run the kernel; TypeError for arrays that its signature does not name. A property, as a method that hands all
+    arguments on would take longer than some kernels."""
 
     def prepare(self) -> None:
         """Compile or load now."""
@@ -154,7 +160,7 @@ class Compiled:
                 with _uncollected():
                     self._dispatcher.compile(self.signature)
                 self._dispatcher.disable_compile()
-                self.ready = True
+                self._run, self.ready = self._dispatcher, True
 
     @property
     def is_ours(self) -> bool:
@@ -171,10 +177,8 @@ class Compiled:
         # Not before it is asked for: only then does every building block exist.
         return f"{machine()} {self.signature} {digest(self.function)}"
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Run the kernel; TypeError for arrays that its signature does not name."""
-        if not self.ready:
-            self.prepare()
+    def _prepare_and_run(self, *arguments: Any) -> Any:
+        self.prepare()
         return self._dispatcher(*arguments)
 
     @property

@@ -99,12 +99,13 @@ class SweptLaw:
         self._scratch = Scratch(0, 0, 0)
         self._felt = room_to_feel()
         self._classes: tuple[object, IntArray, IntArray] | None = None
-        self._flat = 0
+        self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick; ValueError that says what is not finite, and nothing that was seen is changed."""
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
-        self._make_room(len(pose.sphere_radii_m), scene)
+        if self._room != (len(pose.sphere_radii_m), scene):
+            self._make_room(len(pose.sphere_radii_m), scene)
         _, classes, closing = self._classes_of(situation)
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
         if not sense(
@@ -116,7 +117,6 @@ class SweptLaw:
             *(self._scratch.bundle, self.memory.bundle, self._felt),
         ):
             self._refuse(situation)
-        self._flat = scene.flat
         return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
@@ -129,7 +129,8 @@ class SweptLaw:
         totals = self.memory.totals.tolist()
         counts = {"fields": totals[Total.LOOKS]} | {one.name.lower(): totals[one] for one in Count}
         # Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them.
-        return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": self._flat}
+        flat = 0 if self._room[1] is None else self._room[1].flat
+        return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": flat}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """What D_σ is made of along one trigger, and what overlaps at the robot side's δ."""
@@ -172,7 +173,7 @@ class SweptLaw:
         return Asked(there, closing if closes else classes, along, _widest_m(situation), float(found["prediction_sd"]))
 
     def _make_room(self, spheres: int, scene: SceneTable) -> None:
-        needed = spheres, len(scene.kinds), len(scene.first_rows)
+        self._room, needed = (spheres, scene), (spheres, len(scene.kinds), len(scene.first_rows))
         if not self._scratch.fits(*needed):
             self._scratch = Scratch(*needed)
         if not self.memory.fits(spheres, len(scene.first_rows)):

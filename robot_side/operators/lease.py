@@ -44,9 +44,9 @@ class Lease:
         waiting = [one for one in self._participants.values() if one.state is SessionState.OBSERVING]
         return sorted(waiting, key=lambda one: one.waiting_since_s)
 
-    def present(self) -> Iterator[Participant]:
+    def present(self) -> list[Participant]:
         """The owner and the observers."""
-        return (one for one in self._participants.values() if one.state is not SessionState.AWAY)
+        return [one for one in self._participants.values() if one.session.state is not SessionState.AWAY]
 
     def known(self) -> Iterator[Participant]:
         """All remembered operators."""

@@ -92,12 +92,11 @@ class JointReference:
 
         ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
         """
-        velocity = np.asarray(velocity_rad_s, dtype=np.float64)
-        if velocity.shape != self.joints.shape:
-            raise ValueError(f"joint_velocity_rad_s has the shape {velocity.shape}; valid: {self.joints.shape}")
+        if velocity_rad_s.shape != self.joints.shape:
+            raise ValueError(f"joint_velocity_rad_s has the shape {velocity_rad_s.shape}; valid: {self.joints.shape}")
         if not math.isfinite(valid_until_s):
             raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
-        if not _command(self.joints, np.ascontiguousarray(velocity), self.limits.velocity_rad_s):
+        if not _command(self.joints, velocity_rad_s, self.limits.velocity_rad_s):
             raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
         self._valid_until_s = valid_until_s
 

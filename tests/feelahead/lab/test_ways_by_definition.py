@@ -144,7 +144,7 @@ def test_looks_of_the_demo_are_noted_and_another_law_is_noticed(monkeypatch: pyt
     gripped = spheres.index(max(spheres))
     near = replace(recorded, ticks=recorded.ticks[gripped - 200 : gripped + 61])
     asked, encoder_sigma_rad = looks_of(near, 40)
-    assert {len(one.pose.sphere_radii_m) for one in asked} == {246, 383}
+    assert {len(one.pose.sphere_radii_m) for one, _ in asked} == {246, 383}
     assert 20 < len(asked) <= 40
     found = compare(asked, encoder_sigma_rad).row()
     assert found["looks"] == len(asked)
