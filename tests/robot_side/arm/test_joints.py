@@ -16,7 +16,7 @@ from robot_side.arm.ability import JointLimits, ability
 from robot_side.arm.commanded import commanded
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.arm.tool_motion import ToolMotionSettings, deflected, tool_motion
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
 from robot_side.simulation.joint_reference import MotionLimits
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import random_rotation
@@ -77,19 +77,6 @@ def test_the_right_stick_turns_the_view_the_way_it_is_pushed(
     np.testing.assert_allclose(tip, expected, atol=1e-15)
     assert angular @ FORWARD == 0.0
     assert np.linalg.norm(angular) == pytest.approx(0.5 * math.hypot(*turning))
-
-
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(right=st.floats(-1.0, 1.0), up=st.floats(-1.0, 1.0), seed=st.integers(0, 1000))
-def test_the_stick_leads_where_it_moves_the_gripper(right: float, up: float, seed: int) -> None:
-    rotation = random_rotation(np.random.default_rng(seed))
-    direction, deflection = deflected((right, up), rotation)
-    assert np.linalg.norm(direction) == pytest.approx(1.0)
-    assert direction.flags.c_contiguous
-    linear = rotation @ motion(lateral=(right, up))[0]
-    if math.hypot(right, up) > 1e-6:
-        np.testing.assert_allclose(direction, linear / np.linalg.norm(linear), atol=1e-9)
-    assert deflection == min(1.0, math.hypot(right, up))
 
 
 def jacobian_with(singular_values: FloatArray, seed: int, joints: int) -> FloatArray:
