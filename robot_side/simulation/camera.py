@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from robot_side.simulation.object_primitives import ObjectPrimitives
+from common.arrays import FloatArray
+from robot_side.simulation.object_primitives import MovingPrimitives
 from robot_side.simulation.scene import Scene
+from robot_side.surroundings.kinds.layout import VELOCITY
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.velocities import ObjectVelocities
@@ -76,9 +77,8 @@ class MujocoCamera:
         fixed = scene.fixed if self._error.lasts else frozenset()
         self._things = np.array([k for k, thing in enumerate(scene.objects) if thing.name not in fixed], dtype=np.int64)
         """What may be elsewhere in the next frame"""
-        self._moving = scene.primitives.only(self._things)
         self._first_geoms = np.array([thing.geoms[0] for thing in scene.objects], dtype=np.int64)
-        self._movers: Movers | None = None
+        self._moving: tuple[Movers, MovingPrimitives] | None = None
         self._roles: tuple[Role, ...] = ()
 
     def perceive(self, now_s: float) -> PerceivedObjects:
@@ -93,34 +93,30 @@ class MujocoCamera:
         return self._newest
 
     def _frame(self, now_s: float) -> PerceivedObjects:
-        scene, things, offsets_m = self._scene, self._things, self._error.next_frame()
-        geoms = self._first_geoms[things]
-        velocities_m_s = self._velocities.see(now_s, scene.data.geom_xpos[geoms] + offsets_m[things])
-        if self._movers is None:
-            everywhere: FloatArray = np.zeros((len(scene.objects), 3))
-            everywhere[things] = velocities_m_s
-            whole = self._seen(now_s, scene.primitives, offsets_m, self._first_geoms, everywhere)
-            self._movers, self._roles = Movers(whole, things), whole.roles
-            return whole
-        moved = self._seen(now_s, self._moving, offsets_m[things], geoms, velocities_m_s)
-        return self._movers.frame(moved, self._roles)
+        data, offsets_m = self._scene.data, self._error.next_frame()
+        if self._moving is None:
+            return self._whole(now_s, offsets_m)
+        movers, primitives = self._moving
+        numbers = primitives.numbers(offsets_m, data.geom_xpos, data.geom_xmat)
+        of_objects = numbers[len(numbers) - len(self._things) :]
+        of_objects[:, VELOCITY : VELOCITY + 3] = self._velocities.see(now_s, of_objects[:, :3].copy())
+        return movers.frame(now_s, numbers, self._roles)
 
-    def _seen(
-        self,
-        now_s: float,
-        primitives: ObjectPrimitives,
-        offsets_m: FloatArray,
-        first_geoms: IntArray,
-        velocities_m_s: FloatArray,
-    ) -> PerceivedObjects:
-        """The objects of `primitives` now."""
-        data = self._scene.data
-        return replace(
-            primitives.place(now_s, self._scene.roles, offsets_m, data.geom_xpos, data.geom_xmat),
-            positions_m=data.geom_xpos[first_geoms] + offsets_m,
-            rotations=data.geom_xmat[first_geoms].reshape(-1, 3, 3),
+    def _whole(self, now_s: float, offsets_m: FloatArray) -> PerceivedObjects:
+        """A frame of all objects, since which others say what is new."""
+        scene, data, things = self._scene, self._scene.data, self._things
+        positions_m = data.geom_xpos[self._first_geoms] + offsets_m
+        velocities_m_s: FloatArray = np.zeros((len(scene.objects), 3))
+        velocities_m_s[things] = self._velocities.see(now_s, positions_m[things])
+        whole = replace(
+            scene.primitives.place(now_s, scene.roles, offsets_m, data.geom_xpos, data.geom_xmat),
+            positions_m=positions_m,
+            rotations=data.geom_xmat[self._first_geoms].reshape(-1, 3, 3),
             velocities_m_s=velocities_m_s,
         )
+        self._moving = Movers(whole, things), scene.primitives.moving(things, scene.roles)
+        self._roles = whole.roles
+        return whole
 
     def set_role(self, name: str, role: Role) -> None:
         """Change what the object `name` is to the task, from the next frame on. ValueError for an unknown name."""
@@ -129,6 +125,6 @@ class MujocoCamera:
             raise ValueError(f"name = {name!r} is no object; valid: {', '.join(roles)}")
         if Role.IGNORED in (role, roles[name]):
             # Other primitives are there from now on.
-            self._movers = None
+            self._moving = None
         roles[name] = role
         self._roles = tuple(roles[thing.name] for thing in self._scene.objects)

@@ -2,15 +2,19 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import add, load
 from robot_side.simulation.mesh_arrays import mesh_vertices
 from robot_side.simulation.model_enums import GeomKind
+from robot_side.surroundings.kinds.kind import by_kind
+from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows, write_pose
+from robot_side.surroundings.kinds.mesh import of_library
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 
 if TYPE_CHECKING:
@@ -27,18 +31,14 @@ _MESHES = {GeomKind.CAPSULE, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
 """What a mesh describes, unless it is a tetrahedron."""
 _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] = {
     "sphere": lambda model, geoms: (model.geom_size[geoms, 0],),
-    "box": lambda model, geoms: (model.geom_aabb[geoms, :3], model.geom_aabb[geoms, 3:]),
+    "box": lambda model, geoms: (model.geom_aabb[geoms],),
     "tetrahedron": lambda model, geoms: (
-        np.array([mesh_vertices(model, geom) for geom in geoms.tolist()], dtype=np.float64).reshape(-1, 4, 3),
+        np.array([mesh_vertices(model, geom) for geom in geoms.tolist()], dtype=np.float64).reshape(-1, 12),
     ),
-    "half_space": lambda _model, _geoms: (),
+    "half_space": lambda _model, geoms: (np.empty((len(geoms), 0)),),
     "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
 }
 """By kind but meshes the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them."""
-
-
-_OfKind = tuple[IntArray, IntArray, tuple[Any, ...]]
-"""The geoms (k,) of a kind, their objects (k,), and their sizes."""
 
 
 @dataclass(frozen=True)
@@ -85,23 +85,33 @@ class ObjectPrimitives:
         self.stands_out_m: Mapping[str, float] = stands_out_m
         """And how far what is seen of it reaches beyond it, at most."""
 
-        self._of_kind: dict[str, _OfKind] = {}
-        for name, pairs in of_kind.items():
-            own, owners = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
-            sizes = _SIZES.get(name)
-            mesh_index = [meshes[geom][0] for geom in own.tolist()] if sizes is None else []
-            self._of_kind[name] = own, owners, sizes(model, own) if sizes else (np.array(mesh_index, dtype=np.int64),)
+        mesh_index = np.array([meshes[geom][0] for geom, _ in of_kind["mesh"]], dtype=np.int64)
+        self._mesh_index: IntArray = mesh_index
+        pairs = [pair for kind in KINDS for pair in of_kind[kind.name]]
+        own, owners = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
+        kinds = np.repeat(np.arange(len(KINDS)), [len(of_kind[kind.name]) for kind in KINDS])
+        sizes = [
+            _SIZES[kind.name](model, own[kinds == number])
+            if kind.name in _SIZES
+            else (of_library(self._mesh_library, mesh_index),)
+            for number, kind in enumerate(KINDS)
+        ]
+        of_each = np.concatenate([rows(*columns, width=NUMBERS) for columns in sizes])
+        self._primitives = _Primitives(kinds, own, owners, of_each)
+        """All of them, a kind after another"""
+        self._first_geoms = np.array([thing.geoms[0] for thing in objects], dtype=np.int64)
 
-    def only(self, things: IntArray) -> "ObjectPrimitives":
-        """Those of some of the objects, things (m,), rising: by their places among these."""
-        part = copy(self)
-        part._names = tuple(self._names[thing] for thing in things)
-        part._of_kind = {}
-        for name, (geoms, owners, sizes) in self._of_kind.items():
-            kept = np.isin(owners, things)
-            mine = np.searchsorted(things, owners[kept])
-            part._of_kind[name] = geoms[kept], mine, tuple(values[kept] for values in sizes)
-        return part
+    def _seen(self, roles: Mapping[str, Role]) -> BoolArray:
+        """Which primitives (n,) belong to objects that are not ignored."""
+        seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=np.bool_)
+        return seen[self._primitives.owners]
+
+    def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
+        """Those of some of the objects, things (m,), rising, in the order of `movers`; ignored ones have none."""
+        owners = self._primitives.owners
+        kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
+        kept = kept[np.argsort(owners[kept], kind="stable")]
+        return MovingPrimitives(self._primitives.only(kept), things, self._first_geoms[things])
 
     def place(
         self,
@@ -115,17 +125,17 @@ class ObjectPrimitives:
 
         geom_positions_m (g, 3) and geom_rotations (g, 9) are the model's geoms in the world frame.
         """
-        seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=bool)
-
-        arrays: dict[str, Any] = {}
-        for kind in KINDS:
-            geoms, owners, sizes = self._of_kind[kind.name]
-            kept = seen[owners]
-            owners, geoms = owners[kept], geoms[kept]
-            positions_m, rotations = geom_positions_m[geoms] + offsets_m[owners], geom_rotations[geoms]
-            values = kind.placed(positions_m, rotations.reshape(-1, 3, 3), *(size[kept] for size in sizes))
-            arrays |= {array.name: value for array, value in zip(kind.arrays, values, strict=True)}
-            arrays[kind.owner] = owners
+        kept = np.flatnonzero(self._seen(roles))
+        primitives = self._primitives.only(kept)
+        seen = MovingPrimitives(primitives, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+        numbers = seen.numbers(offsets_m, geom_positions_m, geom_rotations)
+        meshes = np.flatnonzero(self._primitives.kinds == MESH)
+        arrays: dict[str, Any] = {"mesh_index": self._mesh_index[np.isin(meshes, kept)]}
+        for number, kind in enumerate(KINDS):
+            mine = primitives.kinds == number
+            arrays[kind.owner] = primitives.owners[mine]
+            for name, (part, row) in kind.parts.items():
+                arrays[name] = numbers[mine, part].reshape(-1, *row)
         return PerceivedObjects(
             time_s=time_s,
             names=self._names,
@@ -133,6 +143,66 @@ class ObjectPrimitives:
             mesh_library=self._mesh_library,
             **arrays,
         )
+
+
+class _Primitives(NamedTuple):
+    """Primitives (n) in the frames of their geoms."""
+
+    kinds: IntArray
+    geoms: IntArray
+    owners: IntArray
+    """Among all objects"""
+    sizes: FloatArray
+    """(n, 20) as `Kind.placed` takes them"""
+
+    def only(self, places: IntArray) -> "_Primitives":
+        """Those at these places."""
+        return _Primitives(self.kinds[places], self.geoms[places], self.owners[places], self.sizes[places])
+
+
+class MovingPrimitives(NamedTuple):
+    """Primitives of some objects (m), ready to be put where MuJoCo has their geoms."""
+
+    primitives: _Primitives
+    things: IntArray
+    first_geoms: IntArray
+    """(m,)"""
+
+    def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
+        """Their numbers (n + m, 20) as in `movers`, velocities 0; the arguments as for `place`."""
+        primitives, things, first_geoms = self
+        numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
+        _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)
+        return numbers
+
+
+_placed = by_kind([kind.placed for kind in KINDS])
+
+
+@compiled(
+    *(input_array(2), input_array(2), input_array(2)),
+    *(input_indices(), input_indices(), input_indices(), input_array(2), input_indices(), input_indices()),
+    output_array(2),
+)
+def _place(
+    positions: FloatArray,
+    turns: FloatArray,
+    offsets: FloatArray,
+    kinds: IntArray,
+    geoms: IntArray,
+    owners: IntArray,
+    sizes: FloatArray,
+    things: IntArray,
+    first_geoms: IntArray,
+    numbers: FloatArray,
+) -> None:
+    numbers[:] = 0.0
+    for k in range(kinds.size):
+        position = add(load(positions, geoms[k]), load(offsets, owners[k]))
+        _placed(kinds[k], sizes, k, position, turns, geoms[k], numbers, k)
+    for k in range(things.size):
+        geom = first_geoms[k]
+        write_pose(add(load(positions, geom), load(offsets, things[k])), turns, geom, numbers, kinds.size + k)
 
 
 def _primitive_kind(model: Any, geom: int) -> str | None:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
+from robot_side.compiled.kernel import compiled, inlined, input_array, input_indices, output_array
 from robot_side.surroundings.bounds import write_around
 
 TOGETHER: Final = 64
@@ -46,8 +46,8 @@ def _spread(numbers: np.ndarray) -> np.ndarray:
     return numbers
 
 
-@compiled(input_array(2), input_indices(), output_array(2), output_array(2))
-def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
+@inlined
+def bound_blocks(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
     """Bound the blocks `which`, rising, of objects with bounds (o, 4) in their order, and the blocks around them."""
     for k in range(which.size):
         first = which[k] * TOGETHER
@@ -58,6 +58,11 @@ def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: Floa
         if group != done:
             write_around(blocks, group * TOGETHER, min((group + 1) * TOGETHER, blocks.shape[0]), groups[group])
             done = group
+
+
+@compiled(input_array(2), input_indices(), output_array(2), output_array(2))
+def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
+    bound_blocks(bounds, which, blocks, groups)
 
 
 class Blocks:
@@ -77,11 +82,7 @@ class Blocks:
         _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
 
     def places(self, things: IntArray) -> IntArray:
-        """Where these objects are in the order, rising."""
-        return np.flatnonzero(np.isin(self.order, things))
-
-    def follow(self, places: IntArray) -> None:
-        """Bound the blocks of the objects at these places, rising, where they are now."""
-        self.bounds[places] = self._object_bounds[self.order[places]]
-        blocks = places // TOGETHER
-        _bound(self.bounds, blocks[np.flatnonzero(np.diff(blocks, prepend=-1))], self.blocks, self.groups)
+        """Where each of these objects is in the order; -1 for one that has no bounds."""
+        found = np.full(len(self._object_bounds), -1)
+        found[self.order] = np.arange(len(self.order))
+        return found[things]

@@ -1,23 +1,38 @@
 """Frames that differ from an earlier one by where some objects are: their cost is that of what moves.
 
-A camera makes a `Movers` of the objects that may move, and a small frame of these alone whenever it looks. What the
-others are, and where, is said once.
+A camera makes a `Movers` of the objects that may move, and whenever it looks says the numbers of these alone: n rows of
+20, one for each of their primitives (see `kinds.layout`), those of an object together and ordered by kind, and then m
+rows, one for each object: its position, rotation and velocity. What the others are, and where, is said once.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import IntArray
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role, SomeObjects
+from common.arrays import FloatArray, IntArray
+from robot_side.surroundings.kinds.layout import NUMBERS, rows
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.placing import numbers_of, primitives_of
 
-OF_OBJECTS: Final = ("positions_m", "rotations", "velocities_m_s")
-"""The arrays of a frame with a row for each object."""
+OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}
+"""The arrays of a frame with a row for each object, in the order of its numbers."""
 
 
-class Movers(SomeObjects):
+class Part(NamedTuple):
+    """Where the values of one of a frame's arrays are among the movers' numbers."""
+
+    places: IntArray
+    """(r,) the rows there"""
+    rows: IntArray
+    """(r,) and those of the array"""
+    columns: slice
+    shape: tuple[int, ...]
+
+
+class Movers:
     """The objects of one frame that may be elsewhere in the next ones."""
 
     def __init__(self, first: PerceivedObjects, things: IntArray) -> None:
@@ -30,76 +45,78 @@ class Movers(SomeObjects):
             raise ValueError(f"things holds {things}; valid: rising places among {len(first.names)} objects")
         self.first = first
         self.things = things
-        self.rows: Mapping[str, IntArray] = {
-            kind.owner: np.flatnonzero(np.isin(getattr(first, kind.owner), things)) for kind in KINDS
-        }
-        """By the name of a kind's owners the rows (r,) of the primitives of these objects."""
-        self._owners = {name: np.searchsorted(things, getattr(first, name)[rows]) for name, rows in self.rows.items()}
+        self.measured = first.velocities_m_s is not None
+        owners, kinds, rows_of_kind = primitives_of(first)
+        own = np.flatnonzero(np.isin(owners, things))
+        self._own = own[np.argsort(owners[own], kind="stable")]
+        """(n,) of all primitives"""
+        self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
+        self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
+        made_whole = {*self.parts, "time_s", "roles", "since"}
+        self._still = {name: value for name, value in vars(first).items() if name not in made_whole}
+
+    def _all_parts(self, kinds: IntArray, rows_of_kind: IntArray) -> Mapping[str, Part]:
+        parts, count = {}, len(kinds)
+        for number, kind in enumerate(KINDS):
+            places = np.flatnonzero(kinds == number)
+            for name, where in kind.parts.items():
+                parts[name] = Part(places, rows_of_kind[places], *where)
+        end = 0
+        for name, shape in OF_OBJECTS.items():
+            end, begin = end + math.prod(shape), end
+            parts[name] = Part(np.arange(count, count + len(self.things)), self.things, slice(begin, end), shape)
+        return parts
 
     def place_of(self, thing: int) -> int | None:
         """Which of the movers an object is; None for one that stands still."""
         place = int(np.searchsorted(self.things, thing))
         return place if place < len(self.things) and self.things[place] == thing else None
 
+    def numbers_in(self, objects: PerceivedObjects) -> FloatArray:
+        """The movers' numbers where a frame of the same objects has them; NaN for what it does not know."""
+        of_objects = [getattr(objects, name) for name in OF_OBJECTS]
+        shapes = OF_OBJECTS.values()
+        count = len(self.things)
+        known = [
+            np.full((count, *shape), np.nan) if values is None else values[self.things]
+            for values, shape in zip(of_objects, shapes, strict=True)
+        ]
+        return np.concatenate([numbers_of(objects)[self._own], rows(*known, width=NUMBERS)])
+
     @cached_property
-    def at_first(self) -> PerceivedObjects:
-        """The movers alone, as they are in `first`."""
-        first, things = self.first, self.things
-        arrays: dict[str, Any] = dict(self._owners)
-        for kind in KINDS:
-            rows = self.rows[kind.owner]
-            arrays |= {array.name: getattr(first, array.name)[rows] for array in kind.arrays}
-        for name in OF_OBJECTS:
-            values = getattr(first, name)
-            arrays[name] = None if values is None else values[things]
-        return PerceivedObjects(
-            time_s=first.time_s,
-            names=tuple(first.names[thing] for thing in things),
-            roles=tuple(first.roles[thing] for thing in things),
-            mesh_library=first.mesh_library,
-            **arrays,
-        )
+    def at_first(self) -> FloatArray:
+        """Their numbers in `first`."""
+        return self.numbers_in(self.first)
 
-    def frame(self, moved: PerceivedObjects, roles: tuple[Role, ...]) -> PerceivedObjects:
-        """The next frame: the movers as they are in `moved`, which has no others, all else as in the first.
+    def frame(self, time_s: float, numbers: FloatArray, roles: tuple[Role, ...]) -> PerceivedObjects:
+        """The next frame: the movers by their numbers, all else as in the first.
 
-        roles: of all objects. ValueError unless `moved` has the movers' primitives in the order of the first frame's.
+        roles: of all objects. ValueError for another number of either.
         """
-        for name, owners in self._owners.items():
-            theirs = getattr(moved, name)
-            if theirs is not owners and not np.array_equal(theirs, owners):
-                raise ValueError(f"moved.{name} holds {theirs}; valid: {owners}, as in the first frame")
-        if not np.array_equal(moved.mesh_index, self.at_first.mesh_index):
-            raise ValueError(f"moved.mesh_index holds {moved.mesh_index}; valid: {self.at_first.mesh_index}")
+        shape = len(self._own) + len(self.things), NUMBERS
+        if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
+            raise ValueError(f"numbers holds {numbers.dtype} {numbers.shape}; valid: contiguous float64 {shape}")
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)}; valid: one for each of {len(self.first.names)} objects")
-        frame = object.__new__(_Elsewhere)
-        whole = {name: value for name, value in vars(self.first).items() if name not in _MADE_WHOLE}
-        vars(frame).update(whole, time_s=moved.time_s, roles=roles, since=(self, moved))
-        return frame
+        return _Elsewhere(**self._still, time_s=time_s, roles=roles, since=(self, numbers))
 
 
 class _Elsewhere(PerceivedObjects):
-    """Such a frame: each array is made whole when somebody reads it first."""
+    """Such a frame: an array is made whole when somebody reads it first."""
 
+    def __init__(self, **said: Any) -> None:
+        vars(self).update(said)
 
-def _whole(name: str, owner: str | None) -> Callable[[_Elsewhere], Any]:
-    def made(frame: _Elsewhere) -> Any:
-        if frame.since is None:
+    def __getattr__(self, name: str) -> Any:
+        """Make the whole array of what is not there yet."""
+        if self.since is None or name not in self.since[0].parts:
             raise AttributeError(name)
-        movers, moved = frame.since
-        at_first, values = getattr(movers.first, name), getattr(moved, name)
-        if at_first is None or values is None:
-            return None
-        whole = at_first.copy()
-        whole[movers.things if owner is None else movers.rows[owner]] = values
-        return whole
-
-    return made
-
-
-_MADE_WHOLE: Final = {name: kind.owner for kind in KINDS for name in kind.fields} | dict.fromkeys(OF_OBJECTS)
-for _name, _owner in _MADE_WHOLE.items():
-    _property = cached_property(_whole(_name, _owner))
-    _property.__set_name__(_Elsewhere, _name)
-    setattr(_Elsewhere, _name, _property)
+        movers, numbers = self.since
+        at_first = getattr(movers.first, name)
+        if at_first is not None:
+            places, rows_there, columns, shape = movers.parts[name]
+            whole = at_first.copy()
+            whole[rows_there] = numbers[places, columns].reshape(-1, *shape)
+            at_first = whole
+        vars(self)[name] = at_first
+        return at_first

@@ -1,6 +1,5 @@
 """What the camera reports: objects as spheres, boxes, tetrahedra, half-spaces, meshes, ellipsoids, each with a role."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Final, Protocol
@@ -13,6 +12,7 @@ from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphe
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
+    from robot_side.surroundings.movers import Movers
 
 
 class Role(Enum):
@@ -76,31 +76,14 @@ class PerceivedObjects:
     ellipsoid_half_axes_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(e, 3)"""
     ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    positions_m: FloatArray | None = None
+    positions_m: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3) of each object's own frame, that of its first primitive, in the world frame; None where nobody knows"""
-    rotations: FloatArray | None = None
+    rotations: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3, 3) object to world, with `positions_m`"""
-    velocities_m_s: FloatArray | None = None
+    velocities_m_s: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
-    since: "tuple[SomeObjects, PerceivedObjects] | None" = field(default=None, init=False, repr=False)
-    """Which objects may be elsewhere than in an earlier frame, and the frame of these alone; None: any may be."""
-
-
-class SomeObjects(Protocol):
-    """Objects of a frame that may be elsewhere in the next ones (see `movers`)."""
-
-    first: PerceivedObjects
-    things: IntArray
-    rows: Mapping[str, IntArray]
-
-    @property
-    def at_first(self) -> PerceivedObjects:
-        """These alone, as they are in `first`."""
-        ...
-
-    def place_of(self, thing: int) -> int | None:
-        """Which of these an object is; None for another one."""
-        ...
+    since: "tuple[Movers, FloatArray] | None" = field(default=None, init=False, repr=False)
+    """Which objects may be elsewhere than in an earlier frame, and their numbers; None: any may be."""
 
 
 class ObjectSource(Protocol):

@@ -1,61 +1,37 @@
-"""The rows of a scene table where the same objects are now: in one pass a kind, for every new frame of a camera."""
+"""The rows of a scene table from the numbers of its primitives: in one pass, whatever their kinds."""
 
-from typing import Any, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, input_indices, output_array, together
+from robot_side.compiled.kernel import TRUTH, compiled, input_indices, output_array
 from robot_side.surroundings.bounds import write_around
+from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
-
-def _each_kind(number: int) -> Any:
-    """Make the function that places the rows of all kinds from `number` on, a kind at a time.
-
-    One row at a time would count references to all columns again and again, which takes four times as long.
-    """
-    place = KINDS[number].place
-    others: Any = _each_kind(number + 1) if number + 1 < len(KINDS) else None
-
-    @inlined
-    def this(columns: Any, kinds: IntArray, rows_of_kind: IntArray, *written: FloatArray) -> None:
-        mine, (bounds, shapes, volumes) = columns[number], written
-        for row in range(kinds.size):
-            if kinds[row] == number:
-                volumes[row] = place(mine, rows_of_kind[row], shapes[row], bounds[row])
-
-    @inlined
-    def this_and_others(*arguments: Any) -> None:
-        this(*arguments)
-        others(*arguments)
-
-    return this if others is None else this_and_others
-
-
-_place_each = _each_kind(0)
+place_one: Final = by_kind([kind.place for kind in KINDS])
+"""(kind, numbers, k, bounds, row) to the volume in m³: `Kind.place` of any kind."""
 
 
 @compiled(
-    together(*(together(*(input_array(1 + len(row)) for row in kind.column_rows)) for kind in KINDS)),
-    *(input_indices(), input_indices(), input_indices()),
-    *(output_array(2), output_array(2), output_array(1), output_array(2), output_array(1)),
+    *(output_array(2), input_indices(), input_indices()),
+    *(output_array(2), output_array(1), output_array(2), output_array(1)),
     returns=TRUTH,
 )
 def _place(
-    columns: Any,
+    numbers: FloatArray,
     kinds: IntArray,
-    rows_of_kind: IntArray,
     first_rows: IntArray,
     bounds: FloatArray,
-    shapes: FloatArray,
     volumes: FloatArray,
     object_bounds: FloatArray,
     object_volumes: FloatArray,
 ) -> bool:
-    shapes[:], solid = 0.0, True
-    _place_each(columns, kinds, rows_of_kind, bounds, shapes, volumes)
+    solid = True
+    for row in range(kinds.size):
+        volumes[row] = place_one(kinds[row], numbers, row, bounds, row)
     for thing in range(first_rows.size - 1):
         first, end, volume = first_rows[thing], first_rows[thing + 1], 0.0
         for row in range(first, end):
@@ -67,26 +43,44 @@ def _place(
 
 
 class Rows(NamedTuple):
-    """What `place` fills, as SceneTable has it."""
+    """What `placed_rows` makes, as SceneTable has it."""
 
-    bounds: FloatArray
     shapes: FloatArray
+    bounds: FloatArray
     volumes: FloatArray
     """(n,) of the primitives, in m³"""
     object_bounds: FloatArray
     object_volumes: FloatArray
+    solid: bool
+    """Whether all have a volume"""
 
 
-def empty_rows(rows: int, objects: int) -> Rows:
-    """Make rows for these numbers of primitives and objects."""
-    return Rows(
-        np.empty((rows, 4)), np.empty((rows, SHAPE_NUMBERS)), np.empty(rows), np.empty((objects, 4)), np.empty(objects)
-    )
+def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> Rows:
+    """Make the rows of primitives (n, 20) of these kinds, object k's from first_rows[k] on."""
+    rows, objects, numbers = len(kinds), len(first_rows) - 1, numbers.copy()
+    bounds, volumes = np.empty((rows, 4)), np.empty(rows)
+    object_bounds, object_volumes = np.empty((objects, 4)), np.empty(objects)
+    solid = _place(numbers, kinds, first_rows, bounds, volumes, object_bounds, object_volumes)
+    shapes = np.ascontiguousarray(numbers[:, :SHAPE_NUMBERS])
+    return Rows(shapes, bounds, volumes, object_bounds, object_volumes, bool(solid))
 
 
-def place(
-    objects: PerceivedObjects, kinds: IntArray, rows_of_kind: IntArray, first_rows: IntArray, filled: Rows
-) -> bool:
-    """Fill the rows (n,) of these kinds, object k's from first_rows[k] on; False if one has no volume."""
-    columns = tuple([kind.read(objects) for kind in KINDS])
-    return bool(_place(columns, kinds, rows_of_kind, first_rows, *filled))
+class Primitives(NamedTuple):
+    """All primitives of a frame (n), a kind after another."""
+
+    owners: IntArray
+    kinds: IntArray
+    rows_of_kind: IntArray
+
+
+def primitives_of(objects: PerceivedObjects) -> Primitives:
+    """Whose they are, and where in the arrays of the frame."""
+    owners = [getattr(objects, kind.owner) for kind in KINDS]
+    counts = [len(owner) for owner in owners]
+    kinds = np.repeat(np.arange(len(KINDS)), counts)
+    return Primitives(np.concatenate(owners), kinds, np.concatenate([np.arange(count) for count in counts]))
+
+
+def numbers_of(objects: PerceivedObjects) -> FloatArray:
+    """The numbers (n, 20) of all primitives of a frame, a kind after another."""
+    return np.concatenate([kind.numbers(objects) for kind in KINDS])

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.surroundings.blocks import Blocks
+from robot_side.surroundings.blocks import TOGETHER, Blocks
 from robot_side.surroundings.kinds.layout import MESH
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
-from robot_side.surroundings.placing import empty_rows, place
+from robot_side.surroundings.movers import Movers
+from robot_side.surroundings.moving_rows import FLAT, WRITTEN, write_movers
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.placing import Rows, numbers_of, placed_rows, primitives_of
 from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.validity import require_valid
 
@@ -19,26 +21,15 @@ if TYPE_CHECKING:
 
 
 class Moving:
-    """The movers' part of a table: where it is, and room to work it out before anything there is overwritten."""
+    """The movers' part of a table."""
 
-    def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
+    def __init__(self, movers: Movers, table: "SceneTable") -> None:
         self.movers = movers
-        self.rows = np.flatnonzero(np.isin(table.object_index, movers.things))
-        """(m,) of the table"""
-        self.kinds, self.rows_of_kind = table.kinds[self.rows], table.rows_of_kind[self.rows]
-        for kind, theirs in enumerate(movers.rows.values()):
-            mine = self.kinds == kind
-            self.rows_of_kind[mine] = np.searchsorted(theirs, self.rows_of_kind[mine])
-        sizes = np.diff(table.first_rows)[movers.things]
-        self.first_rows: IntArray = np.concatenate([[0], np.cumsum(sizes)])
-        self.filled = empty_rows(len(self.rows), len(movers.things))
         self.places = table.blocks.places(movers.things)
-        self.solid = sum(map(len, movers.rows.values())) == len(self.rows)
-        """Whether none of them was left out."""
-
-    def place(self, moved: PerceivedObjects) -> bool:
-        """Work out their part of the table; False if one has no volume."""
-        return place(moved, self.kinds, self.rows_of_kind, self.first_rows, self.filled)
+        self.blocks = np.unique(self.places[self.places >= 0] // TOGETHER)
+        sizes = np.diff(table.first_rows)[movers.things]
+        self.solid = bool((np.diff(movers.first_rows) == sizes).all())
+        """Whether no primitive of theirs was left out."""
 
 
 @dataclass(eq=False)
@@ -120,33 +111,35 @@ def scene_table(objects: PerceivedObjects) -> SceneTable:
 
 
 def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
-    """Write into the table what another frame since the same first one has; False where something lost its volume."""
-    before, moving = table.moving, None
-    if objects.since is not None:
-        movers, moved = objects.since
-        require_valid(moved)
-        moving = before if before is not None and before.movers is movers else Moving(movers, table)
-        if not (moving.solid and moving.place(moved)):
+    """Write into the table what another frame since the same first one has; False where something lost its volume.
+
+    ValueError for what `require_valid` refuses.
+    """
+    before = table.moving
+    since = objects.since
+    if before is not None and (since is None or since[0] is not before.movers):
+        _write_movers(table, before, before.movers.at_first)
+        table.objects, table.moving = before.movers.first, None
+    if since is not None:
+        moving = table.moving or Moving(since[0], table)
+        found = _write_movers(table, moving, since[1]) if moving.solid else FLAT
+        if found != WRITTEN:
+            require_valid(objects)
             return False
-    if before is not None and before is not moving:
-        at_first = before.movers.at_first
-        before.place(at_first)
-        _take_over(table, before, at_first)
-    if moving is not None:
-        _take_over(table, moving, moved)
-    table.objects, table.moving = objects, moving
+        table.moving = moving
+    table.objects = objects
     return True
 
 
-def _take_over(table: SceneTable, moving: Moving, moved: PerceivedObjects) -> None:
-    """What was worked out of the movers holds from now on."""
-    filled, things = moving.filled, moving.movers.things
-    table.bounds[moving.rows], table.shapes[moving.rows] = filled.bounds, filled.shapes
-    table.object_bounds[things], table.object_volumes[things] = filled.object_bounds, filled.object_volumes
-    table.blocks.follow(moving.places)
-    if table.placed is not None:
-        rows = moving.movers.rows["mesh_object"]
-        table.placed.positions[rows], table.placed.rotations[rows] = moved.mesh_positions_m, moved.mesh_rotations
+def _write_movers(table: SceneTable, moving: Moving, numbers: FloatArray) -> int:
+    """Write the movers of these numbers; what came of it."""
+    movers = moving.movers
+    found = int(write_movers(numbers, movers.things, moving.places, moving.blocks, movers.measured, table.bundle))
+    if found == WRITTEN and table.placed is not None:
+        places, rows, *_ = movers.parts["mesh_positions_m"]
+        table.placed.positions[rows] = numbers[places, :3]
+        table.placed.rotations[rows] = numbers[places, 3:12].reshape(-1, 3, 3)
+    return found
 
 
 def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
@@ -159,45 +152,45 @@ def moved_table(last: SceneTable, objects: PerceivedObjects) -> SceneTable | Non
     owners = zip(_owners(last.objects), _owners(objects), strict=True)
     if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):
         return None
-    table, solid = _placed(objects, last.kinds, last.rows_of_kind, last.first_rows, 0, last.blocks.order)
-    return table if solid else None
+    starts = np.cumsum([0, *map(len, _owners(objects))])
+    rows = placed_rows(numbers_of(objects)[starts.take(last.kinds) + last.rows_of_kind], last.kinds, last.first_rows)
+    return (
+        _table(objects, last.kinds, last.rows_of_kind, last.first_rows, rows, 0, last.blocks.order)
+        if rows.solid
+        else None
+    )
 
 
-def _placed(
+def _table(
     objects: PerceivedObjects,
     kinds: IntArray,
     rows_of_kind: IntArray,
     first_rows: IntArray,
+    rows: Rows,
     flat: int,
     order: IntArray | None = None,
-) -> tuple[SceneTable, bool]:
-    """The table with these rows, and whether all of them have a volume."""
-    filled = empty_rows(len(kinds), len(first_rows) - 1)
-    solid = place(objects, kinds, rows_of_kind, first_rows, filled)
+) -> SceneTable:
     return SceneTable(
         objects=objects,
-        bounds=filled.bounds,
-        shapes=filled.shapes,
+        bounds=rows.bounds,
+        shapes=rows.shapes,
         kinds=kinds,
         rows_of_kind=rows_of_kind,
         first_rows=first_rows,
-        object_bounds=filled.object_bounds,
-        object_volumes=filled.object_volumes,
+        object_bounds=rows.object_bounds,
+        object_volumes=rows.object_volumes,
         flat=flat,
         order=order,
-    ), solid
+    )
 
 
 def make(objects: PerceivedObjects) -> SceneTable:
     """The table of a valid frame, primitives ordered by object, those without volume left out."""
-    owners = _owners(objects)
-    counts = [len(owner) for owner in owners]
-    owner = np.concatenate(owners)
-    kinds = np.repeat(np.arange(len(KINDS)), counts)
-    rows_of_kind = np.concatenate([np.arange(count) for count in counts])
-    primitives = empty_rows(len(owner), 0)
-    place(objects, kinds, rows_of_kind, np.zeros(1, dtype=np.int64), primitives)
-    order = np.argsort(owner, kind="stable")
-    order = order[primitives.volumes[order] > 0.0]
-    first_rows = np.searchsorted(owner[order], np.arange(len(objects.names) + 1))
-    return _placed(objects, kinds[order], rows_of_kind[order], first_rows, len(owner) - len(order))[0]
+    owners, kinds, rows_of_kind = primitives_of(objects)
+    numbers = numbers_of(objects)
+    volumes = placed_rows(numbers, kinds, np.zeros(1, dtype=np.int64)).volumes
+    order = np.argsort(owners, kind="stable")
+    order = order[volumes[order] > 0.0]
+    first_rows = np.searchsorted(owners[order], np.arange(len(objects.names) + 1))
+    rows = placed_rows(numbers[order], kinds[order], first_rows)
+    return _table(objects, kinds[order], rows_of_kind[order], first_rows, rows, len(owners) - len(order))

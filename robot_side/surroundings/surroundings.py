@@ -5,7 +5,7 @@ from typing import Final
 from common.arrays import FloatArray
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.scene_table import SceneTable, go_to, make, moved_table
-from robot_side.surroundings.target import object_centers
+from robot_side.surroundings.target import center_m
 from robot_side.surroundings.validity import require_valid
 
 _KEPT: Final = 8
@@ -20,8 +20,6 @@ class Surroundings:
         """By the identity of the frame that each was made of"""
         self._target: tuple[object, int | None] = (None, None)
         """The roles that were searched last, and what was found"""
-        self._centers: tuple[PerceivedObjects, FloatArray] | None = None
-        """The frame whose centres were worked out last, and these"""
 
     def see(self, frame: PerceivedObjects) -> SceneTable:
         """The table of a frame, made when it is first seen; ValueError for what `require_valid` refuses.
@@ -52,15 +50,8 @@ class Surroundings:
         return self._target[1]
 
     def center_m(self, frame: PerceivedObjects, index: int) -> FloatArray:
-        """The row (3,) of `object_centers` of one object, at the cost of what is new in the frame."""
-        if frame.since is not None:
-            movers, moved = frame.since
-            place = movers.place_of(index)
-            frame, index = (movers.first, index) if place is None else (moved, place)
-        if self._centers is None or self._centers[0] is not frame:
-            self._centers = frame, object_centers(frame)
-        center_m: FloatArray = self._centers[1][index]
-        return center_m
+        """The centre (3,) of one object of a frame: see `target.center_m`."""
+        return center_m(self.see(frame), index)
 
     def _keep(self, frame: PerceivedObjects, table: SceneTable) -> SceneTable:
         self._tables[id(frame)] = table

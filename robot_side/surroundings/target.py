@@ -1,12 +1,20 @@
 """Which object is the target: found in a frame, and switched by the operator's button."""
 
+import math
+
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, compiled, output_array
+from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.scene_columns import SCENE
+from robot_side.surroundings.scene_table import SceneTable
 
 _OFF_AXIS_WEIGHT = 3.0
 """A metre off the approach axis puts an object as far back in the order as three along it."""
+_scene = SCENE.at
 
 
 def object_centers(objects: PerceivedObjects) -> FloatArray:
@@ -22,6 +30,31 @@ def object_centers(objects: PerceivedObjects) -> FloatArray:
     with np.errstate(invalid="ignore"):
         centers_m: FloatArray = sums / np.where(counts > 0.0, counts, np.nan)[:, None]
     return centers_m
+
+
+@compiled(BUNDLE, COUNT, output_array(1))
+def _center(bundle: IntArray, thing: int, center: FloatArray) -> None:
+    scene, count = _scene(bundle), 0
+    center[:] = 0.0
+    for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
+        if scene.kinds[row] == HALF_SPACE:
+            continue
+        count += 1
+        points = 4 if scene.kinds[row] == TETRAHEDRON else 1
+        for axis in range(3):
+            total = 0.0
+            for point in range(points):
+                total += scene.shapes[row, 3 * point + axis]
+            center[axis] += total / points
+    for axis in range(3):
+        center[axis] = center[axis] / count if count > 0 else math.nan
+
+
+def center_m(table: SceneTable, thing: int) -> FloatArray:
+    """The same (3,) of one object of a table, of its primitives that have a volume."""
+    center: FloatArray = np.empty(3)
+    _center(table.bundle, thing, center)
+    return center
 
 
 def next_target(

@@ -1,19 +1,18 @@
 """Whether what the camera reports can be: checked once for each frame, so that no tick has to."""
 
 import math
-import sys
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, require_finite
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, together
-from robot_side.surroundings.kinds.kind import Check
+from common.arrays import FloatArray, IntArray, require_finite
+from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, input_indices
+from robot_side.surroundings.kinds.kind import Check, Kind
+from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.placing import numbers_of, primitives_of
 
 _UNIT_TOLERANCE = 1e-6
-_LOWEST = -sys.float_info.max
-"""The least finite number."""
 _FIELDS: Final = tuple((kind.owner, *array) for kind in KINDS for array in kind.arrays)
 """Each array with the field that counts its rows."""
 _CHECKED: Final = tuple(array for kind in KINDS for array in kind.arrays if array.check is not Check.INDEX)
@@ -49,7 +48,7 @@ def require_valid(objects: PerceivedObjects) -> None:
                 f" {len(objects.names)} objects"
             )
         require_finite("objects.velocities_m_s", velocities)
-    if not _are_possible(tuple([getattr(objects, array.name) for array in _CHECKED])):
+    if not _are_possible(numbers_of(objects), primitives_of(objects).kinds):
         _refuse(objects)
 
 
@@ -87,54 +86,56 @@ def _refuse(objects: PerceivedObjects) -> None:
                 )
 
 
+_ANY, _FINITE, _LEAST_0, _UNIT, _ORTHONORMAL = range(5)
+
+
+def _codes(kind: Kind) -> list[int]:
+    """What each of a primitive's numbers must be, beside finite."""
+    codes = [_ANY] * NUMBERS
+    for array in kind.arrays:
+        if array.name in kind.parts:
+            part = kind.parts[array.name][0]
+            codes[part] = [_LEAST_0 if array.check is Check.NOT_NEGATIVE else _FINITE] * (part.stop - part.start)
+            codes[part.start] = {Check.UNIT: _UNIT, Check.ORTHONORMAL: _ORTHONORMAL}.get(array.check, codes[part.start])
+    return codes
+
+
+_CODES: Final = np.array([_codes(kind) for kind in KINDS])
+
+
 @inlined
-def _are_unit(values: FloatArray, columns: int) -> bool:
-    """Whether matrices (3, columns), one after another, have unit columns at right angles."""
-    for start in range(0, values.size, 3 * columns):
-        for first in range(columns):
-            for second in range(first + 1):
-                product = -1.0 if first == second else 0.0
-                for axis in range(start, start + 3 * columns, columns):
-                    product += values[axis + first] * values[axis + second]
-                # NaN fails the comparison.
-                if not abs(product) <= _UNIT_TOLERANCE:
-                    return False
+def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
+    """Whether the matrix (3, columns) that begins there has unit columns at right angles."""
+    for first in range(columns):
+        for second in range(first + 1):
+            product = -1.0 if first == second else 0.0
+            for entry in range(start, start + 3 * columns, columns):
+                product += numbers[row, entry + first] * numbers[row, entry + second]
+            # NaN fails the comparison.
+            if not abs(product) <= _UNIT_TOLERANCE:
+                return False
     return True
 
 
 @inlined
-def _are_at_least(values: FloatArray, least: float) -> bool:
-    """Whether all are at least `least` and finite."""
-    largest = 0.0
-    for value in values:
-        if not value >= least:
-            return False
-        largest = max(largest, value)
-    return largest < math.inf
+def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
+    """Whether a primitive of this kind can have the numbers (n, 20) in this row."""
+    for place in range(NUMBERS):
+        code = _CODES[kind, place]
+        if code != _ANY:
+            value = numbers[row, place]
+            if not math.isfinite(value) or (code == _LEAST_0 and value < 0.0):
+                return False
+            if code == _UNIT and not _are_unit(numbers, row, place, 1):
+                return False
+            if code == _ORTHONORMAL and not _are_unit(numbers, row, place, 3):
+                return False
+    return True
 
 
-def _checks(number: int) -> Any:
-    """Make the function of all checked arrays that says whether those from `number` on can be."""
-    check: Check = _CHECKED[number].check
-    others: Any = _checks(number + 1) if number + 1 < len(_CHECKED) else None
-    columns = {Check.UNIT: 1, Check.ORTHONORMAL: 3}.get(check, 0)
-    least = 0.0 if check is Check.NOT_NEGATIVE else _LOWEST
-
-    @inlined
-    def this(arrays: Any) -> bool:
-        values = arrays[number].ravel()
-        return _are_unit(values, columns) if columns > 0 else _are_at_least(values, least)
-
-    @inlined
-    def this_and_others(arrays: Any) -> bool:
-        return this(arrays) and others(arrays)
-
-    return this if others is None else this_and_others
-
-
-_all_can_be = _checks(0)
-
-
-@compiled(together(*(input_array(1 + len(array.row)) for array in _CHECKED)), returns=TRUTH)
-def _are_possible(arrays: Any) -> bool:
-    return bool(_all_can_be(arrays))
+@compiled(input_array(2), input_indices(), returns=TRUTH)
+def _are_possible(numbers: FloatArray, kinds: IntArray) -> bool:
+    possible = True
+    for row in range(kinds.size):
+        possible = possible and is_possible(kinds[row], numbers, row)
+    return possible

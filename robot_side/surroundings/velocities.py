@@ -1,13 +1,18 @@
 """How fast objects move, from where they were seen in the last frames."""
 
-from collections import deque
+from typing import Final
 
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_array
 
 WINDOW_S = 0.2
 """Over so long a time a velocity is measured: a tenth of a second late, and a frame's noise counts little."""
+
+
+_FRAMES: Final = 8
+"""Room for so many in the beginning"""
 
 
 class ObjectVelocities:
@@ -18,20 +23,56 @@ class ObjectVelocities:
         if not window_s > 0.0:
             raise ValueError(f"window_s = {window_s}; valid: above 0")
         self._window_s = window_s
-        self._seen: deque[tuple[float, FloatArray]] = deque()
+        self._times_s: FloatArray = np.empty(0)
+        self._positions_m: FloatArray = np.empty((0, 0))
+        self._kept = 0
 
     def see(self, time_s: float, positions_m: FloatArray) -> FloatArray:
         """Take in a frame, no older than the last one; velocities (k, 3) in m/s of the k objects, 0 in the first.
 
         positions_m (k, 3): of one point of each object.
         """
-        self._seen.append((time_s, positions_m))
-        while self._seen[0][0] < time_s - self._window_s - 1e-9:
-            self._seen.popleft()
-        times = np.array([when for when, _ in self._seen])
-        times -= times.mean()
-        spread = float(times @ times)
-        if spread == 0.0:
-            return np.zeros_like(positions_m)
-        velocities: FloatArray = np.tensordot(times, np.array([where for _, where in self._seen]), axes=1) / spread
+        if self._kept == len(self._times_s):
+            rows = max(2 * self._kept, _FRAMES)
+            seen_m = self._positions_m.reshape(self._kept, positions_m.size)
+            self._times_s, self._positions_m = np.resize(self._times_s, rows), np.empty((rows, positions_m.size))
+            self._positions_m[: self._kept] = seen_m
+        velocities: FloatArray = np.empty(positions_m.shape)
+        oldest_s, flat = time_s - self._window_s - 1e-9, positions_m.reshape(-1)
+        seen = self._times_s, self._positions_m, self._kept
+        self._kept = _see(*seen, time_s, oldest_s, flat, velocities.reshape(-1))
         return velocities
+
+
+@compiled(output_array(1), output_array(2), COUNT, NUMBER, NUMBER, input_array(1), output_array(1), returns=COUNT)
+def _see(
+    times: FloatArray,
+    seen: FloatArray,
+    kept: int,
+    now: float,
+    oldest: float,
+    positions: FloatArray,
+    velocities: FloatArray,
+) -> int:
+    """Add positions (3 k,) to those seen at the first of the times, drop what is too old; the slopes (3 k,)."""
+    first = 0
+    while first < kept and times[first] < oldest:
+        first += 1
+    if first > 0:
+        for frame in range(first, kept):
+            times[frame - first], seen[frame - first] = times[frame], seen[frame]
+    kept -= first
+    times[kept], seen[kept], kept = now, positions, kept + 1
+    # From now, as a clock's large numbers have few digits for what is between.
+    middle, spread = 0.0, 0.0
+    for frame in range(kept):
+        middle += (times[frame] - now) / kept
+    for frame in range(kept):
+        spread += (times[frame] - now - middle) ** 2
+    velocities[:] = 0.0
+    if spread > 0.0:
+        for frame in range(kept):
+            part = (times[frame] - now - middle) / spread
+            for place in range(velocities.size):
+                velocities[place] += part * seen[frame, place]
+    return kept

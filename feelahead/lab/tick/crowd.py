@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
-from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """The middle of the built-in table's things."""
@@ -51,7 +51,7 @@ class CrowdedCamera:
         self._camera, self._count, self._only = camera, count, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
-        self._own_movers: SomeObjects | None = None
+        self._own_movers: Movers | None = None
         self._movers: Movers | None = None
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
@@ -72,7 +72,7 @@ class CrowdedCamera:
             return joined(_without_objects(own), crowd(self._count, own.time_s))
         if own.since is None:
             return joined(own, crowd(self._count, own.time_s))
-        movers, moved = own.since
+        movers, numbers = own.since
         if self._movers is None or self._own_movers is not movers:
             # The frame that was shown whole is the one that has a table, and whose roles are known.
             shown = self._shown if before is movers.first else None
@@ -81,7 +81,7 @@ class CrowdedCamera:
             self._roles = movers.first.roles, first.roles
         if self._roles[0] is not own.roles:
             self._roles = own.roles, own.roles + (Role.OBSTACLE,) * self._count
-        return self._movers.frame(moved, self._roles[1])
+        return self._movers.frame(own.time_s, numbers, self._roles[1])
 
 
 def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:

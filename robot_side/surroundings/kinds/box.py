@@ -1,13 +1,11 @@
 """Boxes {c + Q diag(half) x : |x_i| <= 1}: centre (3), Q by rows (9), half sizes (3)."""
 
 import math
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, power_of_two_below
-from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract
+from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
 from robot_side.overlap.lanes.box_lane import box_lane
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
 from robot_side.surroundings.kinds.layout import (
@@ -19,22 +17,30 @@ from robot_side.surroundings.kinds.layout import (
     TOUCHING_M,
     Contact,
     Nearest,
+    posed,
     take_over,
+    write_pose,
 )
 
 
 @inlined
-def place(columns: tuple[FloatArray, FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write one box's numbers and bounds; its volume in m³."""
-    centers, rotations, half_sizes = columns
-    half = load(half_sizes, k)
+def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """Write one box's bounds; its volume in m³."""
+    half = numbers[k, 12], numbers[k, 13], numbers[k, 14]
     for axis in range(3):
-        shape[axis] = bound[axis] = centers[k, axis]
-        shape[12 + axis] = half_sizes[k, axis]
-        for column in range(3):
-            shape[3 + 3 * axis + column] = rotations[k, axis, column]
-    bound[3] = norm(half)
-    return 8.0 * (half[0] * half[1] * half[2])
+        bounds[row, axis] = numbers[k, axis]
+    bounds[row, 3] = norm(half)
+    return 8.0 * float(half[0] * half[1] * half[2])
+
+
+@inlined
+def placed(
+    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of a box at a pose; sizes: its centre in its own frame, and half sizes."""
+    write_pose(posed(position, turns, turn, sizes[k, 0], sizes[k, 1], sizes[k, 2]), turns, turn, numbers, row)
+    for axis in range(3):
+        numbers[row, 12 + axis] = sizes[k, 3 + axis]
 
 
 @inlined
@@ -200,12 +206,6 @@ def overlap_one_box(
     return take_over(found[0], found[1], size, radius, push)
 
 
-def _placed(
-    positions: FloatArray, rotations: FloatArray, offsets: FloatArray, half_sizes: FloatArray
-) -> tuple[Any, ...]:
-    return positions + np.einsum("bij,bj->bi", rotations, offsets), rotations, half_sizes
-
-
 KIND: Final = Kind(
     "box",
     (
@@ -213,7 +213,7 @@ KIND: Final = Kind(
         Array("box_rotations", (3, 3), Check.ORTHONORMAL),
         Array("box_half_sizes_m", (3,), Check.NOT_NEGATIVE),
     ),
-    placed=_placed,
+    placed=placed,
     place=place,
     nearest=nearest,
     contact=contact,

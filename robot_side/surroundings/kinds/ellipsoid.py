@@ -18,17 +18,28 @@ from robot_side.surroundings.kinds.layout import (
     OVERLAP,
     Nearest,
     take_over,
+    write_pose,
 )
 
 _NEWTON_STEPS: Final = 60
 
 
 @inlined
-def place(columns: tuple[FloatArray, FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write one ellipsoid's numbers and bounds; its volume in m³."""
-    volume = box.place(columns, k, shape, bound)
-    bound[3] = max(shape[12], shape[13], shape[14])
+def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """Write one ellipsoid's bounds; its volume in m³."""
+    volume = box.place(numbers, k, bounds, row)
+    bounds[row, 3] = max(numbers[k, 12], numbers[k, 13], numbers[k, 14])
     return math.pi / 6.0 * volume
+
+
+@inlined
+def placed(
+    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of an ellipsoid at a pose; sizes: its half axes."""
+    write_pose(position, turns, turn, numbers, row)
+    for axis in range(3):
+        numbers[row, 12 + axis] = sizes[k, axis]
 
 
 @inlined
@@ -150,7 +161,7 @@ KIND: Final = Kind(
         Array("ellipsoid_rotations", (3, 3), Check.ORTHONORMAL),
         Array("ellipsoid_half_axes_m", (3,), Check.NOT_NEGATIVE),
     ),
-    placed=lambda positions, rotations, half_axes: (positions, rotations, half_axes),
+    placed=placed,
     place=place,
     nearest=nearest,
     contact=contact,

@@ -1,9 +1,7 @@
 """Half-spaces, solid where normal·x <= offset: normal (3), offset."""
 
 import math
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
@@ -15,13 +13,23 @@ from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, NEVER, TO
 
 
 @inlined
-def place(columns: tuple[FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write one half-space's numbers and bounds; its volume has no end."""
-    normals, offsets = columns
+def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
+    """Write one half-space's bounds; its volume has no end."""
     for axis in range(3):
-        shape[axis], bound[axis] = normals[k, axis], 0.0
-    shape[3], bound[3] = offsets[k], math.inf
+        bounds[row, axis] = 0.0
+    bounds[row, 3] = math.inf
     return math.inf
+
+
+@inlined
+def placed(
+    _sizes: FloatArray, _k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of the half-space below a plane at a pose, whose normal is the third axis."""
+    normal = turns[turn, 2], turns[turn, 5], turns[turn, 8]
+    for axis in range(3):
+        numbers[row, axis] = normal[axis]
+    numbers[row, 3] = dot(normal, position)
 
 
 @inlined
@@ -47,15 +55,10 @@ def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Over
     return half_space_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
 
 
-def _placed(positions: FloatArray, rotations: FloatArray) -> tuple[Any, ...]:
-    normals = np.ascontiguousarray(rotations[:, :, 2])
-    return normals, np.einsum("pi,pi->p", normals, positions)
-
-
 KIND: Final = Kind(
     "half_space",
     (Array("half_space_normals", (3,), Check.UNIT), Array("half_space_offsets_m", ())),
-    placed=_placed,
+    placed=placed,
     place=place,
     nearest=nearest,
     contact=contact,

@@ -4,7 +4,8 @@ The rule: a kind is one file with one `KIND`, named once in `perceived.KINDS` be
 takes no list of arrays, so `by_kind` builds its if-chain of closures, one inside another, and types end at `Any`.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import cached_property
@@ -12,7 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from common.arrays import FloatArray
 from robot_side.compiled.kernel import Compiled, inlined
+from robot_side.surroundings.kinds.layout import NUMBERS, rows
 
 Row = tuple[int, ...]
 """The shape of an array's rows."""
@@ -48,10 +51,11 @@ class Kind:
     name: str
     arrays: tuple[Array, ...]
     """Where it is, and how large"""
-    placed: Callable[..., tuple[Any, ...]]
-    """From positions (k, 3) and rotations (k, 3, 3) of their own frames, and sizes in these, to the arrays' values"""
+    placed: Callable[..., None]
+    """(sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row): write the numbers of a primitive whose
+    own frame is there, of sizes in this frame. Compiled, as all below."""
     place: Callable[..., float]
-    """(columns, row, shape (15,), bounds (4,)) to the volume in m³: writes the last two. Compiled, as all below."""
+    """(numbers, k, bounds (n, 4), row) to the volume in m³: make the numbers the shape's, and write the bounds"""
     nearest: Callable[..., Any]
     """(shapes (n, 15), row, point) to Nearest"""
     contact: Callable[..., Any]
@@ -63,11 +67,11 @@ class Kind:
     centers: Callable[..., Any] | None = None
     """(columns) to centres (k, 3) in metres; None where it has no end"""
     in_box: bool = False
-    """Whether its first columns are a box around it: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
-    rows: tuple[Row, ...] | None = None
-    """Of the columns, where they are not the arrays"""
+    """Whether its columns are a box around it: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
     derive: Callable[[Any], tuple[Any, ...]] | None = None
-    """Makes such columns from a frame"""
+    """Makes such columns from a frame, where they are not the arrays"""
+    more: Callable[[Any], FloatArray] | None = None
+    """From a frame to the numbers that follow those of the arrays"""
 
     @cached_property
     def owner(self) -> str:
@@ -79,10 +83,20 @@ class Kind:
         """The names of the arrays that may differ from frame to frame: all but indices."""
         return tuple(array.name for array in self.arrays if array.check is not Check.INDEX)
 
-    @property
-    def column_rows(self) -> tuple[Row, ...]:
-        """The shapes of the columns' rows."""
-        return self.rows or tuple(array.row for array in self.arrays)
+    @cached_property
+    def parts(self) -> Mapping[str, tuple[slice, Row]]:
+        """Where in a primitive's numbers the values of these arrays are, and the shape of their rows."""
+        found, end = {}, 0
+        for array in self.arrays:
+            if array.check is not Check.INDEX:
+                found[array.name] = slice(end, end + math.prod(array.row)), array.row
+                end += math.prod(array.row)
+        return found
+
+    def numbers(self, objects: Any) -> FloatArray:
+        """The numbers (k, 20) of each primitive of a frame."""
+        further = () if self.more is None else (self.more(objects),)
+        return rows(*(getattr(objects, name) for name in self.fields), *further, width=NUMBERS)
 
     def read(self, objects: Any) -> tuple[Any, ...]:
         """The columns of a frame."""

@@ -18,6 +18,11 @@ HALF_SPACE: Final = 3
 MESH: Final = 4
 """A mesh has the layout of the box around it. Contact and overlap come from `placed_meshes`, by address."""
 SHAPE_NUMBERS: Final = 15
+"""Of a primitive as a table has it"""
+NUMBERS: Final = 20
+"""Of a primitive as a frame has it: the values of its arrays, and of a mesh what its library says of it."""
+VELOCITY: Final = 12
+"""Among the numbers of an object, its velocity follows its position and rotation."""
 
 Nearest = tuple[float, Vector]
 """Signed distance, positive outside, and the unit vector along which it falls fastest: towards the nearest point from
@@ -30,12 +35,12 @@ ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
 """For a point from which every way is as long."""
 
 
-def rows(*columns: FloatArray) -> FloatArray:
+def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
     """Shapes (k, 15) from columns (k, ...) that follow each other, the rest 0."""
     count = len(columns[0])
     flat = [column.reshape(count, math.prod(column.shape[1:])) for column in columns]
     used = sum(column.shape[1] for column in flat)
-    return np.concatenate([*flat, np.zeros((count, SHAPE_NUMBERS - used))], axis=1)
+    return np.concatenate([*flat, np.zeros((count, width - used))], axis=1)
 
 
 OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMBER, NUMBER, BUNDLE, output_array(1)),)
@@ -50,6 +55,25 @@ LEAST_WAY_M: Final = 1e-12
 CLOSING: Final = 1e-9
 """Slower than this share of the way, what is beside does not come nearer."""
 MOST_STEPS: Final = 60
+
+
+@inlined
+def posed(position: Vector, turns: FloatArray, k: int, x: float, y: float, z: float) -> Vector:
+    """The point (x, y, z) of an own frame in the world; turns (g, 9) by rows."""
+    return (
+        position[0] + (turns[k, 0] * x + turns[k, 1] * y + turns[k, 2] * z),
+        position[1] + (turns[k, 3] * x + turns[k, 4] * y + turns[k, 5] * z),
+        position[2] + (turns[k, 6] * x + turns[k, 7] * y + turns[k, 8] * z),
+    )
+
+
+@inlined
+def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray, row: int) -> None:
+    """Write a position, and a rotation of turns (g, 9), as the first twelve numbers."""
+    for axis in range(3):
+        numbers[row, axis] = position[axis]
+    for entry in range(9):
+        numbers[row, 3 + entry] = turns[k, entry]
 
 
 @inlined

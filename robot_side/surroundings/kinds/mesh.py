@@ -4,31 +4,55 @@ from typing import Any, Final
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
+from robot_side.compiled.vectors import Vector
 from robot_side.surroundings.kinds import box
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
-
-_Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+from robot_side.surroundings.kinds.layout import NUMBERS, write_pose
 
 
 @inlined
-def place(columns: _Columns, k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write the box around one mesh, and the sphere; the mesh's volume in m³."""
-    box.place((columns[0], columns[1], columns[2]), k, shape, bound)
-    bound[3] = columns[3][k]
-    return float(columns[4][k])
+def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """Make a mesh's numbers those of the box around it, and write its bounds; its volume in m³."""
+    x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
+    for axis in range(3):
+        first = 3 + 3 * axis
+        u, v, w = numbers[k, first], numbers[k, first + 1], numbers[k, first + 2]
+        middle = u * numbers[k, 15] + v * numbers[k, 16] + w * numbers[k, 17]
+        bounds[row, axis] = (x if axis == 0 else y if axis == 1 else z) + middle
+    for axis in range(3):
+        numbers[k, axis] = bounds[row, axis]
+    bounds[row, 3] = numbers[k, 18]
+    return float(numbers[k, 19])
+
+
+@inlined
+def placed(
+    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of a mesh at a pose; sizes: what follows the pose."""
+    write_pose(position, turns, turn, numbers, row)
+    for entry in range(12, NUMBERS):
+        numbers[row, entry] = sizes[k, entry - 12]
+
+
+def of_library(library: Any, index: IntArray) -> FloatArray:
+    """Half sizes of the boxes around meshes of the library, their middles, their radii, and the volumes (q, 8)."""
+    if library is None:
+        return np.empty((0, 8))
+    around = library.bounds
+    columns = around.half_sizes_m, around.middles_m, around.radii_m[:, None], library.tables.volumes[:, None]
+    return np.concatenate([column[index] for column in columns], axis=1)
 
 
 def _derive(objects: Any) -> tuple[FloatArray, ...]:
-    """Middles, rotations, half sizes and radii of what is around meshes, and their volumes."""
+    """Middles, rotations and half sizes of the boxes around meshes."""
     library, index = objects.mesh_library, objects.mesh_index
     if library is None:
-        return objects.mesh_positions_m, objects.mesh_rotations, np.empty((0, 3)), np.empty(0), np.empty(0)
-    around = library.bounds
-    half_sizes_m, radii_m = around.half_sizes_m.take(index, axis=0), around.radii_m.take(index)
+        return objects.mesh_positions_m, objects.mesh_rotations, np.empty((0, 3))
     middles_m = library.placed_middles_m(index, objects.mesh_positions_m, objects.mesh_rotations)
-    return middles_m, objects.mesh_rotations, half_sizes_m, radii_m, library.tables.volumes.take(index)
+    return middles_m, objects.mesh_rotations, library.bounds.half_sizes_m.take(index, axis=0)
 
 
 KIND: Final = Kind(
@@ -38,12 +62,12 @@ KIND: Final = Kind(
         Array("mesh_positions_m", (3,)),
         Array("mesh_rotations", (3, 3), Check.ORTHONORMAL),
     ),
-    placed=lambda positions, rotations, index: (index, positions, rotations),
+    placed=placed,
     place=place,
     nearest=box.nearest,
     contact=box.contact,
     centers=lambda middles, *_: middles,
     in_box=True,
-    rows=((3,), (3, 3), (3,), (), ()),
     derive=_derive,
+    more=lambda objects: of_library(objects.mesh_library, objects.mesh_index),
 )

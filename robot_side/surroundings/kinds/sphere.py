@@ -13,13 +13,21 @@ from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, NEV
 
 
 @inlined
-def place(columns: tuple[FloatArray, FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write one sphere's numbers and bounds; its volume in m³."""
-    centers, radii = columns
+def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """Write one sphere's bounds; its volume in m³."""
+    for axis in range(4):
+        bounds[row, axis] = numbers[k, axis]
+    return 4.0 / 3.0 * math.pi * float(numbers[k, 3] ** 3)
+
+
+@inlined
+def placed(
+    sizes: FloatArray, k: int, position: Vector, _turns: FloatArray, _turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of a sphere at a pose; sizes: its radius."""
     for axis in range(3):
-        shape[axis] = bound[axis] = centers[k, axis]
-    shape[3] = bound[3] = radii[k]
-    return 4.0 / 3.0 * math.pi * float(radii[k] ** 3)
+        numbers[row, axis] = position[axis]
+    numbers[row, 3] = sizes[k, 0]
 
 
 @inlined
@@ -54,7 +62,7 @@ def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Over
 KIND: Final = Kind(
     "sphere",
     (Array("sphere_centers_m", (3,)), Array("sphere_radii_m", (), Check.NOT_NEGATIVE)),
-    placed=lambda positions, _rotations, radii: (positions, radii),
+    placed=placed,
     place=place,
     nearest=nearest,
     contact=contact,

@@ -1,13 +1,11 @@
 """Tetrahedra, vertices in any order: four vertices (12)."""
 
 import math
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, power_of_two_below
-from robot_side.compiled.vectors import Vector, add, cross, dot, load, negative, norm, scale, subtract
+from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
 from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 from robot_side.surroundings.kinds.convex_contact import convex_contact
 from robot_side.surroundings.kinds.kind import Array, Kind
@@ -15,6 +13,7 @@ from robot_side.surroundings.kinds.layout import (
     ANY_DIRECTION,
     OVERLAP,
     Nearest,
+    posed,
     take_over,
 )
 
@@ -22,32 +21,37 @@ Vertices = tuple[Vector, Vector, Vector, Vector]
 
 
 @inlined
-def place(columns: tuple[FloatArray], k: int, shape: FloatArray, bound: FloatArray) -> float:
-    """Write one tetrahedron's numbers and bounds; its volume in m³."""
-    vertices = columns[0]
-    for corner in range(4):
-        for axis in range(3):
-            shape[3 * corner + axis] = vertices[k, corner, axis]
+def _corner(shapes: FloatArray, row: int, k: int, point: Vector) -> Vector:
+    """Vertex k, seen from `point`."""
+    return subtract((shapes[row, 3 * k], shapes[row, 3 * k + 1], shapes[row, 3 * k + 2]), point)
+
+
+@inlined
+def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """Write one tetrahedron's bounds; its volume in m³."""
     for axis in range(3):
-        low, high = vertices[k, :, axis].min(), vertices[k, :, axis].max()
-        bound[axis] = 0.5 * (low + high)
-    middle: Vector = (bound[0], bound[1], bound[2])
-    bound[3] = 0.0
+        p, q, r, s = numbers[k, axis], numbers[k, 3 + axis], numbers[k, 6 + axis], numbers[k, 9 + axis]
+        bounds[row, axis] = 0.5 * (min(p, q, r, s) + max(p, q, r, s))
+    middle: Vector = (bounds[row, 0], bounds[row, 1], bounds[row, 2])
+    farthest = 0.0
     for corner in range(4):
-        bound[3] = max(bound[3], norm(subtract(load(vertices[k], corner), middle)))
-    first = load(vertices[k], 0)
-    a, b, c = (
-        subtract(load(vertices[k], 1), first),
-        subtract(load(vertices[k], 2), first),
-        subtract(load(vertices[k], 3), first),
-    )
+        farthest = max(farthest, norm(_corner(numbers, k, corner, middle)))
+    bounds[row, 3] = farthest
+    first = numbers[k, 0], numbers[k, 1], numbers[k, 2]
+    a, b, c = _corner(numbers, k, 1, first), _corner(numbers, k, 2, first), _corner(numbers, k, 3, first)
     return abs(dot(cross(a, b), c)) / 6.0
 
 
 @inlined
-def _corner(shapes: FloatArray, row: int, k: int, point: Vector) -> Vector:
-    """Vertex k, seen from `point`."""
-    return subtract((shapes[row, 3 * k], shapes[row, 3 * k + 1], shapes[row, 3 * k + 2]), point)
+def placed(
+    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
+) -> None:
+    """Write the numbers of a tetrahedron at a pose; sizes: its vertices in its own frame."""
+    for corner in range(4):
+        x, y, z = sizes[k, 3 * corner], sizes[k, 3 * corner + 1], sizes[k, 3 * corner + 2]
+        point = posed(position, turns, turn, x, y, z)
+        for axis in range(3):
+            numbers[row, 3 * corner + axis] = point[axis]
 
 
 @inlined
@@ -139,14 +143,10 @@ def overlap_one_tetrahedron(
     return take_over(found[0], found[1], size, radius, push)
 
 
-def _placed(positions: FloatArray, rotations: FloatArray, corners: FloatArray) -> tuple[Any, ...]:
-    return (positions[:, None, :] + np.einsum("tij,tvj->tvi", rotations, corners),)
-
-
 KIND: Final = Kind(
     "tetrahedron",
     (Array("tetrahedron_vertices_m", (4, 3)),),
-    placed=_placed,
+    placed=placed,
     place=place,
     nearest=nearest,
     contact=contact,

@@ -33,7 +33,7 @@ def test_of_a_crowd_around_a_cameras_objects_a_frame_says_what_moves() -> None:
     assert second.since is not None
     assert second.since[0].first is first
     own = [thing.name for thing in scene.objects if thing.name not in scene.fixed]
-    assert list(second.since[1].names) == own
+    assert [second.names[thing] for thing in second.since[0].things] == own
     assert len(second.roles) == len(second.names) == len(scene.objects) + 300
     # As long as nobody changes a role, all frames share one tuple.
     assert camera.perceive(1.0).roles is second.roles is first.roles

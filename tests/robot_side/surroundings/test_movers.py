@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 from robot_side.surroundings.surroundings import Surroundings
-from robot_side.surroundings.target import object_centers
 from tests.helpers.perceived_scenes import random_rotation, random_scene
 
 
@@ -49,14 +48,11 @@ def test_such_a_frame_is_the_whole_frame(seed: int, share: float) -> None:
     things = np.flatnonzero(rng.uniform(size=len(first.names)) < share)
     movers, expected = Movers(first, things), elsewhere(first, things, rng)
     roles = (Role.TARGET, *first.roles[1:])
-    found = movers.frame(replace(Movers(expected, things).at_first, time_s=3.0), roles)
+    found = movers.frame(3.0, movers.numbers_in(expected), roles)
     assert (found.time_s, found.roles, found.names) == (3.0, roles, first.names)
     seeing = Surroundings()
     assert seeing.target(found) == 0
     assert seeing.target(first) is None
-    centers_m = object_centers(expected)
-    for index in range(len(first.names)):
-        np.testing.assert_array_equal(seeing.center_m(found, index), centers_m[index])
     # So far nothing was made whole.
     assert not {name for kind in KINDS for name in kind.fields} & set(vars(found))
     for one in (found, replace(found, time_s=4.0)):
@@ -69,22 +65,20 @@ def test_such_a_frame_is_the_whole_frame(seed: int, share: float) -> None:
 
 
 def test_what_nobody_knows_of_some_nobody_knows_of_all() -> None:
-    first = whole(np.random.default_rng(1))
+    first = replace(whole(np.random.default_rng(1)), velocities_m_s=None)
     movers = Movers(first, np.array([0, 4]))
-    unknown = movers.frame(replace(movers.at_first, velocities_m_s=None), first.roles)
-    assert unknown.velocities_m_s is None
-    assert unknown.positions_m is not None
+    assert movers.frame(0.0, movers.at_first, first.roles).velocities_m_s is None
 
 
 def test_other_objects_than_the_movers_are_refused() -> None:
     first = whole(np.random.default_rng(2))
     movers = Movers(first, np.array([0, 1, 4]))
-    with pytest.raises(ValueError, match=r"moved\.sphere_object"):
-        movers.frame(first, first.roles)
+    with pytest.raises(ValueError, match=r"numbers holds float64 \(1, 20\); valid: contiguous float64 \(.*, 20\)"):
+        movers.frame(0.0, movers.at_first[:1], first.roles)
     with pytest.raises(ValueError, match=r"roles holds 0; valid: one for each"):
-        movers.frame(movers.at_first, ())
+        movers.frame(0.0, movers.at_first, ())
     for things in ([4, 0], [0, 0], [-1], [len(first.names)]):
         with pytest.raises(ValueError, match="rising places"):
             Movers(first, np.array(things))
     with pytest.raises(ValueError, match="says all"):
-        Movers(movers.frame(movers.at_first, first.roles), np.array([0]))
+        Movers(movers.frame(0.0, movers.at_first, first.roles), np.array([0]))

@@ -21,6 +21,7 @@ from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.scene_table import SceneTable, make, moved_table, scene_table
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.surroundings.target import object_centers
 from robot_side.surroundings.validity import require_valid
 from tests.helpers.field.fields import along, ball_pose, look
 from tests.helpers.field.primitive_rows import object_bound
@@ -124,6 +125,11 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
     )
 
 
+def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
+    """The movers as `objects` has them, all else as in the first frame."""
+    return movers.frame(0.0, movers.numbers_in(objects), objects.roles)
+
+
 def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
     """The table has what its definitions say of each primitive and each object."""
     rows = rows_of_primitives(objects)
@@ -163,7 +169,7 @@ def test_a_table_has_what_is_defined_of_each_primitive_and_so_has_that_of_the_ne
 def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed: int) -> None:
     first, rng = any_objects(seed)
     some, others = (Movers(first, np.flatnonzero(rng.uniform(size=len(first.names)) < share)) for share in (0.5, 0.5))
-    frames = [movers.frame(moved(movers.at_first, rng), first.roles) for movers in (some, some, others)]
+    frames = [frame_of(movers, moved(first, rng)) for movers in (some, some, others)]
     seeing = Surroundings()
     table = seeing.see(first)
     kept = table.bounds
@@ -171,17 +177,24 @@ def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed
         assert seeing.see(objects) is table
         assert table.objects is objects
         assert_as_defined(table, objects)
+        # To the bit: a recording says the same frame whole.
+        said_whole = make(dataclasses.replace(objects))
+        for name in ("shapes", "bounds", "object_bounds", "object_volumes"):
+            np.testing.assert_array_equal(getattr(table, name), getattr(said_whole, name))
+        centers_m = object_centers(objects)
+        for thing in range(len(objects.names)):
+            np.testing.assert_array_equal(seeing.center_m(objects, thing), centers_m[thing])
     assert table.bounds is kept
 
 
 def test_a_frame_that_is_refused_changes_nothing() -> None:
     first = mixed()
     movers = Movers(first, np.array([0, 3]))
-    good = moved(movers.at_first, np.random.default_rng(1))
-    frame = movers.frame(good, first.roles)
+    good = moved(first, np.random.default_rng(1))
+    frame = frame_of(movers, good)
     seeing = Surroundings()
     table = seeing.see(frame)
-    bad = movers.frame(dataclasses.replace(good, box_rotations=1.1 * good.box_rotations), first.roles)
+    bad = frame_of(movers, dataclasses.replace(good, box_rotations=1.1 * good.box_rotations))
     for _ in range(2):
         with pytest.raises(ValueError, match="box_rotations"):
             seeing.see(bad)
@@ -192,17 +205,17 @@ def test_a_frame_that_is_refused_changes_nothing() -> None:
 def test_what_loses_its_volume_has_a_table_of_its_own() -> None:
     first = mixed()
     movers = Movers(first, np.array([0, 3]))
-    frame = movers.frame(movers.at_first, first.roles)
+    frame = frame_of(movers, first)
     seeing = Surroundings()
     table = seeing.see(frame)
-    flat = dataclasses.replace(movers.at_first, box_half_sizes_m=movers.at_first.box_half_sizes_m * [0.0, 1.0, 1.0])
-    without = movers.frame(flat, first.roles)
+    flat = dataclasses.replace(first, box_half_sizes_m=first.box_half_sizes_m * [0.0, 1.0, 1.0])
+    without = frame_of(movers, flat)
     assert seeing.see(without).flat == 2
     assert_as_defined(seeing.see(without), without)
     assert_as_defined(table, frame)
     # And where something had none in the first place.
     spread = Movers(dataclasses.replace(without), np.array([0, 3]))
-    assert_as_defined(seeing.see(spread.frame(movers.at_first, first.roles)), frame)
+    assert_as_defined(seeing.see(frame_of(spread, first)), frame)
 
 
 @pytest.mark.parametrize("unbounded", [0, 3])
@@ -216,7 +229,7 @@ def test_blocks_bound_their_objects_wherever_these_go(unbounded: int) -> None:
     first = scene.add(Role.IGNORED).objects()
     movers = Movers(first, np.sort(rng.choice(5000, 50, replace=False)))
     seeing = Surroundings()
-    for objects in (first, movers.frame(moved(movers.at_first, rng), first.roles)):
+    for objects in (first, frame_of(movers, moved(first, rng))):
         table = seeing.see(objects)
         blocks = table.blocks
         assert sorted(blocks.order) == list(range(5000 + unbounded))

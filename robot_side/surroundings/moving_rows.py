@@ -1,0 +1,80 @@
+"""A camera's frame into a scene table: one call checks what has moved, and writes where it is now."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, TRUTH, compiled, inlined, input_array, input_indices
+from robot_side.surroundings.blocks import bound_blocks
+from robot_side.surroundings.bounds import write_around
+from robot_side.surroundings.kinds.layout import NUMBERS, SHAPE_NUMBERS, VELOCITY
+from robot_side.surroundings.placing import place_one
+from robot_side.surroundings.scene_columns import SCENE, SceneColumns
+from robot_side.surroundings.validity import is_possible
+
+WRITTEN: Final = 0
+FLAT: Final = 1
+"""One has no volume: nothing is written."""
+IMPOSSIBLE: Final = 2
+"""One has numbers that cannot be: nothing is written."""
+_scene = SCENE.at
+
+
+@inlined
+def _take(numbers: FloatArray, own: int, shape: FloatArray) -> None:
+    for entry in range(NUMBERS):
+        shape[0, entry] = numbers[own, entry]
+
+
+@inlined
+def _judged(scene: SceneColumns, things: IntArray, numbers: FloatArray, measured: bool) -> int:
+    """What is to come of the numbers; nothing is written yet."""
+    shape, bound = np.empty((1, NUMBERS)), np.empty((1, 4))
+    own, found = 0, WRITTEN
+    for thing in things:
+        for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
+            if not is_possible(scene.kinds[row], numbers, own):
+                return IMPOSSIBLE
+            _take(numbers, own, shape)
+            if not place_one(scene.kinds[row], shape, 0, bound, 0) > 0.0:
+                found = FLAT
+            own += 1
+    for k in range(own, own + things.size):
+        for axis in range(VELOCITY, VELOCITY + 3):
+            if measured and not math.isfinite(numbers[k, axis]):
+                return IMPOSSIBLE
+    return found
+
+
+@compiled(input_array(2), input_indices(), input_indices(), input_indices(), TRUTH, BUNDLE, returns=COUNT)
+def write_movers(
+    numbers: FloatArray, things: IntArray, places: IntArray, blocks: IntArray, measured: bool, bundle: IntArray
+) -> int:
+    """Write the primitives of the objects `things` (m,), in their order, and bound the blocks; what came of it.
+
+    numbers (n + m, 20) as in `movers`; places (m,) in the order of blocks, or -1. measured: with velocities.
+    """
+    scene = _scene(bundle)
+    found = _judged(scene, things, numbers, measured)
+    if found != WRITTEN:
+        return found
+    shape, own = np.empty((1, NUMBERS)), 0
+    for k in range(things.size):
+        thing, volume = things[k], 0.0
+        first, end = scene.first_rows[thing], scene.first_rows[thing + 1]
+        for row in range(first, end):
+            _take(numbers, own, shape)
+            volume += place_one(scene.kinds[row], shape, 0, scene.bounds, row)
+            for entry in range(SHAPE_NUMBERS):
+                scene.shapes[row, entry] = shape[0, entry]
+            own += 1
+        scene.object_volumes[thing] = volume
+        write_around(scene.bounds, first, end, scene.object_bounds[thing])
+        if places[k] >= 0:
+            for entry in range(4):
+                scene.ordered_bounds[places[k], entry] = scene.object_bounds[thing, entry]
+    bound_blocks(scene.ordered_bounds, blocks, scene.block_bounds, scene.group_bounds)
+    return WRITTEN
