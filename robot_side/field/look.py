@@ -133,16 +133,16 @@ def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) 
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     if rows == 1:
         entry = scratch.entries[0]
-        entry.row, entry.enters, entry.again = scratch.rows[0], pair.contact, math.inf
+        entry.row, entry.enters, entry.again, entry.convex = scratch.rows[0], pair.contact, math.inf, pair.closing > 0.0
         return 1
     count, center = 0, load(scratch.spheres, pair.sphere)
     for k in range(rows):
         row = scratch.rows[k]
         if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
-            enters, _ = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
+            enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
             if enters <= reach:
                 entry = scratch.entries[count]
-                entry.row, entry.enters, entry.again = row, enters, math.inf
+                entry.row, entry.enters, entry.again, entry.convex = row, enters, math.inf, closing > 0.0
                 count += 1
     return count
 

@@ -27,8 +27,9 @@ which it first touches, 0 where it overlaps (`overlaps`). closing: û·n of the 
 lead: strengths begin sooner by this, as the object comes nearer, and by D_σ of an uninflated sphere. expected:
 D_σ(P) - D_σ(0.5) of an object that is to be touched (`touchable`), else 0."""
 
-ENTRY: Final = np.dtype([("row", np.int64), ("enters", np.float64), ("again", np.float64)])
-"""A primitive's row that a pair's sphere enters, at which distance, and where it may rise again after it has fallen."""
+ENTRY: Final = np.dtype([("row", np.int64), ("enters", np.float64), ("again", np.float64), ("convex", np.int64)])
+"""A primitive's row that a pair's sphere enters, and at which distance. again: where its overlap may rise again after
+it has fallen, which that of a convex one never does."""
 
 
 class Count(IntEnum):

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array, together
 from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import sphere_volume
 
@@ -43,6 +43,8 @@ OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMB
 room (3,) for dV/dcentre. It returns V."""
 CONTACT: Final[tuple[Any, ...]] = (BUNDLE, COUNT, *(NUMBER,) * 8, TRUTH)
 """What a kernel of contacts with meshes takes (see `placed_meshes`)."""
+MESH_CONTACT: Final[Any] = together(NUMBER, NUMBER)
+"""And returns: a `Contact`."""
 TOUCHING_M: Final = 1e-7
 """What is no farther off, and no deeper, than this touches: it overlaps by nothing yet, and may go on to do so."""
 LEAST_WAY_M: Final = 1e-12
