@@ -30,7 +30,7 @@ from robot_side.field.samples import Profile
 from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
+from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH, Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
 
 MARGIN_M: Final = 0.012
@@ -68,16 +68,26 @@ def _near_rows(
 
 
 @building_block
-def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> float:
-    """The least distance at which any of a cluster's spheres touches any of the first rows kept."""
+def _cluster_contact(
+    bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float, roughly: bool
+) -> tuple[float, bool]:
+    """The least distance at which any of a cluster's spheres touches any of the first rows kept; whether it is rough.
+
+    roughly: of meshes, the boxes around them count.
+    """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    center, radius, least = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf
+    center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
     for k in range(rows):
         row, near = scratch.rows[k], min(reach, least)
         kind = scene.kinds[row]
         if kind == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius):
-            least = min(least, contact_with(scene, row, center, along, radius, near, False)[0])
-    return least
+            if roughly:
+                found, _ = contact(kind, scene.shapes, row, center, radius, along, near)
+                rough = rough or (kind == MESH and found <= near)
+            else:
+                found, _ = contact_with(scene, row, center, along, radius, near, False)
+            least = min(least, found)
+    return least, rough
 
 
 @building_block
@@ -173,19 +183,21 @@ def _look_at(
 ) -> None:
     """Shorten the distances by one object, of which the first rows are kept: best first.
 
-    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Pairs that
-    wait lie at the other end.
+    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Clusters of
+    which the contact is known but roughly follow in number, as if there were more. Pairs that wait lie at the other end.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
-    far = reach + margin + early
-    for cluster in range((spheres + CLUSTER - 1) // CLUSTER):
-        bound = _cluster_contact(bundles, rows, cluster, along, far)
+    far, nearest = reach + margin + early, math.inf
+    clusters = (spheres + CLUSTER - 1) // CLUSTER
+    for cluster in range(clusters):
+        bound, rough = _cluster_contact(bundles, rows, cluster, along, far, True)
         if bound <= far:
             # A cluster that may overlap comes first.
-            count = push(keys, items, count, bound - early if bound > 0.0 else -math.inf, -1 - cluster)
+            key = bound - early if bound > 0.0 or rough else -math.inf
+            count = push(keys, items, count, key, -1 - cluster - (clusters if rough else 0))
     while count > 0 and keys[0] < _last_to_count(scratch, margin):
-        item, clear = items[0], keys[0] > -math.inf
+        item, first, clear = items[0], keys[0], keys[0] > -math.inf
         count = drop_first(keys, items, count)
         if item >= 0:
             if _follow(bundles, item, rows, thing, along, reach, True):
@@ -193,6 +205,16 @@ def _look_at(
                 items[items.size - waiting] = item
             continue
         last = min(far, _last_to_count(scratch, margin) + early)
+        if -1 - item >= clusters:
+            # No farther than a margin beyond the nearest one, at first: most clusters never come nearer.
+            near = min(last, max(nearest, first + early) + margin)
+            bound, _ = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
+            if bound <= near:
+                nearest = min(nearest, bound)
+                count = push(keys, items, count, bound - early if bound > 0.0 else -math.inf, item + clusters)
+            elif near < last:
+                count = push(keys, items, count, near - early, item)
+            continue
         for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
             for uninflated in (False, True):
                 pair = _pair(

@@ -52,6 +52,14 @@ LEAST_WAY_M: Final = 1e-12
 CLOSING: Final = 1e-9
 """Slower than this share of the way, what is beside does not come nearer."""
 MOST_STEPS: Final = 60
+ENLARGED: Final = 1.0 + 1e-9
+"""Bounds around meshes are enlarged by this, so that rounding never passes over what is touched."""
+
+
+@inlined
+def way_by(part: float) -> float:
+    """The way on which what moves by `part` of it moves by a metre, at most 1e15 m."""
+    return 1.0 / part if abs(part) > 1e-15 else 1e15
 
 
 @inlined

@@ -6,8 +6,10 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
+from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.surroundings.kinds import box
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, TOUCHING_M, Contact, way_by
 
 _Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -18,6 +20,19 @@ def place(columns: _Columns, k: int, shape: FloatArray, bound: FloatArray) -> fl
     box.place((columns[0], columns[1], columns[2]), k, shape, bound)
     bound[3] = columns[3][k]
     return float(columns[4][k])
+
+
+@inlined
+def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
+    """Where a sphere enters the box around a mesh, enlarged by the radius: no later than it touches the mesh."""
+    enter, leave, grown = 0.0, reach, radius * ENLARGED + TOUCHING_M
+    offset = subtract(start, load(shapes, row))
+    for k in range(3):
+        axis = shapes[row, 3 + k], shapes[row, 6 + k], shapes[row, 9 + k]
+        place, by, half = dot(axis, offset), way_by(dot(axis, along)), shapes[row, 12 + k] + grown
+        first, last = (-half - place) * by, (half - place) * by
+        enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+    return (enter, 0.0) if enter <= leave else NEVER
 
 
 def _derive(objects: Any) -> tuple[FloatArray, ...]:
@@ -41,7 +56,7 @@ KIND: Final = Kind(
     placed=lambda positions, rotations, index: (index, positions, rotations),
     place=place,
     nearest=box.nearest,
-    contact=box.contact,
+    contact=contact,
     centers=lambda middles, *_: middles,
     in_box=True,
     rows=((3,), (3, 3), (3,), (), ()),

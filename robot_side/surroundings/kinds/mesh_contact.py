@@ -6,7 +6,7 @@ Everything here is in the mesh's own frame; the walks are those of `tree_queries
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
@@ -19,10 +19,7 @@ from robot_side.overlap.meshes.tree_queries import (
     to_triangle,
     touches_surface,
 )
-from robot_side.surroundings.kinds.layout import CLOSING, TOUCHING_M
-
-_ENLARGED: Final = 1.0 + 1e-9
-"""Bounds are enlarged by this, so that rounding never passes over what is touched."""
+from robot_side.surroundings.kinds.layout import CLOSING, ENLARGED, TOUCHING_M, way_by
 
 
 class Sweep(NamedTuple):
@@ -33,18 +30,13 @@ class Sweep(NamedTuple):
     radius: float
     reach: float
     by_axis: Vector
-    """The way for a metre along each axis, at most 1e15"""
-
-
-@inlined
-def _way_along(part: float) -> float:
-    return 1.0 / part if abs(part) > 1e-15 else 1e15
+    """The way on which it moves by a metre along each axis"""
 
 
 @inlined
 def swept(start: Vector, along: Vector, radius: float, reach: float) -> Sweep:
     """Make a sweep."""
-    return Sweep(start, along, radius, reach, (_way_along(along[0]), _way_along(along[1]), _way_along(along[2])))
+    return Sweep(start, along, radius, reach, (way_by(along[0]), way_by(along[1]), way_by(along[2])))
 
 
 @building_block
@@ -59,7 +51,7 @@ def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
 def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
     """The way at which a node's box, enlarged by the radius, is entered; infinite beyond the reach."""
     enter, leave = 0.0, reach
-    grown = sweep.radius * _ENLARGED + TOUCHING_M
+    grown = sweep.radius * ENLARGED + TOUCHING_M
     for axis in range(3):
         first = (tables.boxes[node, axis] - grown - sweep.start[axis]) * sweep.by_axis[axis]
         last = (tables.boxes[node, 3 + axis] + grown - sweep.start[axis]) * sweep.by_axis[axis]
@@ -76,7 +68,7 @@ def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) ->
     offset = subtract(load(tables.spheres, triangle), sweep.start)
     part = min(max(dot(offset, sweep.along), 0.0), reach)
     apart = subtract(offset, scale(part, sweep.along))
-    most: float = (tables.spheres[triangle, 3] + sweep.radius) * _ENLARGED + TOUCHING_M
+    most: float = (tables.spheres[triangle, 3] + sweep.radius) * ENLARGED + TOUCHING_M
     return dot(apart, apart) > most * most
 
 
