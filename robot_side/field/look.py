@@ -137,13 +137,21 @@ def _pair(
     return pair
 
 
+@inlined
+def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
+    """Write an entry without tangents."""
+    entry.row, entry.enters, entry.again, entry.volume, entry.slope = row, enters, math.inf, 0.0, 0.0
+    entry.closing = min(closing + _ROUNDED, 1.0) if closing > 0.0 else 0.0
+    entry.root_0, entry.root_1 = math.inf, math.inf
+    entry.at_0, entry.at_1, entry.steep_0, entry.steep_1 = 0.0, 0.0, 0.0, 0.0
+
+
 @building_block
 def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
     """Write which of the rows kept a pair's sphere enters, and where; how many."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     if rows == 1:
-        entry = scratch.entries[0]
-        entry.row, entry.enters, entry.again, entry.convex = scratch.rows[0], pair.contact, math.inf, pair.closing > 0.0
+        _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
         return 1
     count, center = 0, load(scratch.spheres, pair.sphere)
     for k in range(rows):
@@ -151,8 +159,7 @@ def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) 
         if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
             enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
             if enters <= reach:
-                entry = scratch.entries[count]
-                entry.row, entry.enters, entry.again, entry.convex = row, enters, math.inf, closing > 0.0
+                _write_entry(scratch.entries[count], row, enters, closing)
                 count += 1
     return count
 
@@ -165,8 +172,7 @@ def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, r
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
     entries = _enter(bundles, pair, rows, along, end)
     least = min(math.pi * pair.radius * LEAST_DEPTH_M * LEAST_DEPTH_M, 0.5 * scene.object_volumes[thing])
-    closing = min(pair.closing + _ROUNDED, 1.0) if entries == 1 and pair.closing > 0.0 else 0.0
-    return follow(Profile(pair, entries, center, along, MARGIN_M, end), closing, least, waits, bundles)
+    return follow(Profile(pair, entries, center, along, MARGIN_M, end), least, waits, bundles)
 
 
 @building_block

@@ -51,8 +51,9 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
         slope = push[0] * profile.along[0] + push[1] * profile.along[1] + push[2] * profile.along[2]
         volume, gradient = volume + part, add(gradient, (push[0], push[1], push[2]))
         scratch.counts[Count.OVERLAPS] += 1
+        entry.volume, entry.slope = part, slope
         rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3
-        if not (entry.convex or rising):
+        if entry.closing == 0.0 and not rising:
             # It may rise again, where the next triangle in front is touched.
             left = profile.end - at
             entry.again = at + contact_in_front(scene, entry.row, center, profile.along, radius, left)
