@@ -22,6 +22,7 @@ _TOLERANCE_M: Final = 2e-5
 """A strength's beginning is known this well."""
 _NEWTON_M: Final = 5e-5
 """From so near, Newton's method goes to where it begins."""
+_DOUBT_M: Final = 5e-4
 _DOUBT: Final = 1.0 / 6.0
 """The cubic is trusted up to this share of the distance between its samples to say that a strength begins too late."""
 _MOST_STEPS: Final = 12
@@ -170,7 +171,7 @@ def _take(
         latest = latest_of(profile, level, distances)
         if latest > a.at:
             found = a if a.volume >= wanted else on_cubic(a, b, wanted)
-            if found.at < latest + _DOUBT * (b.at - a.at) and a.volume < wanted:
+            if found.at < latest + min(_DOUBT * (b.at - a.at), _DOUBT_M) and a.volume < wanted:
                 found = _crossing(profile, a, b, wanted, latest, bundles)
                 # What is known there serves the next strength, too.
                 a = found
@@ -195,6 +196,8 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
             return True
         scratch.counts[Count.PROFILES] += 1
         keep_tangents(profile, 0.0, True, entries)
+        if not may_count(profile, first.volume, max(least, margin * lean), distances, entries):
+            return False
         rises, rise = _first_rise(profile, first, rises, max(least, margin * lean), bundles)
         if not (rises and may_count(profile, rise.floor, rise.least, distances, entries)):
             return False

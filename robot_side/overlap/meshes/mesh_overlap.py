@@ -132,7 +132,7 @@ def rounded_overlap(
         return 0.0, (0.0, 0.0, 0.0)
     if most_2 <= radius * radius * (1.0 - 1e-12):
         return tables.volumes[mesh], (0.0, 0.0, 0.0)
-    count = gather_near(tables, mesh, center, radius, near)
+    count = _keep_near(tables, center, radius, near, gather_near(tables, mesh, center, radius, near))
     count, flat = _keep_touched(tables, center, radius, near, count)
     if count == 0:
         return sphere_volume(radius) if is_inside(tables, mesh, center) else 0.0, (0.0, 0.0, 0.0)
@@ -153,23 +153,41 @@ def rounded_overlap(
 
 
 @building_block
-def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
-    """Keep those triangles in `near` that the ball touches: how many, and whether they lie in one plane."""
-    kept, flat = 0, True
+def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> int:
+    """Keep those triangles in `near` whose planes the ball meets; how many."""
+    kept = 0
     for index in range(count):
         triangle = near[index]
-        corner, normal = corner_of(tables, triangle, 0), corner_of(tables, triangle, 3)
-        height = dot(normal, subtract(center, corner))
-        if abs(height) >= radius or squared_distance(tables, triangle, center) >= radius * radius:
-            continue
+        apart = dot(corner_of(tables, triangle, 3), subtract(center, corner_of(tables, triangle, 0)))
         near[kept] = triangle
-        kept += 1
-        if flat and kept > 1:
-            other = corner_of(tables, near[0], 3)
-            off = subtract(normal, other)
-            lifted = dot(other, subtract(corner, corner_of(tables, near[0], 0)))
-            flat = dot(off, off) <= _SAME_PLANE * _SAME_PLANE and abs(lifted) <= _SAME_PLANE * radius
-    return kept, flat
+        kept += 1 if abs(apart) < radius else 0
+    return kept
+
+
+@building_block
+def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
+    """Keep those triangles in `near` that the ball touches, until two planes are; how many, and whether it is one."""
+    kept = 0
+    for index in range(count):
+        triangle = near[index]
+        if squared_distance(tables, triangle, center) < radius * radius:
+            near[kept] = triangle
+            kept += 1
+            if not _in_plane(tables, near[0], triangle, radius):
+                for other in range(index + 1, count):
+                    near[kept] = near[other]
+                    kept += 1
+                return kept, False
+    return kept, True
+
+
+@inlined
+def _in_plane(tables: MeshTables, triangle: int, other: int, radius: float) -> bool:
+    """Whether two triangles lie in one plane."""
+    normal = corner_of(tables, triangle, 3)
+    off = subtract(normal, corner_of(tables, other, 3))
+    lifted = dot(normal, subtract(corner_of(tables, triangle, 0), corner_of(tables, other, 0)))
+    return dot(off, off) <= _SAME_PLANE * _SAME_PLANE and abs(lifted) <= _SAME_PLANE * radius
 
 
 @inlined
