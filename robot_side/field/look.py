@@ -30,7 +30,7 @@ from robot_side.field.samples import Profile
 from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
+from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH, Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
 
 MARGIN_M: Final = 0.012
@@ -68,15 +68,28 @@ def _near_rows(
 
 
 @building_block
-def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> float:
+def _cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> tuple[float, bool]:
+    """No more than `_cluster_contact`, of meshes the boxes around them; whether there are any."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
+    for k in range(rows):
+        row, near = scratch.rows[k], min(reach, least)
+        kind = scene.kinds[row]
+        if kind == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius):
+            found, _ = contact(kind, scene.shapes, row, center, radius, along, near)
+            least, rough = min(least, found), rough or kind == MESH
+    return least, rough
+
+
+@building_block
+def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float, clear: bool) -> float:
     """The least distance at which any of a cluster's spheres touches any of the first rows kept."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf
     for k in range(rows):
         row, near = scratch.rows[k], min(reach, least)
-        kind = scene.kinds[row]
-        if kind == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius):
-            least = min(least, contact_with(scene, row, center, along, radius, near, False)[0])
+        if scene.kinds[row] == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius):
+            least = min(least, contact_with(scene, row, center, along, radius, near, clear)[0])
     return least
 
 
@@ -127,22 +140,29 @@ def _pair(
     return pair
 
 
+@inlined
+def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
+    """Write an entry without tangents."""
+    entry.row, entry.enters, entry.again, entry.volume, entry.slope = row, enters, math.inf, 0.0, 0.0
+    entry.closing = min(closing + _ROUNDED, 1.0) if closing > 0.0 else 0.0
+    entry.root_0, entry.root_1 = math.inf, math.inf
+    entry.at_0, entry.at_1, entry.steep_0, entry.steep_1 = 0.0, 0.0, 0.0, 0.0
+
+
 @building_block
 def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
     """Write which of the rows kept a pair's sphere enters, and where; how many."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     if rows == 1:
-        entry = scratch.entries[0]
-        entry.row, entry.enters, entry.again = scratch.rows[0], pair.contact, math.inf
+        _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
         return 1
     count, center = 0, load(scratch.spheres, pair.sphere)
     for k in range(rows):
         row = scratch.rows[k]
         if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
-            enters, _ = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
+            enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
             if enters <= reach:
-                entry = scratch.entries[count]
-                entry.row, entry.enters, entry.again = row, enters, math.inf
+                _write_entry(scratch.entries[count], row, enters, closing)
                 count += 1
     return count
 
@@ -153,10 +173,38 @@ def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, r
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     pair = scratch.pairs[item]
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
-    entries = _enter(bundles, pair, rows, along, end)
+    # No sample that matters lies more than a margin beyond the last distance that counts.
+    entered = min(end, _last_to_count(scratch, MARGIN_M) + MARGIN_M + pair.lead)
+    entries = _enter(bundles, pair, rows, along, entered)
     least = min(math.pi * pair.radius * LEAST_DEPTH_M * LEAST_DEPTH_M, 0.5 * scene.object_volumes[thing])
-    closing = min(pair.closing + _ROUNDED, 1.0) if entries == 1 and pair.closing > 0.0 else 0.0
-    return follow(Profile(pair, entries, center, along, MARGIN_M, end), closing, least, waits, bundles)
+    return follow(Profile(pair, entries, center, along, MARGIN_M, end), least, waits, bundles)
+
+
+@building_block
+def _pairs(
+    bundles: Bundles,
+    place: int,
+    i: int,
+    rows: int,
+    thing: int,
+    object_class: int,
+    early: float,
+    along: Vector,
+    widest: float,
+    reach: float,
+    clear: bool,
+) -> int:
+    """Write the pairs of a sphere and an object that touch within the reach; how many."""
+    found = 0
+    for uninflated in (False, True):
+        pair = _pair(
+            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, widest, reach, clear
+        )
+        found += 1 if pair.contact < math.inf else 0
+        # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
+        if not pair.overlaps:
+            break
+    return found
 
 
 @building_block
@@ -173,40 +221,54 @@ def _look_at(
 ) -> None:
     """Shorten the distances by one object, of which the first rows are kept: best first.
 
-    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Pairs that
-    wait lie at the other end.
+    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Clusters of
+    which a bound is known alone follow in number, as if there were more. Pairs that wait lie at the other end.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
-    far = reach + margin + early
-    for cluster in range((spheres + CLUSTER - 1) // CLUSTER):
-        bound = _cluster_contact(bundles, rows, cluster, along, far)
+    far, nearest = reach + margin + early, math.inf
+    clusters = (spheres + CLUSTER - 1) // CLUSTER
+    for cluster in range(clusters):
+        bound, rough = _cluster_bound(bundles, rows, cluster, along, far)
         if bound <= far:
-            # A cluster that may overlap comes first.
-            count = push(keys, items, count, bound - early if bound > 0.0 else -math.inf, -1 - cluster)
+            item = -1 - cluster - (clusters if rough else 0)
+            count = push(keys, items, count, _key(bound, early, rough), item)
     while count > 0 and keys[0] < _last_to_count(scratch, margin):
-        item, clear = items[0], keys[0] > -math.inf
+        item, first = items[0], keys[0]
         count = drop_first(keys, items, count)
+        last = min(far, _last_to_count(scratch, margin) + early)
         if item >= 0:
             if _follow(bundles, item, rows, thing, along, reach, True):
                 waiting += 1
                 items[items.size - waiting] = item
-            continue
-        last = min(far, _last_to_count(scratch, margin) + early)
-        for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
-            for uninflated in (False, True):
-                pair = _pair(
-                    bundles, pairs, i, uninflated, rows, thing, object_class, early, along, widest, last, clear
-                )
-                if pair.contact < math.inf:
-                    count = push(keys, items, count, pair.contact - pair.lead, pairs)
-                    pairs += 1
-                # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
-                if not pair.overlaps:
-                    break
+        elif item < -clusters:
+            # No farther than a margin beyond the nearest one, at first: most clusters never come nearer.
+            near = min(last, max(nearest, first + early) + margin)
+            bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
+            if bound <= near:
+                # Something may rise, and what overlaps is asked for.
+                bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
+                nearest = min(nearest, bound)
+                count = push(keys, items, count, _key(bound, early, False), item + clusters)
+            elif near < last:
+                count = push(keys, items, count, near - early, item)
+        else:
+            clear = first > -math.inf
+            for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
+                met = _pairs(bundles, pairs, i, rows, thing, object_class, early, along, widest, last, clear)
+                for place in range(pairs, pairs + met):
+                    pair = scratch.pairs[place]
+                    count = push(keys, items, count, pair.contact - pair.lead, place)
+                pairs += met
     for k in range(waiting):
         _follow(bundles, items[items.size - 1 - k], rows, thing, along, reach, False)
     scratch.counts[Count.PAIRS] += pairs
+
+
+@inlined
+def _key(bound: float, early: float, rough: bool) -> float:
+    """The place in the queue: a cluster that may overlap comes first."""
+    return bound - early if bound > 0.0 or rough else -math.inf
 
 
 LOOK: Final = (

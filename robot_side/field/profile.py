@@ -11,16 +11,20 @@ asked.
 import math
 from typing import Final, NamedTuple
 
+from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.field.samples import NOTHING, Profile, Sample, next_entry, on_cubic, peak, sample
+from robot_side.field.samples import NOTHING, Profile, Sample, cubic, next_entry, on_cubic, peak, sample
 from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count
-from robot_side.field.sooner import begin, latest_of, matters, may_count
+from robot_side.field.sooner import begin, keep_tangents, latest_of, matters, may_count
 
 scratch_at = SCRATCH.at
 _TOLERANCE_M: Final = 2e-5
 """A strength's beginning is known this well."""
+_NEWTON_M: Final = 5e-5
+"""From so near, Newton's method goes to where it begins."""
 _DOUBT_M: Final = 5e-4
-"""The cubic is trusted this well to say that a strength begins too late to count."""
+_DOUBT: Final = 1.0 / 6.0
+"""The cubic is trusted up to this share of the distance between its samples to say that a strength begins too late."""
 _MOST_STEPS: Final = 12
 _MOST_SAMPLES: Final = 400
 _MOST_OF_A_PEAK: Final = 4
@@ -45,18 +49,21 @@ class Rise(NamedTuple):
 
 
 @building_block
-def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, bundles: Bundles) -> Sample:
-    """The first distance between two samples at which V passes a volume."""
+def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: float, bundles: Bundles) -> Sample:
+    """The first distance between two samples at which V passes a volume; or one from `latest` on, if that is later."""
     for step in range(_MOST_STEPS):
         guess = on_cubic(a, b, wanted)
         if b.at - a.at <= _TOLERANCE_M:
             return guess
         # The cubic converges slowly where V has a kink.
         at = guess.at if step < 3 else 0.5 * (a.at + b.at)
-        found, _, _ = sample(profile, at, bundles)
-        if abs(found.volume - wanted) <= _TOLERANCE_M * found.slope:
-            return found
-        if found.volume < wanted:
+        found, _, _ = sample(profile, min(at, latest), bundles)
+        off = found.volume - wanted
+        if abs(off) <= _NEWTON_M * found.slope:
+            return Sample(found.at - off / found.slope, wanted, found.slope)
+        if off < 0.0:
+            if found.at >= latest:
+                return found
             a = found
         else:
             b = found
@@ -164,8 +171,8 @@ def _take(
         latest = latest_of(profile, level, distances)
         if latest > a.at:
             found = a if a.volume >= wanted else on_cubic(a, b, wanted)
-            if found.at < latest + _DOUBT_M and a.volume < wanted:
-                found = _crossing(profile, a, b, wanted, bundles)
+            if found.at < latest + min(_DOUBT * (b.at - a.at), _DOUBT_M) and a.volume < wanted:
+                found = _crossing(profile, a, b, wanted, latest, bundles)
                 # What is known there serves the next strength, too.
                 a = found
             if found.at < latest:
@@ -175,46 +182,66 @@ def _take(
 
 
 @building_block
-def follow(profile: Profile, closing: float, least: float, waits: bool, bundles: Bundles) -> bool:
+def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> bool:
     """Shorten the distances at which strengths begin by one pair; True: ask again, after all other pairs.
 
-    closing: û·n of the plane in which one convex primitive is touched, above 0; 0 for several primitives, or a mesh.
     least: V_min. waits: a pair whose overlap falls at first may wait, as it takes many samples.
     """
     scratch = scratch_at(bundles.scratch)
-    pair, distances, margin = profile.pair, scratch.distances_m, profile.margin
-    nothing = Sample(pair.contact, 0.0, 0.0)
-    rise = Rise(nothing, 0.0, least)
+    pair, distances, entries, margin = profile.pair, scratch.distances_m, scratch.entries, profile.margin
+    rise = Rise(Sample(pair.contact, 0.0, 0.0), 0.0, least)
     if pair.overlaps:
         first, lean, rises = sample(profile, 0.0, bundles)
         if waits and rises and first.slope <= 0.0:
             return True
         scratch.counts[Count.PROFILES] += 1
-        rises, rise = _first_rise(profile, first, rises, max(least, margin * lean), bundles)
-        if not (rises and may_count(profile, closing, rise.floor, rise.least, rise.free, nothing, distances)):
+        keep_tangents(profile, 0.0, True, entries)
+        if not may_count(profile, first.volume, max(least, margin * lean), distances, entries):
             return False
-    elif not may_count(profile, closing, 0.0, least, nothing, nothing, distances):
+        rises, rise = _first_rise(profile, first, rises, max(least, margin * lean), bundles)
+        if not (rises and may_count(profile, rise.floor, rise.least, distances, entries)):
+            return False
+    elif not may_count(profile, 0.0, least, distances, entries):
         return False
     else:
         scratch.counts[Count.PROFILES] += 1
     free, floor = rise.free, rise.floor
     full, _, may_rise = sample(profile, free.at + margin, bundles)
-    reference, smooth = max(rise.least, full.volume - floor), closing > 0.0 and full.slope > 0.0
-    if not may_count(profile, closing, floor, reference, full, free, distances):
+    reference, smooth = max(rise.least, full.volume - floor), keep_tangents(profile, full.at, False, entries)
+    if not may_count(profile, floor, reference, distances, entries):
+        return False
+    half, _, _ = sample(profile, free.at + _EARLY * margin, bundles)
+    keep_tangents(profile, half.at, True, entries)
+    if not may_count(profile, floor, reference, distances, entries):
         return False
     level, stored, last = 0, 0, free
     if smooth:
-        # The overlap with one convex primitive rises until there.
-        half, _, _ = sample(profile, free.at + _EARLY * margin, bundles)
-        if not may_count(profile, closing, floor, reference, full, half, distances):
-            return False
+        # The overlap with convex primitives rises until there.
         level = _take(profile, level, free, half, floor, reference, bundles)
         level = _take(profile, level, half, full, floor, reference, bundles)
         last = full
+    elif _is_late(profile, free, half, full, floor, reference, distances):
+        return False
     else:
         reference, stored = max(reference, _most_over_margin(profile, rise, full, bundles)), SAMPLES
     _go_on(profile, level, last, stored, may_rise, rise, reference, bundles)
     return False
+
+
+@building_block
+def _is_late(
+    profile: Profile, free: Sample, half: Sample, full: Sample, floor: float, reference: float, distances: FloatArray
+) -> bool:
+    """Whether an overlap that seems to rise all along the margin lets every strength begin too late to count."""
+    if not (floor <= half.volume <= full.volume and min(free.slope, half.slope, full.slope) >= 0.0):
+        return False
+    late = True
+    for level in range(STRENGTHS):
+        at = min(latest_of(profile, level, distances) + _DOUBT * (full.at - half.at), full.at)
+        a, b = (free, half) if at < half.at else (half, full)
+        reached = cubic(a, b, max(at - a.at, 0.0) / (b.at - a.at))
+        late = late and reached - floor < (level + 0.5) / STRENGTHS * reference
+    return late
 
 
 @building_block

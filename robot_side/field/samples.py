@@ -6,7 +6,6 @@ from typing import Any, Final, NamedTuple
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.field.scratch import SCRATCH, Bundles, Count, ScratchColumns
-from robot_side.surroundings.kinds.layout import MESH
 from robot_side.surroundings.overlaps import overlap
 from robot_side.surroundings.scene_columns import SCENE, contact_in_front
 
@@ -52,9 +51,10 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
         slope = push[0] * profile.along[0] + push[1] * profile.along[1] + push[2] * profile.along[2]
         volume, gradient = volume + part, add(gradient, (push[0], push[1], push[2]))
         scratch.counts[Count.OVERLAPS] += 1
+        entry.volume, entry.slope = part, slope
         rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3
-        if kind == MESH and not rising:
-            # A mesh may rise again, where the next triangle in front is touched.
+        if entry.closing == 0.0 and not rising:
+            # It may rise again, where the next triangle in front is touched.
             left = profile.end - at
             entry.again = at + contact_in_front(scene, entry.row, center, profile.along, radius, left)
             rising = entry.again <= at

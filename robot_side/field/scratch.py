@@ -27,8 +27,16 @@ which it first touches, 0 where it overlaps (`overlaps`). closing: û·n of the 
 lead: strengths begin sooner by this, as the object comes nearer, and by D_σ of an uninflated sphere. expected:
 D_σ(P) - D_σ(0.5) of an object that is to be touched (`touchable`), else 0."""
 
-ENTRY: Final = np.dtype([("row", np.int64), ("enters", np.float64), ("again", np.float64)])
-"""A primitive's row that a pair's sphere enters, at which distance, and where it may rise again after it has fallen."""
+ENTRY: Final = np.dtype(
+    [
+        ("row", np.int64),
+        *((name, np.float64) for name in ("enters", "closing", "again", "volume", "slope")),
+        *((f"{name}_{place}", np.float64) for place in (0, 1) for name in ("at", "root", "steep")),
+    ]
+)
+"""A primitive's row that a pair's sphere enters, at which distance, and û·n of the plane in which it does so: above 0
+where it is convex. again: where its overlap may rise again after it has fallen. volume, slope: of the newest sample.
+at, root, steep: where the tangents to the overlap's cube root touch it, and how steeply."""
 
 
 class Count(IntEnum):

@@ -5,11 +5,13 @@ primitive is touched in, Brunn and Minkowski's concave cube root, the sphere's d
 """
 
 import math
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.field.samples import Profile, Sample
+from robot_side.field.samples import NOTHING, Profile
 from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
 
 _SLACK_M: Final = 5e-5
@@ -61,34 +63,73 @@ def _uncovered(distance: float, radius: float) -> float:
 
 
 @inlined
-def _root(sample: Sample) -> tuple[float, float]:
-    """The cube root of an overlap, and its slope; concave while one convex primitive is entered (Brunn, Minkowski)."""
-    root = sample.volume ** (1.0 / 3.0)
-    return (root, sample.slope / (3.0 * root * root)) if sample.slope > 0.0 else (math.inf, 0.0)
+def _touched(part: Any, least: float) -> tuple[float, float]:
+    """The cube root of a part's overlap in the newest sample, and its slope; infinite where it has no good tangent."""
+    if not part.volume > least:
+        return math.inf, 0.0
+    root = part.volume ** (1.0 / 3.0)
+    return root, part.slope / (3.0 * root * root)
 
 
 @building_block
-def may_count(
-    profile: Profile, closing: float, floor: float, full: float, first: Sample, second: Sample, distances: FloatArray
-) -> bool:
+def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray) -> bool:
+    """Keep the tangents that the newest sample, at `at`, gives; whether V rises up to there.
+
+    The cube root is concave while one convex primitive is entered (Brunn, Minkowski), so that a tangent bounds it.
+    """
+    least, falls = _ENOUGH * profile.pair.radius**3, -NOTHING * math.pi * profile.pair.radius**2
+    rises = True
+    for k in range(profile.entries):
+        part = entries[k]
+        if part.enters > at:
+            continue
+        rises = rises and part.closing > 0.0 and part.slope >= falls
+        root, steep = _touched(part, least)
+        if second:
+            part.at_1, part.root_1, part.steep_1 = at, root, steep
+        else:
+            part.at_0, part.root_0, part.steep_0 = at, root, steep
+    return rises
+
+
+@inlined
+def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
+    """The most that a cube root is; where it falls, nothing is known of what has been before."""
+    if steep > 0.0:
+        return root + steep * (at - touches)
+    return root if at >= touches else math.inf
+
+
+@inlined
+def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
+    """The most that V is at a distance; infinite where a primitive is not convex."""
+    most = 0.0
+    for k in range(profile.entries):
+        part = entries[k]
+        if part.enters < at:
+            by_first = _by_tangent(at, part.at_0, part.root_0, part.steep_0)
+            root = max(min(by_first, _by_tangent(at, part.at_1, part.root_1, part.steep_1)), 0.0)
+            own = root * root * root if part.closing > 0.0 else math.inf
+            if part.closing > 0.0 and part.enters > 0.0:
+                own = min(own, _cap(part.closing * (at - part.enters), profile.pair.radius))
+            most += own
+    return most
+
+
+@building_block
+def may_count(profile: Profile, floor: float, full: float, distances: FloatArray, entries: np.ndarray) -> bool:
     """Whether a pair may make any strength begin sooner.
 
-    closing: see `follow`. floor: V(0). full: at least what full strength takes. first, second: samples whose tangents
-    bound what one convex primitive adds, of volume 0 for none.
+    floor: V(0). full: at least what full strength takes. entries: with what bounds them.
     """
-    pair, least = profile.pair, _ENOUGH * profile.pair.radius**3
-    root, steep = _root(first) if first.volume > least else (math.inf, 0.0)
-    other_root, other_steep = _root(second) if second.volume > least else (math.inf, 0.0)
+    pair = profile.pair
     for level in range(STRENGTHS):
         at = latest_of(profile, level, distances)
         if at <= pair.contact:
             continue
-        most = _uncovered(at - pair.contact, pair.radius)
-        if closing > 0.0:
-            bound = min(root + steep * (at - first.at), other_root + other_steep * (at - second.at))
-            most = min(most, max(bound, 0.0) ** 3 - floor)
-            if not pair.overlaps:
-                most = min(most, _cap(closing * (at - pair.contact), pair.radius))
-        if most * (1.0 + 1e-9) >= (level + 0.5) / STRENGTHS * full:
+        wanted = (level + 0.5) / STRENGTHS * full
+        if _uncovered(at - pair.contact, pair.radius) * (1.0 + 1e-9) < wanted:
+            continue
+        if (_most(profile, at, entries) - floor) * (1.0 + 1e-9) >= wanted:
             return True
     return False

@@ -7,17 +7,17 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
-from robot_side.compiled.columns import INDICES, NUMBERS, Declared, matrices, rows
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.columns import FLAGS, INDICES, NUMBERS, Declared, matrices, rows
 from robot_side.compiled.kernel import NUMBER, compiled, inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
-from robot_side.overlap.meshes.mesh_kernels import to_mesh, to_world
-from robot_side.overlap.meshes.mesh_overlap import mesh_overlap
+from robot_side.overlap.meshes.mesh_kernels import to_world
+from robot_side.overlap.meshes.mesh_overlap import rounded_overlap
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.tree_queries import is_clear_of
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
-from robot_side.surroundings.kinds.layout import CONTACT, OVERLAP
-from robot_side.surroundings.kinds.mesh_contact import Sweep, next_touch, way
+from robot_side.surroundings.kinds.layout import CONTACT, LEAST_WAY_M, MESH_CONTACT, NEVER, OVERLAP, Contact
+from robot_side.surroundings.kinds.mesh_contact import closing_at, next_touch, overlaps, swept
 from robot_side.surroundings.perceived import PerceivedObjects
 
 
@@ -35,6 +35,7 @@ class MeshColumns(NamedTuple):
     moments: FloatArray
     roots: IntArray
     volumes: FloatArray
+    convex: BoolArray
     near: IntArray
     scratch: FloatArray
 
@@ -42,7 +43,7 @@ class MeshColumns(NamedTuple):
 MESHES: Final = Declared(
     MeshColumns,
     *(INDICES, INDICES, rows(3), matrices(3, 3)),
-    *(rows(FIELDS), rows(4), rows(6), INDICES, rows(7), INDICES, NUMBERS),
+    *(rows(FIELDS), rows(4), rows(6), INDICES, rows(7), INDICES, NUMBERS, FLAGS),
     *(INDICES, NUMBERS),
 )
 _at = MESHES.at
@@ -58,7 +59,8 @@ class PlacedMeshes:
         self.rows = rows_of_kind
         self.mesh = objects.mesh_index
         self.positions, self.rotations = objects.mesh_positions_m.copy(), objects.mesh_rotations.copy()
-        tables = objects.mesh_library.tables
+        library = objects.mesh_library
+        tables, self.convex = library.tables, library.convex
         self.triangles, self.spheres, self.boxes, self.links, self.moments, self.roots, self.volumes = tables
         self.near, self.scratch = np.empty(len(self.triangles) + 1, np.int64), np.empty(SCRATCH)
         self.bundle = MESHES.bundle(self)
@@ -94,16 +96,15 @@ def overlap_one_mesh(
     tables, place, center = _tables(meshes), meshes.rows[row], (x, y, z)
     mesh = meshes.mesh[place]
     push[0] = push[1] = push[2] = 0.0
-    rounded = _turned_back(meshes.rotations[place], subtract(center, load(meshes.positions, place)))
-    if is_clear_of(tables, mesh, rounded, radius):
+    own = _turned_back(meshes.rotations[place], subtract(center, load(meshes.positions, place)))
+    if is_clear_of(tables, mesh, own, radius):
         return 0.0
-    precise = to_mesh(center, meshes.positions, meshes.rotations, place)
-    found, _ = mesh_overlap(precise, radius, tables, mesh, meshes.near, meshes.scratch)
-    push[0], push[1], push[2] = to_world(meshes.rotations, place, found[1])
-    return found[0]
+    volume, gradient = rounded_overlap(own, radius, tables, mesh, meshes.near, meshes.scratch)
+    push[0], push[1], push[2] = to_world(meshes.rotations, place, gradient)
+    return volume
 
 
-@compiled(*CONTACT, returns=NUMBER)
+@compiled(*CONTACT, returns=MESH_CONTACT)
 def contact_with_mesh(
     bundle: IntArray,
     row: int,
@@ -116,14 +117,20 @@ def contact_with_mesh(
     radius: float,
     reach: float,
     inside: bool,
-) -> float:
-    """The distance at which a sphere at (x, y, z) that moves along (u, v, w) first touches; infinite beyond the reach.
+) -> Contact:
+    """Where a sphere at (x, y, z) that moves along (u, v, w) first touches; û·n is 0 for a mesh that is not convex.
 
-    0 where it overlaps already; with `inside`, the distance to the next triangle in front instead.
+    With `inside`, the distance to the next triangle in front, overlap or not.
     """
     meshes = _at(bundle)
     tables, place = _tables(meshes), meshes.rows[row]
     rotation, mesh = meshes.rotations[place], meshes.mesh[place]
     start = _turned_back(rotation, subtract((x, y, z), load(meshes.positions, place)))
-    sweep = Sweep(start, _turned_back(rotation, (u, v, w)), radius, reach)
-    return next_touch(tables, mesh, sweep) if inside else way(tables, mesh, sweep)
+    sweep = swept(start, _turned_back(rotation, (u, v, w)), radius, reach)
+    if not inside and overlaps(tables, mesh, sweep):
+        return 0.0, 1.0 if meshes.convex[mesh] else 0.0
+    found, triangle = next_touch(tables, mesh, sweep, meshes.near, meshes.scratch)
+    if not found <= reach:
+        return NEVER
+    found = max(found, 0.0 if inside else LEAST_WAY_M)
+    return found, closing_at(tables, triangle, sweep, found) if meshes.convex[mesh] else 0.0

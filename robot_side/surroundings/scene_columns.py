@@ -5,12 +5,12 @@ from typing import Final, NamedTuple
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.columns import BUNDLED, INDICES, NUMBERS, Declared, rows
-from robot_side.compiled.kernel import NUMBER, inlined
+from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.blocks import TOGETHER
 from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import CONTACT, MESH, SHAPE_NUMBERS, Contact
+from robot_side.surroundings.kinds.layout import CONTACT, MESH, MESH_CONTACT, SHAPE_NUMBERS, Contact
 
 
 class SceneColumns(NamedTuple):
@@ -35,21 +35,21 @@ SCENE: Final = Declared(
     *(rows(4), rows(SHAPE_NUMBERS), INDICES, INDICES, rows(4), NUMBERS),
     *(INDICES, rows(4), rows(4), rows(4), INDICES, BUNDLED),
 )
-_mesh_contact = call_at_address(NUMBER, CONTACT)
+_mesh_contact = call_at_address(MESH_CONTACT, CONTACT)
 
 
 @inlined
 def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float) -> float:
     """The distance at which a sphere next touches a triangle in front of a mesh; infinite beyond the reach."""
-    found: float = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, True))
-    return found
+    found, _ = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, True))
+    return float(found)
 
 
 @inlined
 def contact_with(
     scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float, clear: bool
 ) -> Contact:
-    """Where a sphere first touches the primitive in `row`; û·n is 0 for a mesh, of which it bounds nothing.
+    """Where a sphere first touches the primitive in `row`; û·n is 0 for a mesh with dents, of which it bounds nothing.
 
     clear: it is known not to overlap, which a mesh need not be asked then.
     """
@@ -57,8 +57,7 @@ def contact_with(
     found, closing = contact(kind, scene.shapes, row, start, radius, along, reach)
     if kind == MESH and found <= reach:
         # So far it was the box around the mesh.
-        found = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
-        closing = 0.0
+        found, closing = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
     return found, closing
 
 

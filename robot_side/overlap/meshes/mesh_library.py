@@ -6,11 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
 from robot_side.overlap.meshes.mesh_tables import joined
+
+_FLAT_M = 1e-7
+"""A dent that is no deeper is none."""
+_TOGETHER = 64
+"""Triangles that are looked at together: most meshes with dents show them early."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,14 @@ class MeshLibrary:
         apart = np.linalg.norm(corners - np.repeat(middles, counts, axis=0)[:, None, :], axis=2).max(axis=1)
         return MeshBounds(middles, 0.5 * (highest - lowest), np.maximum.reduceat(apart, first_triangles))
 
+    @cached_property
+    def convex(self) -> BoolArray:
+        """(m,): whether no corner of a mesh lies in front of any of its triangles."""
+        tables = self.tables
+        first = tables.links.reshape(-1, 3)[tables.roots[:-1], 1]
+        parts = (np.split(part, first[1:]) for part in (tables.triangles[:, :9], tables.triangles[:, 9:12]))
+        return np.array([_is_convex(*part) for part in zip(*parts, strict=True)])
+
     @property
     def corners_m(self) -> list[FloatArray]:
         """Each mesh's triangles (t, 3, 3) in its own frame."""
@@ -63,6 +76,16 @@ class MeshLibrary:
         middles = self.bounds.middles_m.take(mesh_index, axis=0)
         placed: FloatArray = positions + np.einsum("qij,qj->qi", rotations, middles)
         return placed
+
+
+def _is_convex(corners: FloatArray, normals: FloatArray) -> bool:
+    """Whether triangles (t, 9) with outward normals (t, 3) bound a convex solid."""
+    first, places = corners[:, :3], np.unique(corners.reshape(-1, 3), axis=0)
+    offsets = np.einsum("ti,ti->t", normals, first)
+    return all(
+        (places @ normals[few].T <= offsets[few] + _FLAT_M).all()
+        for few in np.array_split(np.arange(len(normals)), 1 + len(normals) // _TOGETHER)
+    )
 
 
 def mesh_pairs(

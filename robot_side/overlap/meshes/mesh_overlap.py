@@ -1,18 +1,34 @@
 """One sphere and one closed mesh (eq. 11); `triangle_lanes` has the idea."""
 
 import math
+from typing import NamedTuple
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.transpose import transpose_four
-from robot_side.compiled.vectors import Vector, add, dot, scale
-from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
+from robot_side.compiled.vectors import Vector, add, dot, scale, subtract
+from robot_side.overlap.closed_forms.half_space import cap
+from robot_side.overlap.closed_forms.solid import (
+    Overlap,
+    bounded,
+    nothing,
+    sphere_volume,
+    whole_solid,
+    whole_sphere,
+)
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
 from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.small_mesh_overlap import beyond_face
-from robot_side.overlap.meshes.tree_queries import gather_near, nearest_triangle, squared_distance, winding_number
+from robot_side.overlap.meshes.tree_queries import (
+    corner_of,
+    gather_near,
+    is_inside,
+    nearest_triangle,
+    squared_distance,
+    winding_number,
+)
 from robot_side.overlap.meshes.triangle_lanes import (
     CORNERS,
     IMAGINARY,
@@ -42,6 +58,20 @@ _SMALL_VOLUME = 1e-5
 """A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
 _CLOSE = 0.02
 """A centre farther than this from the surface (in radii) cannot be inside where the volume is small."""
+_SAME_PLANE = 1e-9
+"""Triangles lie in one plane if their normals, and their distances in radii, are off by no more."""
+
+
+class Sums(NamedTuple):
+    """Of triangles: the product of their numbers, and the sums of `TURN`, `MOMENT` and `PUSH`."""
+
+    product: Complex
+    turn: float
+    moment: float
+    push: Vector
+
+
+NO_SUMS = Sums((1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0))
 
 
 @building_block
@@ -69,14 +99,18 @@ def mesh_overlap(
         if winding_number(tables, mesh, center) > 0:
             return whole_sphere(radius), 0
         return nothing(), 0
-    product, turn, moment, push = _sum_triangles(precise_center, radius, tables, near, count, scratch)
-    covered = -2.0 * (math.atan2(product[1], product[0]) + turn)
-    covered -= _WHOLE * math.floor(covered / _WHOLE)
-    if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
-        covered -= _WHOLE if covered > 0.5 * _WHOLE else 0.0
-        part = (moment + covered) / 3.0
-        if part < -_UNDECIDED_VOLUME or (part < _UNDECIDED_VOLUME and _mostly_inside(tables, mesh, center, radius)):
-            covered += _WHOLE
+    sums = NO_SUMS
+    for first in range(0, count, LANES):
+        size, large = _measure(center, _lows(precise_center), radius, tables, near, first, count, scratch)
+        if large:
+            for lane in range(size):
+                triangle = near[first + lane]
+                if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
+                    refine_lane(scratch, lane, tables, triangle, precise_center, radius)
+        sums = _with_lanes(sums, size, scratch)
+    push = sums.push
+    covered = _covered(sums, tables, mesh, center, radius)
+    moment = sums.moment
     volume = (moment + covered) / 3.0
     if volume < _SMALL_VOLUME:
         applies, small, small_covered, small_push = _small_overlap(precise_center, radius, tables, near, count)
@@ -86,6 +120,74 @@ def mesh_overlap(
     area = radius * radius
     overlap = volume * area * radius, scale(-area, push), covered * area
     return bounded(overlap, radius, tables.volumes[mesh]), count
+
+
+@building_block
+def rounded_overlap(
+    center: Vector, radius: float, tables: MeshTables, mesh: int, near: IntArray, scratch: FloatArray
+) -> tuple[float, Vector]:
+    """(volume, gradient) as of `mesh_overlap`, without what saves digits: exact to 1e-13 of the sphere."""
+    least_2, most_2 = _box_distances_2(tables, mesh, center)
+    if least_2 >= radius * radius or radius == 0.0:
+        return 0.0, (0.0, 0.0, 0.0)
+    if most_2 <= radius * radius * (1.0 - 1e-12):
+        return tables.volumes[mesh], (0.0, 0.0, 0.0)
+    count = _keep_near(tables, center, radius, near, gather_near(tables, mesh, center, radius, near))
+    count, flat = _keep_touched(tables, center, radius, near, count)
+    if count == 0:
+        return sphere_volume(radius) if is_inside(tables, mesh, center) else 0.0, (0.0, 0.0, 0.0)
+    if flat:
+        # Where the ball meets no other plane, the triangles of this one cover all of the disc.
+        normal = corner_of(tables, near[0], 3)
+        height = dot(normal, subtract(center, corner_of(tables, near[0], 0)))
+        volume, gradient, _ = cap(radius - height, radius + height, radius, normal)
+        return volume, gradient
+    sums = NO_SUMS
+    for first in range(0, count, LANES):
+        size, _ = _measure(center, (0.0, 0.0, 0.0), radius, tables, near, first, count, scratch)
+        sums = _with_lanes(sums, size, scratch)
+    volume = (sums.moment + _covered(sums, tables, mesh, center, radius)) / 3.0
+    area = radius * radius
+    overlap = bounded((volume * area * radius, scale(-area, sums.push), 0.0), radius, tables.volumes[mesh])
+    return overlap[0], overlap[1]
+
+
+@building_block
+def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> int:
+    """Keep those triangles in `near` whose planes the ball meets; how many."""
+    kept = 0
+    for index in range(count):
+        triangle = near[index]
+        apart = dot(corner_of(tables, triangle, 3), subtract(center, corner_of(tables, triangle, 0)))
+        near[kept] = triangle
+        kept += 1 if abs(apart) < radius else 0
+    return kept
+
+
+@building_block
+def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
+    """Keep those triangles in `near` that the ball touches, until two planes are; how many, and whether it is one."""
+    kept = 0
+    for index in range(count):
+        triangle = near[index]
+        if squared_distance(tables, triangle, center) < radius * radius:
+            near[kept] = triangle
+            kept += 1
+            if not _in_plane(tables, near[0], triangle, radius):
+                for other in range(index + 1, count):
+                    near[kept] = near[other]
+                    kept += 1
+                return kept, False
+    return kept, True
+
+
+@inlined
+def _in_plane(tables: MeshTables, triangle: int, other: int, radius: float) -> bool:
+    """Whether two triangles lie in one plane."""
+    normal = corner_of(tables, triangle, 3)
+    off = subtract(normal, corner_of(tables, other, 3))
+    lifted = dot(normal, subtract(corner_of(tables, triangle, 0), corner_of(tables, other, 0)))
+    return dot(off, off) <= _SAME_PLANE * _SAME_PLANE and abs(lifted) <= _SAME_PLANE * radius
 
 
 @inlined
@@ -101,39 +203,54 @@ def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
     return least, most
 
 
-@building_block
-def _sum_triangles(
-    precise_center: PreciseVector,
+@inlined
+def _measure(
+    center: Vector,
+    center_rest: Vector,
     radius: float,
     tables: MeshTables,
     near: IntArray,
+    first: int,
     count: int,
     scratch: FloatArray,
-) -> tuple[Complex, float, float, Vector]:
-    """The product of the numbers and the sums of `TURN`, `MOMENT` and `PUSH` over the triangles in `near`."""
-    product, turn, moment, push = (1.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
-    for first in range(0, count, LANES):
-        size = min(count - first, LANES)
-        groups = (size + (WIDTH - 1)) // WIDTH
-        _load_lanes(tables, near, first, size, groups, scratch)
-        large = 0
-        for lane in range(groups * WIDTH):
-            large += 1 if scratch[LONGEST + lane] > FAR * radius else 0
-        triangle_geometry(scratch, groups, highs(precise_center), _lows(precise_center), radius)
-        if large > 0:
-            for lane in range(size):
-                triangle = near[first + lane]
-                if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
-                    refine_lane(scratch, lane, tables, triangle, precise_center, radius)
-        triangle_terms(scratch, groups)
-        reduce_lanes(scratch, size)
-        product = times(product, (scratch[REAL], scratch[IMAGINARY]))
-        rescale = 1.0 / (abs(product[0]) + abs(product[1]))
-        product = product[0] * rescale, product[1] * rescale
-        turn += scratch[TURN]
-        moment += scratch[MOMENT]
-        push = add(push, (scratch[PUSH], scratch[PUSH_Y], scratch[PUSH_Z]))
-    return product, turn, moment, push
+) -> tuple[int, bool]:
+    """Measure the triangles in `near` from `first` on; how many there was room for, and whether any is large."""
+    size = min(count - first, LANES)
+    groups = (size + (WIDTH - 1)) // WIDTH
+    _load_lanes(tables, near, first, size, groups, scratch)
+    large = 0
+    for lane in range(groups * WIDTH):
+        large += 1 if scratch[LONGEST + lane] > FAR * radius else 0
+    triangle_geometry(scratch, groups, center, center_rest, radius)
+    return size, large > 0
+
+
+@inlined
+def _with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
+    """Add what has been measured."""
+    triangle_terms(scratch, (size + (WIDTH - 1)) // WIDTH)
+    reduce_lanes(scratch, size)
+    product = times(sums.product, (scratch[REAL], scratch[IMAGINARY]))
+    rescale = 1.0 / (abs(product[0]) + abs(product[1]))
+    return Sums(
+        (product[0] * rescale, product[1] * rescale),
+        sums.turn + scratch[TURN],
+        sums.moment + scratch[MOMENT],
+        add(sums.push, (scratch[PUSH], scratch[PUSH_Y], scratch[PUSH_Z])),
+    )
+
+
+@inlined
+def _covered(sums: Sums, tables: MeshTables, mesh: int, center: Vector, radius: float) -> float:
+    """The part of the sphere (sr) that lies inside the mesh."""
+    covered = -2.0 * (math.atan2(sums.product[1], sums.product[0]) + sums.turn)
+    covered -= _WHOLE * math.floor(covered / _WHOLE)
+    if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
+        covered -= _WHOLE if covered > 0.5 * _WHOLE else 0.0
+        part = (sums.moment + covered) / 3.0
+        if part < -_UNDECIDED_VOLUME or (part < _UNDECIDED_VOLUME and _mostly_inside(tables, mesh, center, radius)):
+            covered += _WHOLE
+    return covered
 
 
 @building_block

@@ -146,6 +146,51 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
 
 
 @inlined
+def _crosses(start: Vector, end: Vector, point: Vector, u: int, v: int) -> bool:
+    """Whether the ray from `point` along the axis `u` crosses an edge in the plane of `u` and `v`; alike reversed."""
+    if (start[v] > point[v]) == (end[v] > point[v]):
+        return False
+    low, high = (start, end) if start[v] < end[v] else (end, start)
+    side: float = (high[u] - low[u]) * (point[v] - low[v]) - (point[u] - low[u]) * (high[v] - low[v])
+    return side > 0.0
+
+
+@building_block
+def is_inside(tables: MeshTables, mesh: int, point: Vector) -> bool:
+    """Whether a point off the surface lies inside a mesh.
+
+    A ray along an axis, out of the mesh's box by the nearest side, then crosses the surface an odd number of times.
+    """
+    node, end = tables.roots[mesh], tables.roots[mesh + 1]
+    axis, sign, least = 0, 1.0, math.inf
+    for number in range(3):
+        below, above = point[number] - tables.boxes[node, number], tables.boxes[node, 3 + number] - point[number]
+        if min(below, above) < 0.0:
+            return False
+        if min(below, above) < least:
+            axis, sign, least = number, 1.0 if above < below else -1.0, min(below, above)
+    u, v, inside, level = (axis + 1) % 3, (axis + 2) % 3, False, sign * point[axis]
+    while node < end:
+        box = tables.boxes[node]
+        ahead = sign * (box[3 + axis] if sign > 0.0 else box[axis]) >= level
+        if not (ahead and box[u] <= point[u] <= box[3 + u] and box[v] <= point[v] <= box[3 + v]):
+            node = tables.links[3 * node]
+            continue
+        first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(first, first + size):
+            a, b, c = corner_of(tables, triangle, 0), corner_of(tables, triangle, 1), corner_of(tables, triangle, 2)
+            odd = _crosses(a, b, point, u, v) != _crosses(b, c, point, u, v)
+            if odd != _crosses(c, a, point, u, v):
+                low, high = sign * min(a[axis], b[axis], c[axis]), sign * max(a[axis], b[axis], c[axis])
+                normal = corner_of(tables, triangle, 3)
+                behind = dot(normal, subtract(point, a)) * sign * normal[axis] < 0.0
+                if min(low, high) > level or (max(low, high) >= level and behind):
+                    inside = not inside
+        node += 1
+    return inside
+
+
+@inlined
 def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
     """The signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
     a = subtract(corner_of(tables, triangle, 0), point)

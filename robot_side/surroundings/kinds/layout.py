@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array
+from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array, together
 from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import sphere_volume
 
@@ -48,6 +48,8 @@ OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMB
 room (3,) for dV/dcentre. It returns V."""
 CONTACT: Final[tuple[Any, ...]] = (BUNDLE, COUNT, *(NUMBER,) * 8, TRUTH)
 """What a kernel of contacts with meshes takes (see `placed_meshes`)."""
+MESH_CONTACT: Final[Any] = together(NUMBER, NUMBER)
+"""And returns: a `Contact`."""
 TOUCHING_M: Final = 1e-7
 """What is no farther off, and no deeper, than this touches: it overlaps by nothing yet, and may go on to do so."""
 LEAST_WAY_M: Final = 1e-12
@@ -55,6 +57,14 @@ LEAST_WAY_M: Final = 1e-12
 CLOSING: Final = 1e-9
 """Slower than this share of the way, what is beside does not come nearer."""
 MOST_STEPS: Final = 60
+ENLARGED: Final = 1.0 + 1e-9
+"""Bounds around meshes are enlarged by this, so that rounding never passes over what is touched."""
+
+
+@inlined
+def way_by(part: float) -> float:
+    """The way on which what moves by `part` of it moves by a metre, at most 1e15 m."""
+    return 1.0 / part if abs(part) > 1e-15 else 1e15
 
 
 @inlined

@@ -6,10 +6,10 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector
+from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.surroundings.kinds import box
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import NUMBERS, write_pose
+from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, NUMBERS, TOUCHING_M, Contact, way_by, write_pose
 
 
 @inlined
@@ -46,6 +46,19 @@ def of_library(library: Any, index: IntArray) -> FloatArray:
     return np.concatenate([column[index] for column in columns], axis=1)
 
 
+@inlined
+def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
+    """Where a sphere enters the box around a mesh, enlarged by the radius: no later than it touches the mesh."""
+    enter, leave, grown = 0.0, reach, radius * ENLARGED + TOUCHING_M
+    offset = subtract(start, load(shapes, row))
+    for k in range(3):
+        axis = shapes[row, 3 + k], shapes[row, 6 + k], shapes[row, 9 + k]
+        place, by, half = dot(axis, offset), way_by(dot(axis, along)), shapes[row, 12 + k] + grown
+        first, last = (-half - place) * by, (half - place) * by
+        enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+    return (enter, 0.0) if enter <= leave else NEVER
+
+
 def _derive(objects: Any) -> tuple[FloatArray, ...]:
     """Middles, rotations and half sizes of the boxes around meshes."""
     library, index = objects.mesh_library, objects.mesh_index
@@ -65,7 +78,7 @@ KIND: Final = Kind(
     placed=placed,
     place=place,
     nearest=box.nearest,
-    contact=box.contact,
+    contact=contact,
     centers=lambda middles, *_: middles,
     in_box=True,
     derive=_derive,

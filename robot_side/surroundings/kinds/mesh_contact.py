@@ -6,22 +6,20 @@ Everything here is in the mesh's own frame; the walks are those of `tree_queries
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
+from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.tree_queries import (
     corner_of,
     is_clear_of,
+    is_inside,
     to_triangle,
     touches_surface,
-    winding_number,
 )
-from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, TOUCHING_M
-
-_ENLARGED: Final = 1.0 + 1e-9
-"""Bounds are enlarged by this, so that rounding never passes over what is touched."""
+from robot_side.surroundings.kinds.layout import CLOSING, ENLARGED, TOUCHING_M, way_by
 
 
 class Sweep(NamedTuple):
@@ -31,6 +29,14 @@ class Sweep(NamedTuple):
     along: Vector
     radius: float
     reach: float
+    by_axis: Vector
+    """The way on which it moves by a metre along each axis"""
+
+
+@inlined
+def swept(start: Vector, along: Vector, radius: float, reach: float) -> Sweep:
+    """Make a sweep."""
+    return Sweep(start, along, radius, reach, (way_by(along[0]), way_by(along[1]), way_by(along[2])))
 
 
 @building_block
@@ -38,41 +44,31 @@ def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
     """Whether a sphere overlaps a mesh at its start, deeper than what only touches."""
     if is_clear_of(tables, mesh, sweep.start, sweep.radius):
         return False
-    if touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M):
-        return True
-    if is_clear_of(tables, mesh, sweep.start, 0.0):
-        return False
-    return winding_number(tables, mesh, sweep.start) > 0
-
-
-@building_block
-def _node_is_passed(tables: MeshTables, node: int, sweep: Sweep) -> bool:
-    """Whether the sweep misses a node's box, enlarged by the radius."""
-    enter, leave = 0.0, sweep.reach
-    grown = sweep.radius * _ENLARGED + TOUCHING_M
-    for axis in range(3):
-        low = tables.boxes[node, axis] - grown - sweep.start[axis]
-        high = tables.boxes[node, 3 + axis] + grown - sweep.start[axis]
-        speed = sweep.along[axis]
-        if abs(speed) * sweep.reach < 1e-12:
-            if low > 0.0 or high < 0.0:
-                return True
-            continue
-        first, last = low / speed, high / speed
-        enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
-    return enter > leave
+    return touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M) or is_inside(tables, mesh, sweep.start)
 
 
 @inlined
-def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep) -> bool:
+def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
+    """The way at which a node's box, enlarged by the radius, is entered; infinite beyond the reach."""
+    enter, leave = 0.0, reach
+    grown = sweep.radius * ENLARGED + TOUCHING_M
+    for axis in range(3):
+        first = (tables.boxes[node, axis] - grown - sweep.start[axis]) * sweep.by_axis[axis]
+        last = (tables.boxes[node, 3 + axis] + grown - sweep.start[axis]) * sweep.by_axis[axis]
+        enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+    return enter if enter <= leave else math.inf
+
+
+@inlined
+def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) -> bool:
     """Whether the sweep misses the ball around a triangle, or the triangle faces away."""
     normal = corner_of(tables, triangle, 3)
     if dot(normal, sweep.along) >= -CLOSING:
         return True
     offset = subtract(load(tables.spheres, triangle), sweep.start)
-    part = min(max(dot(offset, sweep.along), 0.0), sweep.reach)
+    part = min(max(dot(offset, sweep.along), 0.0), reach)
     apart = subtract(offset, scale(part, sweep.along))
-    most: float = (tables.spheres[triangle, 3] + sweep.radius) * _ENLARGED + TOUCHING_M
+    most: float = (tables.spheres[triangle, 3] + sweep.radius) * ENLARGED + TOUCHING_M
     return dot(apart, apart) > most * most
 
 
@@ -142,28 +138,43 @@ def _edge_touch(first: Vector, second: Vector, along: Vector, radius: float) -> 
 
 
 @building_block
-def way(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
-    """The way at which the overlap begins to rise, 0 where there is one; infinite beyond the reach."""
-    if overlaps(tables, mesh, sweep):
-        return 0.0
-    return max(next_touch(tables, mesh, sweep), LEAST_WAY_M)
+def next_touch(tables: MeshTables, mesh: int, sweep: Sweep, nodes: IntArray, enters: FloatArray) -> tuple[float, int]:
+    """The way at which the sphere next touches a triangle in front, 0 where it does, and which; infinite for none.
+
+    The boxes that are entered first come first. nodes, enters: room for those that wait, one for each level.
+    """
+    best, touched, node, waiting = math.inf, -1, tables.roots[mesh], 0
+    reach = sweep.reach
+    at = _enters(tables, node, sweep, reach)
+    while True:
+        if at <= reach and best > 0.0:
+            first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+            if size == 0:
+                near, far = node + 1, tables.links[3 * node + 3]
+                at, far_at = _enters(tables, near, sweep, reach), _enters(tables, far, sweep, reach)
+                if far_at < at:
+                    near, far, at, far_at = far, near, far_at, at
+                if far_at <= reach:
+                    nodes[waiting], enters[waiting] = far, far_at
+                    waiting += 1
+                node = near
+                continue
+            for triangle in range(first, first + size):
+                if not _is_passed(tables, triangle, sweep, reach):
+                    found = _touch(tables, triangle, sweep, best)
+                    if found < best:
+                        # Nothing beyond the nearest touch so far counts.
+                        best, touched, reach = found, triangle, min(reach, found)
+        if waiting == 0:
+            break
+        waiting -= 1
+        node, at = nodes[waiting], enters[waiting]
+    return best if best <= sweep.reach else math.inf, touched
 
 
 @building_block
-def next_touch(tables: MeshTables, mesh: int, sweep: Sweep) -> float:
-    """The way at which the sphere next touches a triangle in front, 0 where it does; infinite beyond the reach."""
-    best = math.inf
-    node, end = tables.roots[mesh], tables.roots[mesh + 1]
-    while node < end and best > 0.0:
-        if _node_is_passed(tables, node, sweep):
-            node = tables.links[3 * node]
-            continue
-        first, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
-        for triangle in range(first, first + size):
-            if not _is_passed(tables, triangle, sweep):
-                found = _touch(tables, triangle, sweep, best)
-                if found < best:
-                    # Nothing beyond the nearest touch so far counts.
-                    best, sweep = found, Sweep(sweep.start, sweep.along, sweep.radius, min(sweep.reach, found))
-        node += 1
-    return best if best <= sweep.reach else math.inf
+def closing_at(tables: MeshTables, triangle: int, sweep: Sweep, way: float) -> float:
+    """û·n of the plane in which the sphere touches a triangle after a way."""
+    towards = to_triangle(tables, triangle, add(sweep.start, scale(way, sweep.along)))
+    distance = norm(towards)
+    return max(dot(towards, sweep.along) / distance, CLOSING) if distance > 0.0 else 1.0
