@@ -1,6 +1,6 @@
 """The field along one direction: the distances at which the eight strengths begin."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
@@ -41,6 +41,8 @@ class Field:
     and the slow one: an object that is to be touched is felt less there, and where it is expected."""
     sigma_m: float
     """The largest D_σ of the gripper's spheres."""
+    counts: IntArray
+    """How much work it was, at the places of `Count`."""
 
     @property
     def fast_m(self) -> FloatArray:
@@ -56,31 +58,11 @@ class Field:
 
 
 @dataclass
-class FieldCounts:
-    """How much work there was, over the run."""
-
-    fields: int = 0
-    pairs: int = 0
-    """Pairs of a sphere and an object that the sphere meets within the reach."""
-    profiles: int = 0
-    """Of these, overlap profiles that were sampled."""
-    overlaps: int = 0
-    """Of one sphere and one primitive."""
-    limited: int = 0
-    """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)."""
-    with_nothing_near: int = 0
-    """Fields within the reach of which no sphere met anything."""
-    flat: int = 0
-    """Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them."""
-
-
-@dataclass
 class Ahead:
-    """Looks ahead along directions; keeps the room that this takes."""
+    """Looks ahead along one direction at a time, as the law does within its own call; keeps the room that this takes."""
 
     encoder_sigma_rad: FloatArray
     """(n,)"""
-    counts: FieldCounts = field(default_factory=FieldCounts)
 
     def __post_init__(self) -> None:
         self._encoder_variance = self.encoder_sigma_rad * self.encoder_sigma_rad
@@ -110,16 +92,7 @@ class Ahead:
         )
         if not found:
             _refuse(pose, along)
-        pairs, profiles, overlaps, limited = scratch.counts.tolist()
-        counts = self.counts
-        counts.fields += 1
-        counts.pairs += pairs
-        counts.profiles += profiles
-        counts.overlaps += overlaps
-        counts.limited += limited
-        counts.with_nothing_near += pairs == 0
-        counts.flat = scene.flat
-        return Field(scratch.distances_m.copy(), float(scratch.largest_m[0]))
+        return Field(scratch.distances_m.copy(), float(scratch.largest_m[0]), scratch.counts.copy())
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:

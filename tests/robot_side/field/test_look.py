@@ -15,6 +15,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 from robot_side.field.field import Ahead, Along
+from robot_side.field.scratch import Count
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
@@ -91,34 +92,31 @@ def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
 
 
 def test_what_is_far_beside_or_behind_costs_no_overlap() -> None:
-    by = Ahead(np.zeros(6))
     away = Scene()
     for place in ([0.5, 0.0, 0.0], [0.0, -0.5, 0.1], [0.0, 0.0, -0.5], [0.0, 0.0, 9.0]):
         away.add().box(place, [0.05, 0.05, 0.05]).add().sphere(place, 0.06)
     away.add().half_space([0.0, 0.0, 1.0], -0.3).add().half_space([1.0, 0.0, 0.0], -0.3)
-    found = look(gripper_pose(), away.objects(), along(AHEAD, 0.007, reach_m=0.3), by=by)
+    found = look(gripper_pose(), away.objects(), along(AHEAD, 0.007, reach_m=0.3))
     assert np.isinf(found.fast_m).all()
     assert np.isinf(found.slow_m).all()
-    assert (by.counts.fields, by.counts.with_nothing_near, by.counts.pairs, by.counts.overlaps) == (1, 1, 0, 0)
+    assert found.counts.tolist() == [0] * len(Count)
     near = away.add().box([0.0, 0.0, 0.2], [0.05, 0.05, 0.05]).objects()
-    look(gripper_pose(), near, along(AHEAD, 0.007, reach_m=0.3), by=by)
-    assert (by.counts.fields, by.counts.with_nothing_near) == (2, 1)
-    assert by.counts.pairs > 0
-    assert by.counts.overlaps > 0
+    counts = look(gripper_pose(), near, along(AHEAD, 0.007, reach_m=0.3)).counts
+    assert counts[Count.PAIRS] > 0
+    assert counts[Count.OVERLAPS] > 0
 
 
 def test_a_scene_of_many_far_things_is_as_quickly_told_as_one() -> None:
     """Only what may shorten a way is worked out: what is behind the nearest wall costs nothing."""
     wall = Scene().add().box([0.0, 0.0, 0.15], [0.3, 0.3, 0.01])
-    alone, crowded = Ahead(np.zeros(6)), Ahead(np.zeros(6))
     looked = along(AHEAD, 0.007, reach_m=0.3)
-    expected = look(gripper_pose(), wall.objects(), looked, by=alone)
+    expected = look(gripper_pose(), wall.objects(), looked)
     rng = np.random.default_rng(1)
     for _ in range(500):
         wall.add().box([*rng.uniform(-0.2, 0.2, 2), rng.uniform(0.2, 0.3)], rng.uniform(0.01, 0.03, 3))
-    found = look(gripper_pose(), wall.objects(), looked, by=crowded)
+    found = look(gripper_pose(), wall.objects(), looked)
     np.testing.assert_array_equal(found.fast_m, expected.fast_m)
-    assert crowded.counts.overlaps == alone.counts.overlaps
+    assert found.counts[Count.OVERLAPS] == expected.counts[Count.OVERLAPS]
 
 
 @pytest.mark.parametrize("name", ["tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"])

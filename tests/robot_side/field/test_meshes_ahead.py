@@ -5,7 +5,7 @@ import pytest
 
 from common.arrays import FloatArray
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
-from robot_side.field.field import Ahead
+from robot_side.field.scratch import Count
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -101,22 +101,23 @@ def test_meshes_that_are_far_cost_no_overlap() -> None:
     places[:, 2] += 4.0
     for place in places:
         scene.add().mesh(capsule, place)
-    pose, by = gripper_pose(), Ahead(np.zeros(6))
-    look(pose, scene.objects(), along(AHEAD, 0.007), by=by)
-    assert (by.counts.overlaps, by.counts.with_nothing_near) == (0, 1)
+    pose = gripper_pose()
+    assert look(pose, scene.objects(), along(AHEAD, 0.007)).counts.tolist() == [0] * len(Count)
     for place in ([0.0, 0.0, 0.2], [0.1, 0.0, 0.2], [-0.1, 0.0, 0.2]):
         scene.add().mesh(capsule, place)
-    assert np.isfinite(look(pose, scene.objects(), along(AHEAD, 0.007), by=by).fast_m).all()
-    assert by.counts.pairs <= 3 * len(pose.sphere_radii_m)
+    found = look(pose, scene.objects(), along(AHEAD, 0.007))
+    assert np.isfinite(found.fast_m).all()
+    assert found.counts[Count.PAIRS] <= 3 * len(pose.sphere_radii_m)
 
 
 def test_along_a_convex_mesh_that_is_touched_little_is_worked_out() -> None:
     """Nothing that does not rise now ever will; of one with a dent there is no telling but by going there."""
     box = Mesh(CUBE_CORNERS * [0.02, 0.4, 0.4], CUBE_TRIANGLES)
-    pose, by = gripper_pose(), Ahead(np.zeros(6))
+    pose = gripper_pose()
     side_m = float((pose.sphere_centers_m[:, 0] + pose.sphere_radii_m).max())
     beside = Scene().add().mesh(box, [side_m + 0.003 + 0.02, 0.0, 0.1]).objects()
-    assert np.isinf(look(pose, beside, along(AHEAD, 0.007, reach_m=0.3), by=by).fast_m).all()
-    assert by.counts.pairs > 20
+    found = look(pose, beside, along(AHEAD, 0.007, reach_m=0.3))
+    assert np.isinf(found.fast_m).all()
+    assert found.counts[Count.PAIRS] > 20
     # One overlap for each sphere that is in it already.
-    assert by.counts.overlaps <= by.counts.pairs
+    assert found.counts[Count.OVERLAPS] <= found.counts[Count.PAIRS]

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from robot_side.field.field import Ahead
 from robot_side.field.look import MARGIN_M
+from robot_side.field.scratch import Count
 from robot_side.surroundings.distances import nearest_points
 from robot_side.surroundings.kinds.layout import TOUCHING_M
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -153,8 +154,7 @@ def test_nothing_is_met_beyond_the_reach_nor_behind(kind: str) -> None:
     }
     add[kind]()
     for sign, reach, met in ((1.0, 0.181, True), (1.0, 0.179, False), (-1.0, 1.0, False)):
-        by = Ahead(np.zeros(6))
         direction = np.array([0.0, 0.0, sign])
         # What is full within the margin beyond the reach is felt within it.
-        look(ball_pose(0.01), scene.objects(), along(direction, reach_m=reach - MARGIN_M + 0.01), by=by)
-        assert (by.counts.pairs > 0) is met
+        found = look(ball_pose(0.01), scene.objects(), along(direction, reach_m=reach - MARGIN_M + 0.01))
+        assert bool(found.counts[Count.PAIRS] > 0) is met

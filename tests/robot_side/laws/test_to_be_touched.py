@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from robot_side.field.field import Ahead, Along, Field
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
-from robot_side.field.scratch import TOUCH_STRENGTH
+from robot_side.field.scratch import TOUCH_STRENGTH, Count
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, EQUAL_M, along, ball_pose, look
 from tests.helpers.gripper_poses import OPENING_M, free_pose, gripper_pose
@@ -120,35 +120,34 @@ def test_what_is_known_better_may_touch_first_though_it_is_felt_last() -> None:
 # Between the fingers (§3.4)
 
 
-def fingers_about(object_class: int, widest_m: float, inflated_m: float = 0.02) -> tuple[Field, Ahead]:
+def fingers_about(object_class: int, widest_m: float, inflated_m: float = 0.02) -> Field:
     """Two fingertips on the way to a block between them, and a palm behind it."""
     pose = free_pose([[0.03, 0.0, 0.0], [-0.03, 0.0, 0.0], [0.0, 0.0, -0.1]], [0.008] * 3, [True, True, False])
     block = Scene().add().box([0.0, 0.0, 0.05], [0.015, 0.02, 0.02]).objects()
-    by = Ahead(np.zeros(6))
-    return look(pose, block, along(AHEAD, inflated_m), classes=[object_class], widest_m=widest_m, by=by), by
+    return look(pose, block, along(AHEAD, inflated_m), classes=[object_class], widest_m=widest_m)
 
 
 def test_towards_the_target_a_finger_is_enlarged_by_at_most_half_the_gap_and_that_is_counted() -> None:
-    free, by = fingers_about(TARGET, np.inf)
-    assert by.counts.limited == 0
-    limited, by = fingers_about(TARGET, 0.004)
-    assert by.counts.limited == 2
+    free = fingers_about(TARGET, np.inf)
+    assert free.counts[Count.LIMITED] == 0
+    limited = fingers_about(TARGET, 0.004)
+    assert limited.counts[Count.LIMITED] == 2
     # The fingers pass it by, 7 mm to each side: the palm alone meets it, as far enlarged as ever.
     assert free.fast_m[0] < 0.0 < limited.fast_m[0]
     face_m = 0.03 + 0.1 - 0.008 - 0.02
     assert face_m - 0.012 < limited.fast_m[0] < limited.fast_m[7] <= face_m
     # A limit that does not bind counts for nothing.
-    loose, by = fingers_about(TARGET, 0.021)
-    assert by.counts.limited == 0
+    loose = fingers_about(TARGET, 0.021)
+    assert loose.counts[Count.LIMITED] == 0
     np.testing.assert_array_equal(loose.fast_m, free.fast_m)
 
 
 @pytest.mark.parametrize("object_class", [OBSTACLE, TOUCHABLE])
 def test_towards_anything_else_it_is_never_reduced(object_class: int) -> None:
-    free, _ = fingers_about(object_class, np.inf)
-    limited, by = fingers_about(object_class, 0.004)
+    free = fingers_about(object_class, np.inf)
+    limited = fingers_about(object_class, 0.004)
     np.testing.assert_array_equal(limited.fast_m, free.fast_m)
-    assert by.counts.limited == 0
+    assert limited.counts[Count.LIMITED] == 0
 
 
 def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
