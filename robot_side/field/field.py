@@ -59,7 +59,7 @@ class Field:
 
 @dataclass
 class Ahead:
-    """Looks ahead along one direction at a time, as the law does within its own call; keeps the room that this takes."""
+    """Looks ahead along one direction at a time, as the law does within its own call; keeps the room for that."""
 
     encoder_sigma_rad: FloatArray
     """(n,)"""
