@@ -3,11 +3,9 @@
 import math
 from typing import Final
 
-import numpy as np
-
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import COUNT, TRUTH, compiled, inlined, input_array, input_indices
+from robot_side.compiled.kernel import COUNT, TRUTH, compiled, inlined, input_array, input_indices, output_array
 from robot_side.surroundings.blocks import bound_blocks
 from robot_side.surroundings.bounds import write_around
 from robot_side.surroundings.kinds.layout import NUMBERS, SHAPE_NUMBERS, VELOCITY
@@ -30,12 +28,13 @@ def _take(numbers: FloatArray, own: int, shape: FloatArray) -> None:
 
 
 @inlined
-def _judged(scene: SceneColumns, things: IntArray, numbers: FloatArray, measured: bool) -> int:
+def _judged(
+    scene: SceneColumns, things: IntArray, numbers: FloatArray, measured: bool, shape: FloatArray, bound: FloatArray
+) -> int:
     """What is to come of the numbers; nothing is written yet."""
-    shape, bound = np.empty((1, NUMBERS)), np.empty((1, 4))
     own, found = 0, WRITTEN
-    for thing in things:
-        for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
+    for k in range(things.size):
+        for row in range(scene.first_rows[things[k]], scene.first_rows[things[k] + 1]):
             if not is_possible(scene.kinds[row], numbers, own):
                 return IMPOSSIBLE
             _take(numbers, own, shape)
@@ -49,19 +48,31 @@ def _judged(scene: SceneColumns, things: IntArray, numbers: FloatArray, measured
     return found
 
 
-@compiled(input_array(2), input_indices(), input_indices(), input_indices(), TRUTH, BUNDLE, returns=COUNT)
+@compiled(
+    *(input_array(2), input_indices(), input_indices(), input_indices(), TRUTH, BUNDLE),
+    *(output_array(2), output_array(2)),
+    returns=COUNT,
+)
 def write_movers(
-    numbers: FloatArray, things: IntArray, places: IntArray, blocks: IntArray, measured: bool, bundle: IntArray
+    numbers: FloatArray,
+    things: IntArray,
+    places: IntArray,
+    blocks: IntArray,
+    measured: bool,
+    bundle: IntArray,
+    shape: FloatArray,
+    bound: FloatArray,
 ) -> int:
     """Write the primitives of the objects `things` (m,), in their order, and bound the blocks; what came of it.
 
     numbers (n + m, 20) as in `movers`; places (m,) in the order of blocks, or -1. measured: with velocities.
+    shape (1, 20) and bound (1, 4) are room.
     """
     scene = _scene(bundle)
-    found = _judged(scene, things, numbers, measured)
+    found = _judged(scene, things, numbers, measured, shape, bound)
     if found != WRITTEN:
         return found
-    shape, own = np.empty((1, NUMBERS)), 0
+    own = 0
     for k in range(things.size):
         thing, volume = things[k], 0.0
         first, end = scene.first_rows[thing], scene.first_rows[thing + 1]

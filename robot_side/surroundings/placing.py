@@ -5,14 +5,20 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import TRUTH, compiled, input_indices, output_array
+from robot_side.compiled.kernel import TRUTH, building_block, compiled, input_indices, output_array
 from robot_side.surroundings.bounds import write_around
 from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
-place_one: Final = by_kind([kind.place for kind in KINDS])
-"""(kind, numbers, k, bounds, row) to the volume in m³: `Kind.place` of any kind."""
+_place_any: Final = by_kind([kind.place for kind in KINDS])
+
+
+@building_block
+def place_one(kind: int, numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
+    """`Kind.place` of any kind."""
+    volume: float = _place_any(kind, numbers, k, bounds, row)
+    return volume
 
 
 @compiled(

@@ -8,7 +8,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.surroundings.blocks import TOGETHER, Blocks
-from robot_side.surroundings.kinds.layout import MESH
+from robot_side.surroundings.kinds.layout import MESH, NUMBERS
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.moving_rows import FLAT, WRITTEN, write_movers
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
@@ -30,6 +30,7 @@ class Moving:
         sizes = np.diff(table.first_rows)[movers.things]
         self.solid = bool((np.diff(movers.first_rows) == sizes).all())
         """Whether no primitive of theirs was left out."""
+        self.room: tuple[FloatArray, FloatArray] = np.empty((1, NUMBERS)), np.empty((1, 4))
 
 
 @dataclass(eq=False)
@@ -134,7 +135,8 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
 def _write_movers(table: SceneTable, moving: Moving, numbers: FloatArray) -> int:
     """Write the movers of these numbers; what came of it."""
     movers = moving.movers
-    found = int(write_movers(numbers, movers.things, moving.places, moving.blocks, movers.measured, table.bundle))
+    where = movers.things, moving.places, moving.blocks
+    found = int(write_movers(numbers, *where, movers.measured, table.bundle, *moving.room))
     if found == WRITTEN and table.placed is not None:
         places, rows, *_ = movers.parts["mesh_positions_m"]
         table.placed.positions[rows] = numbers[places, :3]

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, input_indices
+from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, input_indices
 from robot_side.surroundings.kinds.kind import Check, Kind
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
@@ -117,7 +117,7 @@ def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
     return True
 
 
-@inlined
+@building_block
 def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
     """Whether a primitive of this kind can have the numbers (n, 20) in this row."""
     for place in range(NUMBERS):

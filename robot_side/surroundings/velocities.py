@@ -58,21 +58,25 @@ def _see(
     first = 0
     while first < kept and times[first] < oldest:
         first += 1
-    if first > 0:
-        for frame in range(first, kept):
-            times[frame - first], seen[frame - first] = times[frame], seen[frame]
+    for frame in range(first, kept):
+        times[frame - first] = times[frame]
+        for place in range(positions.size):
+            seen[frame - first, place] = seen[frame, place]
     kept -= first
-    times[kept], seen[kept], kept = now, positions, kept + 1
+    times[kept] = now
+    for place in range(positions.size):
+        seen[kept, place] = positions[place]
+    kept += 1
     # From now, as a clock's large numbers have few digits for what is between.
     middle, spread = 0.0, 0.0
     for frame in range(kept):
         middle += (times[frame] - now) / kept
     for frame in range(kept):
-        spread += (times[frame] - now - middle) ** 2
-    velocities[:] = 0.0
-    if spread > 0.0:
+        away = times[frame] - now - middle
+        spread += away * away
+    for place in range(positions.size):
+        velocities[place] = 0.0
         for frame in range(kept):
-            part = (times[frame] - now - middle) / spread
-            for place in range(velocities.size):
-                velocities[place] += part * seen[frame, place]
+            if spread > 0.0:
+                velocities[place] += (times[frame] - now - middle) / spread * seen[frame, place]
     return kept
