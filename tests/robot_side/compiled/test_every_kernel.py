@@ -18,11 +18,10 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
     modules = {kernel.name.rpartition(".")[0] for kernel in imported_kernels()}
     assert {
         "robot_side.surroundings.distances",
-        "robot_side.laws.felt",
         "robot_side.field.look",
-        "robot_side.laws.recent_looks",
+        "robot_side.laws.prospect",
         "robot_side.surroundings.placing",
-        "robot_side.laws.sideways",
+        "robot_side.laws.swept",
         "robot_side.field.total_overlap",
         "robot_side.arm.ability",
         "robot_side.arm.commanded",
