@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Any, NamedTuple
 
 from common.clock import MonotonicClock, ThreadClock
-from common.command.command_line import given_fields, parse_settings, run_command
+from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
@@ -54,11 +54,6 @@ _HELPS = {
 controller is told; what is read from it, and commands. "": all else, such as what is shown."""
 _GUARD_PERIOD_S = 0.5
 """From one look at the watchdog to the next."""
-
-
-def main() -> None:
-    """The console script."""
-    run_command("feelahead-operator", command)
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
@@ -298,7 +293,3 @@ class _Loop:
         values["motion_overruns"] = self._pacer.overruns
         values["queue_to_robot_ms"] = self._sending.queue_ms
         return values
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,5 @@
 """The robot side's end of the link without a robot: it grants the lease, and its fields are as stiff as it is told."""
 
-from types import TracebackType
 
 from common.clock import MonotonicClock, clock_domain
 from common.errors import RemoteProtocolError
@@ -39,9 +38,7 @@ class StiffnessSource:
     def __enter__(self) -> "StiffnessSource":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._sockets.close()
 
     @property

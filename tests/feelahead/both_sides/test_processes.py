@@ -34,7 +34,7 @@ LIMIT_S = 600.0
 
 def demo(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "feelahead.main", "demo", "--no-console", *arguments],
+        [sys.executable, "-P", "-m", "feelahead", "demo", "--no-console", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -56,12 +56,12 @@ def wait_for_link(side: SideProcess) -> dict[str, Any]:
 
 
 def robot(*arguments: str) -> SideProcess:
-    return SideProcess("robot_side.main", "robot", ["--bind=tcp://127.0.0.1:0", *arguments])
+    return SideProcess("robot_side", "robot", ["--bind=tcp://127.0.0.1:0", *arguments])
 
 
 def operator(listening: dict[str, Any], *arguments: str) -> SideProcess:
     endpoints = [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
-    return SideProcess("operator_side.main", "operator", [*endpoints, "--device=simulated", *arguments])
+    return SideProcess("operator_side", "operator", [*endpoints, "--device=simulated", *arguments])
 
 
 @pytest.mark.parametrize("more", [("--realtime",), ("--compensation", "robot"), ("--law", "paper")])
