@@ -25,15 +25,12 @@ def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: Opera
 def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
     """Take what the pages of the console have said since the last call."""
     console.receive()
-    while console.hands:
-        words = console.hands.popleft()
-        if words.hands is None:
-            pages.close(words.page, now_s)
+    while console.words:
+        page, said = console.words.popleft()
+        if said is None:
+            pages.close(page, now_s)
         else:
-            pages.receive(words.page, {"hands": words.hands}, now_s)
-    while console.tuning:
-        words = console.tuning.popleft()
-        pages.receive(words.page, {"tune": words.tune}, now_s)
+            pages.receive(page, said, now_s)
 
 
 def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:

@@ -1,6 +1,5 @@
 """The robot side's end of the link without a robot: it grants the lease, and its fields are as stiff as it is told."""
 
-
 from common.clock import MonotonicClock, clock_domain
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, encode
