@@ -10,7 +10,7 @@ import pytest
 import feelahead.main
 import operator_side.main
 import robot_side.main
-from common.errors import ConfigurationError
+from tests.helpers.refusal import refusal
 from tests.helpers.repository import DATA, ROOT
 
 COMMANDS = {
@@ -25,11 +25,7 @@ KEY = "ab" * 32
 
 def complaint(command: str) -> str:
     program, *arguments = shlex.split(command)
-    with pytest.raises(ConfigurationError) as caught:
-        COMMANDS[program](arguments)
-    text = str(caught.value)
-    assert "\n" not in text
-    return text
+    return refusal(COMMANDS[program], arguments)
 
 
 @pytest.mark.parametrize(

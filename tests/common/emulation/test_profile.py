@@ -11,6 +11,7 @@ from common.emulation.loss import GilbertElliott, RandomLoss
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError
+from tests.helpers.refusal import refusal
 
 repeatable = settings(derandomize=True, deadline=None)
 
@@ -99,10 +100,7 @@ WORDS = (
     ],
 )
 def test_refuses_a_bad_profile_in_one_line(spec: str, named: str, valid: str) -> None:
-    with pytest.raises(ConfigurationError) as refusal:
-        LinkProfile.parse(spec)
-    text = str(refusal.value)
-    assert "\n" not in text
+    text = refusal(LinkProfile.parse, spec)
     assert repr(spec) in text
     assert named in text.replace(repr(spec), "", 1)
     assert valid in text

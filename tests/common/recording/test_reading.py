@@ -20,6 +20,7 @@ from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.topics import FORMAT, schema_of
 from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, VIEW, as_json, stamped
+from tests.helpers.refusal import refusal
 
 SECONDS = 5
 BLOCKS_A_SECOND = 20
@@ -102,9 +103,9 @@ def test_a_flipped_bit_costs_no_more_than_what_follows(short: tuple[bytes, list[
 def test_what_is_no_recording_is_told_in_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     path.write_bytes(content)
-    with pytest.raises(ConfigurationError, match=r"other\.mcap: .*valid: ") as caught:
-        open_recording(path)
-    assert "\n" not in str(caught.value)
+    text = refusal(open_recording, path)
+    assert "other.mcap: " in text
+    assert "valid: " in text
 
 
 def test_a_damaged_description_is_told_in_one_line(short: tuple[bytes, list[int]], tmp_path: Path) -> None:
