@@ -1,6 +1,4 @@
 import os
-import subprocess
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -12,8 +10,8 @@ from common.command.command_line import load_toml, parse_settings
 from common.command.run_options import RunOptions
 from common.errors import ConfigurationError
 from common.limits import check_limits
+from tests.helpers.python_process import ended
 from tests.helpers.refusal import refusal
-from tests.helpers.repository import ROOT
 
 
 @dataclass(frozen=True)
@@ -131,16 +129,8 @@ def test_the_line_is_the_same_where_no_box_can_be_drawn(encoding: str) -> None:
         "    try: parse(*arguments)\n"
         "    except ConfigurationError as error: print(error)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONIOENCODING": encoding, "LC_ALL": "C"},
-        cwd=ROOT,
-    )
-    lines = ended.stdout.splitlines()
-    assert lines == [
+    _, said, _ = ended("-c", code, PYTHONIOENCODING=encoding, LC_ALL="C")
+    assert said.splitlines() == [
         "--duration: 'x'; valid: a number",
         "Unrecognized options: --nonsense, 1 (valid flags and values: prog --help)",
         "--seed: invalid literal for int() with base 10: 'y'; valid: a whole number",
