@@ -33,7 +33,8 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
+from operator_side.facts_of_core import Surroundings
+from operator_side.following_pages import follow_pages, hands_facts, shared_hands
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
@@ -97,11 +98,17 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
-            surroundings = functools.partial(
-                surroundings_of, core, sending, pages, person, swap_sides=settings.swap_sides
-            )
             # The console before our own priority is raised, which it would inherit.
-            viewing = Viewing(core, surroundings, status, pages, _console(settings, stack), recording)
+            viewing = Viewing(
+                core,
+                lambda now_s: Surroundings(
+                    "controller" if person is None else person.hands,
+                    sending.asked,
+                    settings.swap_sides,
+                    hands_facts(pages, person, core, now_s),
+                ),
+                *(status, pages, _console(settings, stack), recording),
+            )
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
