@@ -37,26 +37,20 @@ from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import (
     AnyViewMessage,
-    EnlargementTerms,
     SceneShapes,
-    SceneState,
     Shape,
     VideoFrame,
     VideoStep,
 )
-from tests.helpers.felt import felt, field, ways
+from tests.helpers.felt import felt, field, scene_state, ways
 
 repeatable = settings(derandomize=True, deadline=None)
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
 ROW = struct.pack("<7f", *POSE)
-TERMS = EnlargementTerms(0.01, 0.001, 0.002, 0.003, 0.004, 2.3, 0.1, 0.02)
 SHAPE = Shape(0, False, "mesh", (1.0, 1.0, 1.0), POSE, vertices_m=b"\x00" * 12, triangles=b"\x01" * 12)
-SCENE = SceneState(
-    *(HEADER, 1, 2.5, ROW, struct.pack("<I", 3), ROW, bytes([0, 1]), POSE, bytes(16), ((3, 1e-9, 2e-9),)),
-    *(TERMS, TERMS, 100.0, 200.0, 0),
-)
+SCENE = msgspec.structs.replace(scene_state(HEADER), roles=bytes([0, 1]), spheres=bytes(16))
 VIEWS: tuple[AnyViewMessage, ...] = (
     VideoFrame(HEADER, view="overview", captured_s=3.0, width=640, height=480, jpeg=bytes(range(256)) * 100),
     SceneShapes(HEADER, 1, ("palm",), ("ball",), (SHAPE,), 2, ROW),
