@@ -12,13 +12,7 @@ from msgspec import Meta
 from common.limits import check_limits
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
-from operator_side.dualsense.effects.official import (
-    MAX_STRENGTH,
-    ZONE_COUNT,
-    MultiPositionFeedback,
-    Off,
-    TriggerEffect,
-)
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback, Off, TriggerEffect
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement

@@ -35,13 +35,7 @@ from common.protocol.messages import (
 )
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
-from common.protocol.view_messages import (
-    AnyViewMessage,
-    SceneShapes,
-    Shape,
-    VideoFrame,
-    VideoStep,
-)
+from common.protocol.view_messages import AnyViewMessage, SceneShapes, Shape, VideoFrame, VideoStep
 from tests.helpers.felt import felt, field, scene_state, ways
 
 repeatable = settings(derandomize=True, deadline=None)

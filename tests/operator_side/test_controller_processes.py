@@ -16,12 +16,7 @@ from typing import Any
 import pytest
 
 from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.output_report import (
-    RELEASED,
-    WARNING_LIGHT,
-    OutputReport,
-    parse_output_report,
-)
+from operator_side.dualsense.reports.output_report import RELEASED, WARNING_LIGHT, OutputReport, parse_output_report
 from tests.helpers.python_process import LIMIT_S, ended
 from tests.helpers.repository import ROOT
 from tests.operator_side.stiffness_source import StiffnessSource

@@ -9,11 +9,7 @@ from common.errors import ConfigurationError
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from tests.helpers.refusal import refusal
-from tests.helpers.socket_talk import (
-    EPHEMERAL,
-    greet,
-    publish_until_seen,
-)
+from tests.helpers.socket_talk import EPHEMERAL, greet, publish_until_seen
 
 
 def test_reports_the_ports_that_the_system_chose(robot: RobotSockets) -> None:

@@ -13,15 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from feelahead.lab.approaches.prediction import (
-    AGE_BINS_S,
-    COMPENSATIONS,
-    ToolPath,
-    error_table,
-    judge,
-    moments,
-    over,
-)
+from feelahead.lab.approaches.prediction import AGE_BINS_S, COMPENSATIONS, ToolPath, error_table, judge, moments, over
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.propagation import (
     BATCHES,

@@ -8,12 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from operator_side.calibration.store import (
-    calibration_path,
-    load_calibration,
-    read_calibration,
-    write_calibration,
-)
+from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from tests.helpers.refusal import refusal
 

@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.reports.controller_state import Battery, BatteryState, Button, ControllerState
-from operator_side.dualsense.reports.feature_report import (
-    Firmware,
-    build_address,
-    build_calibration,
-    parse_address,
-)
+from operator_side.dualsense.reports.feature_report import Firmware, build_address, build_calibration, parse_address
 from operator_side.dualsense.reports.input_report import build_input_report, is_input_report, parse_input_report
 from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 

@@ -10,12 +10,7 @@ from common.protocol.messages import LeaseNotice, MotionCommand
 from common.protocol.session import SessionState
 from operator_side.core import INTENT_EXPIRES_S, OperatorSide
 from operator_side.dualsense.hid.background_writes import STALL_S
-from operator_side.dualsense.hid.connection import (
-    BEAT_PERIOD_S,
-    LOOK_PERIOD_S,
-    Connection,
-    ConnectionState,
-)
+from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S
 from operator_side.dualsense.reports.controller_state import Button
