@@ -33,8 +33,7 @@ DEMO = ("-P", "-m", "feelahead", "demo", "--no-console")
 
 
 def wait_until(side: SideProcess, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the side's first status from now on for which `condition` holds."""
-    side.events()
+    """Return the side's first unread status for which `condition` holds, however late it is read."""
     for _ in range(5000):
         status = side.wait_for("status", LIMIT_S)
         if condition(status):
