@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 
 from msgspec import Meta
 
-from common.limits import check_limits
+from common.limits import Limited
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback, Off, TriggerEffect
@@ -25,14 +25,11 @@ _ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True)
-class RenderingSettings:
+class RenderingSettings(Limited):
     """How what lies ahead becomes what a finger feels."""
 
     horizon_s: Annotated[float, Meta(ge=0.0, le=2.0)] = HORIZON_S
     """h: so long a speed goes on before anything felt can change it (reaction, the finger's way, a write)."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 class RenderedTrigger:

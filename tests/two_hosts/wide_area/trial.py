@@ -5,12 +5,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from common.limits import check_limits
+from common.limits import Limited
 from tests.two_hosts.wide_area.way import Direction, WayWords
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(Limited):
     """One link, and what is done over it; the flags of `question.WideSweep` have the words to each."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)] = 100.0
@@ -26,9 +26,6 @@ class Trial:
     bulk: bool = False
     observer: Literal["none", "reads", "stops"] = "none"
     seconds: Annotated[float, Meta(ge=2.0, le=3600.0)] = 20.0
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     def ways(self) -> dict[Direction, WayWords]:
         """The link in SI units, at first."""
