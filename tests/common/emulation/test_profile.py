@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.emulation.clauses import Chance, Outage, Rate
@@ -12,8 +12,6 @@ from common.emulation.profile import LinkProfile
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError
 from tests.helpers.refusal import refusal
-
-repeatable = settings(derandomize=True, deadline=None)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +104,6 @@ def test_refuses_a_bad_profile_in_one_line(spec: str, named: str, valid: str) ->
     assert valid in text
 
 
-@repeatable
 @given(
     st.lists(
         st.sampled_from(WORDS),

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
@@ -12,7 +12,6 @@ from operator_side.calibration.store import calibration_path, load_calibration, 
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from tests.helpers.refusal import refusal
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 ADDRESS = "aa:bb:cc:00:11:22"
 MEASURED = TravelCalibration(TriggerTravel(0.06, 0.91), TriggerTravel(0.03, 0.98), StickRest(0.02, -0.01, 0.08))
 TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))
@@ -36,7 +35,6 @@ def test_what_was_stored_is_loaded_for_that_controller_alone(own_folder: Path) -
 
 
 @given(st.builds(TravelCalibration, TRIGGERS, TRIGGERS, STICKS, STICKS))
-@REPEATABLE
 def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibration) -> None:
     path = calibration_path(ADDRESS)
     write_calibration(path, ADDRESS, calibration)
