@@ -6,7 +6,7 @@ from typing import Final, cast
 
 import msgspec
 
-from common.command.live_view import Value
+from common.command.live_view import Value, number
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import ZONE_COUNT, Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
@@ -32,7 +32,7 @@ def operator_facts(
 ) -> OperatorFacts:
     """The facts of `now_s`; `status`: `core.status(now_s)`, and what else the status line is made of."""
     felt, written, lease = core.stiffness, core.haptics.written, core.lease
-    pulled = [_number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
+    pulled = [number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
     order = -1 if surroundings.swap_sides else 1
     needed: list[float | None] = [None, None]
     fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
@@ -92,7 +92,3 @@ def _delay(asked: str, samples_s: Iterable[float | None]) -> DelayFacts:
         return DelayFacts(asked, None, None, None)
     nearest_rank = math.ceil(_TAIL * len(known_ms)) - 1
     return DelayFacts(asked, sum(known_ms) / len(known_ms), sorted(known_ms)[nearest_rank], known_ms[-1])
-
-
-def _number(value: Value) -> float | None:
-    return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None
