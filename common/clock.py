@@ -11,7 +11,6 @@ class Clock(Protocol):
 
     def now(self) -> float:
         """Seconds since this clock's origin."""
-        ...
 
 
 class MonotonicClock:

@@ -1,11 +1,8 @@
 """Check that a record's fields lie within the ranges that their type hints declare.
 
     @dataclass(frozen=True)
-    class SafetySettings:
+    class SafetySettings(Limited):
         gap_s: Annotated[float, Meta(gt=0.0, lt=60.0)] = 0.1
-
-        def __post_init__(self) -> None:
-            check_limits(self)
 
 msgspec reads the same `Meta` when it decodes a message or a TOML file, so that a range is declared once. NaN lies in
 no range. `Finite` is any number but NaN and the infinities.
@@ -31,6 +28,15 @@ def check_limits(record: Any) -> None:
     kind: Any = type(record)
     for name, check in _checks(kind):
         check(name, getattr(record, name))
+
+
+class Limited:
+    """A dataclass that is checked when it is made."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check_limits(self)
 
 
 def check_value(name: str, value: object, hint: object) -> None:

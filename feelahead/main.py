@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable, Sequence
 
-from common.command.command_line import run_command
 from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.calibrate import calibrate
@@ -27,11 +26,6 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
 }
 
 
-def main() -> None:
-    """The console script."""
-    run_command("feelahead", command)
-
-
 def command(arguments: Sequence[str]) -> int:
     """Run the command that the first argument names."""
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -46,7 +40,3 @@ def command(arguments: Sequence[str]) -> int:
     if name not in _COMMANDS:
         raise ConfigurationError(f"unknown command {name!r}; valid: {', '.join(_COMMANDS)}")
     return _COMMANDS[name][0](rest)
-
-
-if __name__ == "__main__":
-    main()

@@ -13,18 +13,7 @@ _NOTICED: Final = 0.01
 """Of a travel or a stick: the triggers' own noise is less."""
 _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
 """A command leaves in the turn that is nearest to `LONGEST_HELD_S`, however early or late that turn comes."""
-STOPPING: Final = OperatorIntent(
-    l2=0.0,
-    r2=0.0,
-    lateral=(0.0, 0.0),
-    turning=(0.0, 0.0),
-    run=False,
-    arm=False,
-    emergency_stop=True,
-    next_target=False,
-    hand_over=False,
-    gripper=0,
-)
+STOPPING: Final = OperatorIntent(emergency_stop=True)
 """What the hands mean while it is held, whatever they do."""
 
 

@@ -6,7 +6,7 @@ from typing import Final, cast
 
 import msgspec
 
-from common.command.live_view import Value
+from common.command.live_view import Value, number
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import ZONE_COUNT, Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
@@ -24,8 +24,6 @@ class Surroundings(msgspec.Struct, frozen=True):
     asked_to_robot: str = ""
     """The profile that this side emulates, in the grammar's words"""
     swap_sides: bool = False
-    may_tune: bool = False
-    probability: float | None = None
     page: HandsFacts | None = None
 
 
@@ -33,8 +31,8 @@ def operator_facts(
     core: OperatorSide, status: Mapping[str, Value], surroundings: Surroundings, now_s: float
 ) -> OperatorFacts:
     """The facts of `now_s`; `status`: `core.status(now_s)`, and what else the status line is made of."""
-    felt, written = core.stiffness, core.haptics.written
-    pulled = [_number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
+    felt, written, lease = core.stiffness, core.haptics.written, core.lease
+    pulled = [number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
     order = -1 if surroundings.swap_sides else 1
     needed: list[float | None] = [None, None]
     fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
@@ -75,8 +73,8 @@ def operator_facts(
         round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,
         field_age_ms=1e3 * (now_s - core.stiffness_s) if core.stiffness_received else None,
         hands=surroundings.hands,
-        may_tune=surroundings.may_tune,
-        probability=surroundings.probability,
+        may_tune=lease is not None and lease.may_tune,
+        probability=None if lease is None else lease.probability,
         page=surroundings.page,
     )
 
@@ -94,7 +92,3 @@ def _delay(asked: str, samples_s: Iterable[float | None]) -> DelayFacts:
         return DelayFacts(asked, None, None, None)
     nearest_rank = math.ceil(_TAIL * len(known_ms)) - 1
     return DelayFacts(asked, sum(known_ms) / len(known_ms), sorted(known_ms)[nearest_rank], known_ms[-1])
-
-
-def _number(value: Value) -> float | None:
-    return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None

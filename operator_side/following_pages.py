@@ -6,10 +6,8 @@ from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.facts import HandsFacts
-from operator_side.facts_of_core import Surroundings
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
-from operator_side.sending import Sending
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
 
@@ -25,15 +23,12 @@ def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: Opera
 def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
     """Take what the pages of the console have said since the last call."""
     console.receive()
-    while console.hands:
-        words = console.hands.popleft()
-        if words.hands is None:
-            pages.close(words.page, now_s)
+    while console.words:
+        page, said = console.words.popleft()
+        if said is None:
+            pages.close(page, now_s)
         else:
-            pages.receive(words.page, {"hands": words.hands}, now_s)
-    while console.tuning:
-        words = console.tuning.popleft()
-        pages.receive(words.page, {"tune": words.tune}, now_s)
+            pages.receive(page, said, now_s)
 
 
 def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
@@ -46,7 +41,7 @@ def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
 
 def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
     """Facts for the pages; `shared` None for a real controller."""
-    rest_s = pages.rest_s(now_s)
+    rest_s = pages.rest_s(now_s)  # first, as it looks whether the page is still there
     return HandsFacts(
         may_drive=pages.may_drive,
         driver=pages.driver,
@@ -56,25 +51,4 @@ def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSi
         doing="" if shared is None else shared.doing,
         tuning_refused=core.tuner.why,
         link_asked=core.tuner.link,
-    )
-
-
-def surroundings_of(
-    core: OperatorSide,
-    sending: Sending,
-    pages: DrivingPage,
-    shared: SharedHands | None,
-    now_s: float,
-    *,
-    swap_sides: bool,
-) -> Surroundings:
-    """Collect all that the facts of `now_s` need besides the core."""
-    lease = core.lease
-    return Surroundings(
-        hands="controller" if shared is None else shared.hands,
-        asked_to_robot=sending.asked,
-        swap_sides=swap_sides,
-        may_tune=lease is not None and lease.may_tune,
-        probability=None if lease is None else lease.probability,
-        page=hands_facts(pages, shared, core, now_s),
     )

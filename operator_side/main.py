@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Any, NamedTuple
 
 from common.clock import MonotonicClock, ThreadClock
-from common.command.command_line import given_fields, parse_settings, run_command
+from common.command.command_line import given_fields, parse_settings
 from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal, ignore_broken_output
@@ -33,7 +33,8 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.following_pages import follow_pages, shared_hands, surroundings_of
+from operator_side.facts_of_core import Surroundings
+from operator_side.following_pages import follow_pages, hands_facts, shared_hands
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
@@ -54,11 +55,6 @@ _HELPS = {
 controller is told; what is read from it, and commands. "": all else, such as what is shown."""
 _GUARD_PERIOD_S = 0.5
 """From one look at the watchdog to the next."""
-
-
-def main() -> None:
-    """The console script."""
-    run_command("feelahead-operator", command)
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
@@ -102,11 +98,17 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
                 guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
                 connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
             stack.callback(connection.close)
-            surroundings = functools.partial(
-                surroundings_of, core, sending, pages, person, swap_sides=settings.swap_sides
-            )
             # The console before our own priority is raised, which it would inherit.
-            viewing = Viewing(core, surroundings, status, pages, _console(settings, stack), recording)
+            viewing = Viewing(
+                core,
+                lambda now_s: Surroundings(
+                    "controller" if person is None else person.hands,
+                    sending.asked,
+                    settings.swap_sides,
+                    hands_facts(pages, person, core, now_s),
+                ),
+                *(status, pages, _console(settings, stack), recording),
+            )
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
@@ -298,7 +300,3 @@ class _Loop:
         values["motion_overruns"] = self._pacer.overruns
         values["queue_to_robot_ms"] = self._sending.queue_ms
         return values
-
-
-if __name__ == "__main__":
-    main()

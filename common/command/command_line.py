@@ -42,6 +42,7 @@ def parse_settings(
     except ValueError as error:
         raise ConfigurationError(str(error)) from error
     complaint = io.StringIO()
+    nested = any(dataclasses.is_dataclass(hint) for hint in get_type_hints(settings_type).values())
     try:
         with contextlib.redirect_stderr(complaint):
             return tyro.cli(
@@ -49,9 +50,7 @@ def parse_settings(
                 prog=program,
                 args=list(arguments),
                 default=default,
-                config=(tyro.conf.AvoidSubcommands, tyro.conf.OmitArgPrefixes)
-                if not _is_nested(settings_type)
-                else (tyro.conf.AvoidSubcommands,),
+                config=(tyro.conf.AvoidSubcommands, *(() if nested else (tyro.conf.OmitArgPrefixes,))),
             )
     except SystemExit as stop:
         if stop.code:
@@ -139,10 +138,6 @@ def _config_path(arguments: Sequence[str]) -> str | None:
         elif argument.startswith("--config="):
             path = argument.removeprefix("--config=")
     return path
-
-
-def _is_nested(settings_type: type) -> bool:
-    return any(dataclasses.is_dataclass(hint) for hint in get_type_hints(settings_type).values())
 
 
 def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str, elsewhere: str) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from common.limits import Share, check_limits
+from common.limits import Limited, Share, check_limits
 
 LinkModel = Literal["datagram", "stream"]
 
@@ -15,26 +15,20 @@ QUEUE_LIMIT = 1000
 
 
 @dataclass(frozen=True)
-class Chance:
+class Chance(Limited):
     """Something that happens to a share of the messages."""
 
     share: Share
     correlation: Share = 0.0
 
-    def __post_init__(self) -> None:
-        check_limits(self)
-
 
 @dataclass(frozen=True)
-class Rate:
+class Rate(Limited):
     """A bottleneck that takes one message after the other."""
 
     bits_per_second: Annotated[float, Meta(ge=1.0)]
     overhead_bytes: int = 0
     """On each message, such as headers; negative takes away."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     def transmission_s(self, size_bytes: int) -> float:
         """How long a message of `size_bytes` takes."""

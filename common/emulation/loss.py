@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import FloatArray
-from common.limits import Share, check_limits
+from common.limits import Limited, Share
 
 _DRAWN_AT_ONCE = 256
 _WORDS = 2**32
@@ -41,14 +41,11 @@ def decisions(generator: np.random.Generator, share: float, correlation: float =
 
 
 @dataclass(frozen=True)
-class RandomLoss:
+class RandomLoss(Limited):
     """`loss random`: each message with the same probability."""
 
     probability: Share
     correlation: Share = 0.0
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     def losses(self, generator: np.random.Generator) -> Iterator[bool]:
         """Say of each message whether it is lost, without end and whatever the time between them."""
@@ -60,7 +57,7 @@ class RandomLoss:
 
 
 @dataclass(frozen=True)
-class GilbertElliott:
+class GilbertElliott(Limited):
     """`loss gemodel p r 1-h 1-k`: a good and a bad state, with a loss probability in each.
 
     Each message is lost by the state that the one before left behind, while it takes a step itself.
@@ -74,9 +71,6 @@ class GilbertElliott:
     """1-h."""
     loss_good: Share = 0.0
     """1-k."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     def losses(self, generator: np.random.Generator) -> Iterator[bool]:
         """Say of each message whether it is lost, without end and whatever the time between them."""

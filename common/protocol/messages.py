@@ -101,9 +101,12 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
-    """What all messages share."""
+    """What all messages share; those that check more by hand, or much a second, replace the check of ranges."""
 
     header: Header
+
+    def __post_init__(self) -> None:
+        check_limits(self)
 
 
 class Hello(Message, frozen=True, tag="hello"):
@@ -112,9 +115,6 @@ class Hello(Message, frozen=True, tag="hello"):
     side: Literal["operator", "robot"]
     clock_domain: _Words
     """Names the monotonic clock (common.clock.clock_domain): equal and not empty means a shared clock."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 class MotionCommand(Message, frozen=True, tag="motion"):
@@ -161,9 +161,6 @@ class Watch(Message, frozen=True, tag="watch"):
     lacks: tuple[_Number, _Number] | None = None
     """The newest VideoStep of each view that could not be shown, 0 for none; None: the sender can show JPEG alone."""
 
-    def __post_init__(self) -> None:
-        check_limits(self)
-
 
 class Tune(Message, frozen=True, tag="tune"):
     """What the owner wants to be different while the run goes on; repeated until a notice says that it was taken."""
@@ -174,9 +171,6 @@ class Tune(Message, frozen=True, tag="tune"):
     """P of eq. 10, within (0, 1); None leaves it."""
     link: _Words | None = None
     """The emulated link of both directions in netem's words, none for an empty text; None leaves it."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 class LeaseNotice(Message, frozen=True, tag="lease"):
@@ -198,9 +192,6 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     tuned: _Number = 0
     """The number of the receiver's newest wish to tune that arrived, granted or not."""
 
-    def __post_init__(self) -> None:
-        check_limits(self)
-
 
 class LinkReport(Message, frozen=True, tag="report"):
     """The robot side's view of the link to the owner, twice a second."""
@@ -215,9 +206,6 @@ class LinkReport(Message, frozen=True, tag="report"):
     """How often and how well they are made."""
     held_back: _Words
     """The streams that gave way since the last report, and why; empty for none."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     def values(self) -> dict[str, float | str | None]:
         """The same as status values."""
@@ -299,9 +287,6 @@ class Telemetry(Message, frozen=True, tag="telemetry"):
     """The largest over the gripper's spheres."""
     l2: Share
     r2: Share
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

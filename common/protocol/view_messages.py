@@ -12,7 +12,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta
 
-from common.limits import Finite, check_limits
+from common.limits import Finite
 from common.protocol.messages import Message, Vector3
 
 ViewName = Literal["overview", "first_person"]
@@ -36,9 +36,6 @@ class VideoFrame(Message, frozen=True, tag="video"):
     height: _Pixels
     jpeg: bytes
 
-    def __post_init__(self) -> None:
-        check_limits(self)
-
 
 class VideoStep(Message, frozen=True, tag="step"):
     """One picture of one camera in H.264: whole, or the changes since the picture before it."""
@@ -54,9 +51,6 @@ class VideoStep(Message, frozen=True, tag="step"):
     """Whether it can be shown without any other"""
     h264: bytes
     """An access unit in Annex B's form"""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

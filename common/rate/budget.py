@@ -74,7 +74,8 @@ class Budget(Generic[Name]):
         self._streams: dict[Name, _Stream] = {name: _Stream() for name in paced}
         self._number: dict[Name, int] = dict.fromkeys(paced, first_number)
         self._dropped = {"telemetry": {"rate": 0, "queue": 0}}
-        self._level_bytes = 0.0
+        self.level_bytes = 0.0
+        """Bytes that may leave at once; below 0 a debt."""
         self._now_s: float | None = None
         self._telemetry_s = -math.inf
         self._flows_s = math.inf
@@ -99,7 +100,7 @@ class Budget(Generic[Name]):
         self._fill(now_s)
         taken = on_the_wire(size_bytes)
         self.controller.sent(taken, now_s, _URGENCY.get(stream, Urgency.PACED))
-        self._level_bytes = max(self._level_bytes - taken, -_DEBT_S * self.controller.rate_bit_s / 8.0)
+        self.level_bytes = max(self.level_bytes - taken, -_DEBT_S * self.controller.rate_bit_s / 8.0)
         if stream not in self._streams:
             self._must_bit_s += 8.0 * taken / _SMOOTHING_S
         if stream == "haptics":
@@ -109,7 +110,7 @@ class Budget(Generic[Name]):
         """Return True and count it if telemetry of that size leaves now; if not, the next one is newer."""
         self._fill(now_s)
         flows = self.controller.may_send(now_s)
-        if (flows and self._level_bytes > 0.0) or now_s - self._telemetry_s >= _SELDOM_S:
+        if (flows and self.level_bytes > 0.0) or now_s - self._telemetry_s >= _SELDOM_S:
             self._telemetry_s = now_s
             self.spend("telemetry", size_bytes, now_s)
             return True
@@ -131,12 +132,12 @@ class Budget(Generic[Name]):
         for name, stream in self._streams.items():
             while (size_bytes := self._next_bytes(stream)) and self.controller.may_send(now_s):
                 # A piece may be larger than the bucket by a quarter; then a full one will do.
-                if self._level_bytes < min(on_the_wire(size_bytes), self._depth_bytes):
+                if self.level_bytes < min(on_the_wire(size_bytes), self._depth_bytes):
                     break
                 leaving.append(self._next(name, stream, size_bytes))
                 self.spend(name, len(leaving[-1].payload), now_s)
         # Only now: where haptics leave in every turn, the bucket would never be full.
-        self._level_bytes = min(self._level_bytes, self._depth_bytes)
+        self.level_bytes = min(self.level_bytes, self._depth_bytes)
         if not self.controller.may_send(now_s) or not any(stream.left_bytes for stream in self._streams.values()):
             self._flows_s = now_s
         self.controller.update(now_s, limited=now_s - self._flows_s > SLICE_S)
@@ -173,13 +174,8 @@ class Budget(Generic[Name]):
         elapsed_s = 0.0 if self._now_s is None else max(0.0, now_s - self._now_s)
         self._now_s = now_s if self._now_s is None else max(now_s, self._now_s)
         bytes_s = self.controller.rate_bit_s / 8.0
-        self._level_bytes += bytes_s * elapsed_s
+        self.level_bytes += bytes_s * elapsed_s
         self._must_bit_s *= math.exp(-elapsed_s / _SMOOTHING_S)
-
-    @property
-    def level_bytes(self) -> float:
-        """Bytes that may leave at once; below 0 a debt."""
-        return self._level_bytes
 
     def waiting_s(self, stream: Name) -> float:
         """How long what is offered to `stream` now would wait; endless where a whole of it has not begun to leave.

@@ -1,7 +1,6 @@
 """Garbage collection out of the way of the ticks: never by itself, only when there is time for it."""
 
 import gc
-from types import TracebackType
 
 from common.clock import Clock
 from common.statistics import RunningStatistics
@@ -28,9 +27,7 @@ class IdleCollection:
         gc.disable()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         gc.enable()
         gc.unfreeze()
 

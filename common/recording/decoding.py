@@ -10,7 +10,7 @@ import msgspec
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, decode_view
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
-from common.protocol.view_messages import AnyViewMessage, EnlargementTerms, SceneState
+from common.protocol.view_messages import AnyViewMessage, SceneState
 from common.recording.entries import Block, Entry, Kind, split_text
 from common.recording.wire import as_json
 
@@ -120,16 +120,17 @@ def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple
     if isinstance(message, Telemetry):
         yield _shown("/telemetry", now_s, stamps, msgspec.structs.asdict(message))
     elif isinstance(message, SceneState):
-        yield _shown("/enlargement", now_s, stamps, {"l2": _terms(message.l2), "r2": _terms(message.r2)})
+        yield _shown(
+            "/enlargement",
+            now_s,
+            stamps,
+            {name: msgspec.structs.asdict(getattr(message, name)) for name in ("l2", "r2")},
+        )
         of_objects = [
             {"object": objects[index] if index < len(objects) else str(index), "l2_mm3": 1e9 * l2, "r2_mm3": 1e9 * r2}
             for index, l2, r2 in message.overlaps
         ]
         yield _shown("/overlap", now_s, stamps, {"objects": of_objects})
-
-
-def _terms(terms: EnlargementTerms) -> dict[str, Any]:
-    return msgspec.structs.asdict(terms)
 
 
 def _shown(topic: str, now_s: float, stamps: dict[str, Any], values: dict[str, Any]) -> Shown:

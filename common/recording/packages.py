@@ -1,4 +1,4 @@
-"""The packages of the extra `record`, which are not needed to run."""
+"""The packages of extras, which are not needed to run."""
 
 from importlib.util import find_spec
 

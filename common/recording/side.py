@@ -37,11 +37,9 @@ class Encoder(Protocol):
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         """When it happened, and its entries; a payload for who looks goes to `views` with when."""
-        ...
 
     def begin_anew(self) -> None:
         """What was told so far may be lost: tell the next thing whole."""
-        ...
 
 
 def require_recordable(path: Path | None) -> None:

@@ -3,7 +3,6 @@
 import os
 import select
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Self
 
 import zmq
@@ -96,12 +95,7 @@ class SocketShell:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

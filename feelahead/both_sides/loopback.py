@@ -55,7 +55,6 @@ class Person(Protocol):
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
-        ...
 
 
 class Loopback:

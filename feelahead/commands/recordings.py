@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
-from common.limits import check_limits
+from common.limits import Limited
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 from feelahead.recordings.playback import require_protocol
@@ -22,7 +22,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator,record]'"
 
 
 @dataclass(frozen=True)
-class ReplaySettings:
+class ReplaySettings(Limited):
     """Show a recording in the console, or compute its cores again.
 
     Try: feelahead demo --record run.mcap, then feelahead replay run.mcap --check.
@@ -39,9 +39,6 @@ class ReplaySettings:
     """On the whole terminal, instead of the console's page."""
     console_port: Annotated[int, Meta(ge=0, le=65535)] = 0
     """The page's port on this machine; 0: any that is free."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 @dataclass(frozen=True)

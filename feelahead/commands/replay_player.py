@@ -60,8 +60,8 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
             if console.came != came:
                 came = console.came
                 playback.show_again()
-            while console.playing:
-                playback.wish(console.playing.popleft().play)
+            while console.words:
+                playback.wish((console.words.popleft()[1] or {}).get("play"))
             for one in playback.advance(passed_s):
                 send(one)
             since_s += passed_s

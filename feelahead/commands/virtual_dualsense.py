@@ -11,7 +11,7 @@ from msgspec import Meta
 from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
-from common.limits import check_limits
+from common.limits import Limited
 from operator_side.dualsense.effects.official import AnyEffect, Off, OtherEffect
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.transport import Transport
@@ -30,7 +30,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class VirtualDualSenseSettings:
+class VirtualDualSenseSettings(Limited):
     """A virtual DualSense through /dev/uhid (Linux): games, drivers and feelahead-operator see it as a real one.
 
     It prints what it is told to do. Ctrl-C unplugs it.
@@ -44,9 +44,6 @@ class VirtualDualSenseSettings:
     """Unplug it after this long; without it, at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
     """none: no hands; pulling: R2 and L2 in turn, and the left stick round."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 def virtual_dualsense(arguments: Sequence[str]) -> int:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from typing import Any, cast
 
 from common.errors import ConfigurationError, FeelaheadError
+from common.recording.packages import require_packages
 
 _LOOK_S = 1.0
 _CONNECT_S = "10s"
@@ -52,11 +53,10 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
 
     own_file: a question's file that the cluster does not have; it is sent there.
     """
-    try:
-        import distributed  # noqa: PLC0415  # large, and in the extra `experiments`
-        from distributed.comm.core import CommClosedError  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        raise ConfigurationError("--scheduler: distributed is missing; it is in the extra `experiments`") from error
+    require_packages("--scheduler", "distributed", extra="experiments")
+    import distributed  # noqa: PLC0415  # large
+    from distributed.comm.core import CommClosedError  # noqa: PLC0415
+
     for name in ("distributed", "distributed.client"):  # its import has set them up; the error says what went wrong
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
+from common.recording.packages import require_packages
 
 PICTURES: Final = (".png", ".svg", ".pdf")
 """Endings that a picture's name may have."""
@@ -24,13 +25,12 @@ def figure(path: Path, rows: int = 1, columns: int = 1, title: str = "", **optio
 
     ConfigurationError without matplotlib, and where the file cannot be written.
     """
-    try:
-        import matplotlib as mpl  # noqa: PLC0415  # slow to load, and only for pictures
+    require_packages("--picture", "matplotlib", extra="experiments")
+    import matplotlib as mpl  # noqa: PLC0415  # slow to load, and only for pictures
 
-        mpl.use("Agg")
-        from matplotlib import pyplot as plt  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        raise ConfigurationError("--picture: matplotlib is missing; it is in the extra `experiments`") from error
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
     with mpl.rc_context({"svg.hashsalt": "feelahead"}):
         layout: dict[str, Any] = {"dpi": 110, "layout": "constrained"} | options
         drawn, axes = plt.subplots(rows, columns, **layout)

@@ -30,11 +30,9 @@ class Shown(Protocol):
 
     def begin(self, piece: str) -> None:
         """Name the piece of work that takes its time now."""
-        ...
 
     def advance(self, share: float) -> None:
         """Count what is done."""
-        ...
 
 
 @contextmanager

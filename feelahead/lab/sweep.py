@@ -93,6 +93,11 @@ S = TypeVar("S", bound=Sweep)
 C = TypeVar("C")
 
 
+def cell_of(kind: type[C], settings: Sweep) -> C:
+    """Make the cell of those settings that it declares for them, as a base of their class."""
+    return kind(**{name: getattr(settings, name) for name in kind.__dataclass_fields__})  # type: ignore[attr-defined]
+
+
 def _nothing(*_: Any) -> tuple[()]:
     return ()
 

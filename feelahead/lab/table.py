@@ -7,6 +7,7 @@ from typing import Any
 
 from common.errors import ConfigurationError
 from common.files.output_file import output_file
+from common.recording.packages import require_packages
 
 Row = dict[str, Any]
 """Figures by name, as JSON has them. Lists and tables go to `--summary` alone, the rest also to `--csv`."""
@@ -61,11 +62,10 @@ class Table:
 
     def write_parquet(self, path: Path) -> None:
         """Write the scalar columns as Parquet; ConfigurationError without pyarrow."""
-        try:
-            import pyarrow as pa  # noqa: PLC0415  # large, and only asked for by name
-            from pyarrow import parquet  # noqa: PLC0415
-        except ModuleNotFoundError as error:
-            raise ConfigurationError("--parquet: pyarrow is missing; it is in the extra `experiments`") from error
+        require_packages("--parquet", "pyarrow", extra="experiments")
+        import pyarrow as pa  # noqa: PLC0415  # large, and only asked for by name
+        from pyarrow import parquet  # noqa: PLC0415
+
         columns = {name: [row.get(name) for row in self.rows] for name in self.columns}
         new = path.with_name(f".{path.name}.new")
         try:

@@ -2,7 +2,7 @@
 
 operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run,
                           p where in a recording we are
-here ──▶ operator side    a the address, w how many pages are open, h hands, t tuning, p playing, e why there is none,
+here ──▶ operator side    a the address, w how many pages are open, s what a page said, e why there is none,
                           l which pictures in H.264 are lacking: said once where they can be shown, and at each change
 """
 

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 from typing import Any, Final, Self
 
 import msgspec
@@ -18,15 +17,8 @@ _END_LIMIT_S: Final = 0.3
 """It may still be starting, and has nothing to lose."""
 
 
-class PageWords(msgspec.Struct, frozen=True):
-    """What one page said of its hands, of what it wants tuned, or of how a recording is to be played."""
-
-    page: int
-    """Which of the pages of this run"""
-    hands: dict[str, Any] | None = None
-    """None, where hands were to be expected: this page is gone"""
-    tune: dict[str, Any] | None = None
-    play: dict[str, Any] | None = None
+PageWords = tuple[int, dict[str, Any] | None]
+"""Which of the pages of this run, and its `hands`, what it wants to `tune`, or to `play`; None: this page is gone."""
 
 
 class Console:
@@ -42,9 +34,7 @@ class Console:
         """As in `Watch`; None until it is known that pictures in H.264 can be shown."""
         self.came = 0
         """How often one came to look."""
-        self.hands: deque[PageWords] = deque(maxlen=_MOST_HEARD)
-        self.tuning: deque[PageWords] = deque(maxlen=_MOST_HEARD)
-        self.playing: deque[PageWords] = deque(maxlen=_MOST_HEARD)
+        self.words: deque[PageWords] = deque(maxlen=_MOST_HEARD)
         """What the pages said, the oldest first, for whoever takes it."""
         self._handling: set[int] = set()
         """The pages that have said something of their hands, and are not gone."""
@@ -58,9 +48,7 @@ class Console:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
@@ -107,22 +95,24 @@ class Console:
             elif kind == b"e":
                 self._end(f"no console: {content.decode()}")
                 return
-            elif kind in (b"h", b"t", b"p"):
-                self._hear(kind, msgspec.msgpack.decode(content, type=PageWords))
+            elif kind == b"s":
+                self._hear(*msgspec.msgpack.decode(content, type=PageWords))
         if channel.ended:
             self._end("the console has ended; the run goes on without it")
 
-    def _hear(self, kind: bytes, words: PageWords) -> None:
-        {b"h": self.hands, b"t": self.tuning, b"p": self.playing}[kind].append(words)
-        if kind == b"h":
-            (self._handling.discard if words.hands is None else self._handling.add)(words.page)
+    def _hear(self, page: int, said: dict[str, Any] | None) -> None:
+        self.words.append((page, said))
+        if said is None:
+            self._handling.discard(page)
+        elif "hands" in said:
+            self._handling.add(page)
 
     def _end(self, why: str) -> None:
         """Whoever watched sees no more; whose hands moved something through a page is gone, too."""
         self.gone, self.address = True, None
         self.pages = 0
         for page in sorted(self._handling):
-            self._hear(b"h", PageWords(page))
+            self._hear(page, None)
         self._notes.append(why)
 
     def take_notes(self) -> list[str]:

@@ -20,7 +20,6 @@ class Headers(Protocol):
 
     def get_all(self, key: str) -> Sequence[str]:
         """Every value of one header, whose name is found in any case."""
-        ...
 
 
 class Gate:

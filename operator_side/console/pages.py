@@ -17,8 +17,6 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket's own codes: try again later; policy violation."""
 
-_WORDS: Final = (("h", "hands"), ("t", "tune"), ("p", "play"))
-
 ROUND_ENDS: Final = '{"kind":"end"}'
 """A page answers it with `taken`."""
 
@@ -121,7 +119,7 @@ class Pages:
             sending.cancel()
             del self._pages[number]
             self._count()
-            self._heard("h", msgspec.msgpack.encode({"page": number, "hands": None}))
+            self._heard("s", msgspec.msgpack.encode((number, None)))
 
     def _count(self) -> None:
         self._changed(sum(page.looks for page in self._pages.values()))
@@ -154,6 +152,6 @@ class Pages:
             if said.looks is not None and said.looks != page.looks:
                 page.looks = said.looks
                 self._count()
-            for kind, name in _WORDS:
-                if (words := getattr(said, name)) is not None:
-                    self._heard(kind, msgspec.msgpack.encode({"page": number, name: words}))
+            words = {"hands": said.hands, "tune": said.tune, "play": said.play}
+            if words := {name: value for name, value in words.items() if value is not None}:
+                self._heard("s", msgspec.msgpack.encode((number, words)))

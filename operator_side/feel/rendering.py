@@ -9,16 +9,10 @@ from typing import Annotated, Any, Final
 
 from msgspec import Meta
 
-from common.limits import check_limits
+from common.limits import Limited
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
-from operator_side.dualsense.effects.official import (
-    MAX_STRENGTH,
-    ZONE_COUNT,
-    MultiPositionFeedback,
-    Off,
-    TriggerEffect,
-)
+from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback, Off, TriggerEffect
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement
@@ -31,14 +25,11 @@ _ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True)
-class RenderingSettings:
+class RenderingSettings(Limited):
     """How what lies ahead becomes what a finger feels."""
 
     horizon_s: Annotated[float, Meta(ge=0.0, le=2.0)] = HORIZON_S
     """h: so long a speed goes on before anything felt can change it (reaction, the finger's way, a write)."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 class RenderedTrigger:

@@ -14,21 +14,21 @@ _DEFAULT_CALIBRATION: Final = TravelCalibration()
 class OperatorIntent:
     """What the operator's hands mean at one moment. Buttons are levels: they are true as long as they are held."""
 
-    l2: float
+    l2: float = 0.0
     """Calibrated travel, 0 to 1, of the trigger that retreats: L2, unless the sides are swapped."""
-    r2: float
+    r2: float = 0.0
     """Calibrated travel, 0 to 1, of the trigger that advances."""
-    lateral: Stick
+    lateral: Stick = (0.0, 0.0)
     """Of the stick that moves across, the left one: right and up positive, within the unit circle."""
-    turning: Stick
+    turning: Stick = (0.0, 0.0)
     """Of the stick that turns, the right one."""
-    run: bool
-    arm: bool
-    emergency_stop: bool
-    next_target: bool
+    run: bool = False
+    arm: bool = False
+    emergency_stop: bool = False
+    next_target: bool = False
     """One press is one step: whoever counts looks for the change from false to true."""
-    hand_over: bool
-    gripper: Literal[-1, 0, 1]
+    hand_over: bool = False
+    gripper: Literal[-1, 0, 1] = 0
     """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
     """What the controller itself reports of its own L2 and R2, 0 to 1 each, uncalibrated and never swapped."""

@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from common.limits import Share, check_limits
+from common.limits import Limited, Share
 
 _Usual = Annotated[float, Meta(ge=0.0, lt=10.0)]
 """Metres or seconds, as people have them."""
 
 
 @dataclass(frozen=True)
-class PersonSettings:
+class PersonSettings(Limited):
     """A person's limits; every value is an assumption that can be set."""
 
     visual_reaction_s: _Usual = 0.25
@@ -50,6 +50,3 @@ class PersonSettings:
     pull_n: Annotated[float, Meta(ge=0.0, le=20.0)] | None = None
     """Instead of all this: arm, then pull R2 with this force and go on, whatever is felt or seen. 2 N is a light pull,
     3.7 N a normal one."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)

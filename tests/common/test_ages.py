@@ -2,13 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.silence import counted_s
 from common.timing.ages import LoopAge, QueueingAge
 
-repeatable = settings(derandomize=True, deadline=None)
 delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)
 
 
@@ -42,7 +41,6 @@ def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
     assert loop_age.value(10.0 + elapsed_s) == pytest.approx(expected_s, rel=1e-12)
 
 
-@repeatable
 @given(delays)
 def test_loop_age_never_lies_below_the_quantile_or_rises_by_waiting(ages_s: list[float]) -> None:
     loop_age = LoopAge(worst_case_s=0.2, probability=0.5, window=5)
@@ -72,7 +70,6 @@ def test_loop_age_refuses_a_worst_case_that_is_none(worst_case_s: float) -> None
 # Queueing age
 
 
-@repeatable
 @given(delays, st.floats(-1e5, 1e5))
 def test_a_clock_offset_cancels(delays_s: list[float], offset_s: float) -> None:
     alike, apart = QueueingAge(), QueueingAge()
@@ -82,7 +79,6 @@ def test_a_clock_offset_cancels(delays_s: list[float], offset_s: float) -> None:
         assert apart.update(sent_s + offset_s, sent_s + delay_s) == pytest.approx(age_s, abs=1e-9)
 
 
-@repeatable
 @given(delays)
 def test_age_is_what_exceeds_the_least_delay(delays_s: list[float]) -> None:
     queueing = QueueingAge()

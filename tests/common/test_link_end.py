@@ -171,7 +171,7 @@ ways = st.builds(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(ways, ways, st.floats(-0.9 * MAX_SKEW, 0.9 * MAX_SKEW), st.floats(-0.1, 0.1), st.integers(0, 2**32))
 def test_the_bound_holds_on_every_arrival_whatever_the_link(
     to_robot: Way, to_operator: Way, skew: float, asymmetry_s: float, seed: int
@@ -251,7 +251,6 @@ hold = st.floats(0.0, 1e9) | st.floats(0.0, 0.1)
 invented = st.lists(st.tuples(stamp, stamp, hold, stamp, hold), min_size=1, max_size=12)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.lists(invented, min_size=1, max_size=4), st.booleans())
 def test_a_peer_that_invents_stamps_spoils_nothing_for_long(
     bouts: list[list[tuple[float, float, float, float, float]]], shared: bool

@@ -35,28 +35,15 @@ from common.protocol.messages import (
 )
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
-from common.protocol.view_messages import (
-    AnyViewMessage,
-    EnlargementTerms,
-    SceneShapes,
-    SceneState,
-    Shape,
-    VideoFrame,
-    VideoStep,
-)
-from tests.helpers.felt import felt, field, ways
+from common.protocol.view_messages import AnyViewMessage, SceneShapes, Shape, VideoFrame, VideoStep
+from tests.helpers.felt import felt, field, scene_state, ways
 
-repeatable = settings(derandomize=True, deadline=None)
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
 ROW = struct.pack("<7f", *POSE)
-TERMS = EnlargementTerms(0.01, 0.001, 0.002, 0.003, 0.004, 2.3, 0.1, 0.02)
 SHAPE = Shape(0, False, "mesh", (1.0, 1.0, 1.0), POSE, vertices_m=b"\x00" * 12, triangles=b"\x01" * 12)
-SCENE = SceneState(
-    *(HEADER, 1, 2.5, ROW, struct.pack("<I", 3), ROW, bytes([0, 1]), POSE, bytes(16), ((3, 1e-9, 2e-9),)),
-    *(TERMS, TERMS, 100.0, 200.0, 0),
-)
+SCENE = msgspec.structs.replace(scene_state(HEADER), roles=bytes([0, 1]), spheres=bytes(16))
 VIEWS: tuple[AnyViewMessage, ...] = (
     VideoFrame(HEADER, view="overview", captured_s=3.0, width=640, height=480, jpeg=bytes(range(256)) * 100),
     SceneShapes(HEADER, 1, ("palm",), ("ball",), (SHAPE,), 2, ROW),
@@ -132,7 +119,7 @@ def said(message: Message) -> dict[str, Any]:
 
 
 @given(messages | st.sampled_from(VIEWS))
-@settings(repeatable, max_examples=300)
+@settings(max_examples=300)
 def test_a_message_comes_back_as_it_was_and_is_messagepack(message: Any) -> None:
     payload = encode(message)
     ours, others = (decode_view, decode) if isinstance(message, get_args(AnyViewMessage)) else (decode, decode_view)
@@ -171,7 +158,7 @@ def is_told_as_it_was(message: StiffnessUpdate | Telemetry, back: Any) -> None:
 
 
 @given(messages, st.data())
-@settings(repeatable, max_examples=500)
+@settings(max_examples=500)
 def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, data: st.DataObject) -> None:
     hostile = bytearray(encode(message))
     for _ in range(data.draw(st.integers(1, 4))):
@@ -188,7 +175,7 @@ def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, d
 
 
 @given(made(StiffnessUpdate) | made(Telemetry), st.data())
-@settings(repeatable, max_examples=500)
+@settings(max_examples=500)
 def test_any_field_of_bytes_is_refused_whole_or_valid_through_and_through(
     message: StiffnessUpdate | Telemetry, data: st.DataObject
 ) -> None:
@@ -256,7 +243,7 @@ nested = st.recursive(
 
 
 @given(st.binary(max_size=200) | nested.map(lambda content: msgpack.packb([PROTOCOL_VERSION, content])))
-@settings(repeatable, max_examples=1000)
+@settings(max_examples=1000)
 def test_garbage_and_well_packed_nonsense_raise_the_documented_error(payload: bytes) -> None:
     with pytest.raises(RemoteProtocolError):
         decode(payload)

@@ -74,7 +74,7 @@ towards_armed = st.sampled_from([SessionEvent.ASKED_WHILE_FREE, SessionEvent.HEA
 
 
 @given(st.lists(towards_armed | st.sampled_from(SessionEvent), max_size=40))
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_armed_always_follows_a_lease_a_healthy_second_and_the_button(events: list[SessionEvent]) -> None:
     session = Session()
     since_lease: list[SessionEvent] = []

@@ -2,12 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.statistics import RESERVOIR_SIZE, RunningStatistics, SlidingMinimum, SlidingQuantile
 
-repeatable = settings(derandomize=True, deadline=None)
 samples = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200)
 
 
@@ -18,7 +17,6 @@ def test_without_samples_everything_is_absent() -> None:
     assert empty.summary_ms() == dict.fromkeys(("mean", "sd", "p50", "p95", "p99"))
 
 
-@repeatable
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2000), st.sets(st.integers(0, 1999), max_size=5))
 def test_asking_in_between_changes_nothing(values: list[float], asked_at: set[int]) -> None:
     quiet, asked = RunningStatistics(0), RunningStatistics(0)
@@ -35,7 +33,6 @@ def test_asking_in_between_changes_nothing(values: list[float], asked_at: set[in
     assert asked.quantile(0.37) == quiet.quantile(0.37) == np.quantile(values, 0.37)
 
 
-@repeatable
 @given(st.lists(st.lists(st.floats(-1e6, 1e6), max_size=700), max_size=4))
 def test_many_at_once_are_as_good_as_one_by_one(blocks: list[list[float]]) -> None:
     together, single = RunningStatistics(0), RunningStatistics(0)
@@ -109,7 +106,6 @@ def test_refuses_an_empty_window() -> None:
         SlidingQuantile(window=0)
 
 
-@repeatable
 @given(samples, st.integers(1, 50), st.sampled_from([0.05, 0.25, 0.5, 0.75, 0.95, 1.0]))
 def test_sliding_quantile_agrees_with_numpy(values: list[float], window: int, probability: float) -> None:
     sliding = SlidingQuantile(window, probability)
@@ -129,7 +125,6 @@ def test_sliding_quantile_forgets_on_request() -> None:
     assert sliding.value == 0.5
 
 
-@repeatable
 @given(
     st.lists(st.tuples(st.integers(0, 3), st.integers(0, 9)), min_size=1, max_size=200),
     st.integers(1, 8),

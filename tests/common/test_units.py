@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
@@ -53,14 +53,12 @@ def test_negative_and_infinite_durations_are_named(text: str) -> None:
     assert "0s or longer" in str(caught.value)
 
 
-@settings(derandomize=True, deadline=None)
 @given(value=st.floats(0.0, 1e12, allow_subnormal=False), unit=st.sampled_from(["us", "ms", "s"]))
 def test_every_number_that_python_writes_is_read(value: float, unit: str) -> None:
     scale = {"us": 1e6, "ms": 1e3, "s": 1.0}[unit]
     assert parse_duration(f"{value!r}{unit}", "delay") == pytest.approx(value / scale, rel=1e-14)
 
 
-@settings(derandomize=True, deadline=None)
 @given(text=st.text(max_size=12))
 def test_any_text_is_a_duration_or_a_complaint(text: str) -> None:
     try:

@@ -6,12 +6,7 @@ from typing import Any
 
 from operator_side.dualsense.hid.device import HidHandle
 from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.dualsense.reports.feature_report import (
-    ADDRESS_ID,
-    FIRMWARE_ID,
-    Firmware,
-    build_address,
-)
+from operator_side.dualsense.reports.feature_report import ADDRESS_ID, FIRMWARE_ID, Firmware, build_address
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.transport import Transport
 

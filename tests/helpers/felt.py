@@ -1,11 +1,13 @@
-"""Fields that a robot side may send, and effects that they become: what tests need often."""
+"""Messages that a robot side may send, and effects that they become: what tests need often."""
 
+import struct
 from typing import Any
 
 import msgspec
 
-from common.protocol.messages import Header, MotionState, StiffnessUpdate, TriggerField, Ways
+from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry, TriggerField, Ways
 from common.protocol.uniform_field import FAR_M, uniform_field
+from common.protocol.view_messages import EnlargementTerms, SceneState
 from operator_side.dualsense.effects.official import MultiPositionFeedback
 
 
@@ -26,6 +28,25 @@ def felt(
     """The same strength in every zone of each trigger, 0 to 8, whatever the hands and the arm do."""
     return StiffnessUpdate(
         header, uniform_field(l2), uniform_field(r2), speed_m_s=0.0, horizon_m=FAR_M, rumble=rumble, state=state
+    )
+
+
+def telemetry(header: Header, **changes: Any) -> Telemetry:
+    """A tool at the origin that looks downwards, disarmed, and nothing else, unless `changes` say otherwise."""
+    still = Telemetry(
+        *(header, "disarmed", (0.0, 0.0, 0.0), 0.0, None, None, (0.0, -1.0, 0.0)),
+        *(0.0, False, 0.0, 0.0, 0.0),
+    )
+    return msgspec.structs.replace(still, **changes)
+
+
+def scene_state(header: Header, version: int = 1) -> SceneState:
+    """One link, one object and no sphere, all in one place."""
+    pose = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
+    row, terms = struct.pack("<7f", *pose), EnlargementTerms(0.01, 0.0, 0.001, 0.003, 0.002, 2.3, 0.1, 0.02)
+    return SceneState(
+        *(header, version, 1.0, row, bytes(4), row, b"\0", pose, b"", ((0, 1e-9, 2e-9),)),
+        *(terms, terms, 50.0, 80.0, 0),
     )
 
 

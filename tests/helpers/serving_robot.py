@@ -8,11 +8,11 @@ import msgpack
 from common.clock import MonotonicClock
 from common.protocol.codec import PROTOCOL_VERSION, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Telemetry
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
+from tests.helpers.felt import telemetry
 
 LEASE_S = 59.0
 """Long enough for an owner who says nothing to stay one."""
@@ -66,24 +66,7 @@ class ServingRobot:
             for answer in self.session.take_answers(now_s):
                 self.sockets.send(answer.peer, answer.payload)
             if self._publishes:
-                self.sockets.publish(b"telemetry", self._telemetry(now_s))
+                self.sockets.publish(b"telemetry", encode(telemetry(self.session.view_header(now_s))))
 
     def tick(self, now_s: float) -> None:
         """Do more than answer, where a test needs that; `now_s`: the turn's time."""
-
-    def _telemetry(self, now_s: float) -> bytes:
-        message = Telemetry(
-            self.session.view_header(now_s),
-            state="disarmed",
-            tool_position_m=(0.0, 0.0, 0.0),
-            tool_speed_m_s=0.0,
-            target=None,
-            target_in_tool_m=None,
-            up_in_tool=(0.0, 0.0, 1.0),
-            gripper_opening_m=0.0,
-            holding=False,
-            enlargement_m=0.0,
-            l2=0.0,
-            r2=0.0,
-        )
-        return encode(message)

@@ -16,25 +16,20 @@ from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SP
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.simulated_person.person import Phase, SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
+from tests.helpers.felt import telemetry
 
 TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()
 GRASP_M = 0.02
 CLEAR_SIGHTED = PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M)
 """A person who judges distances rightly, so that a test can say where the target seems to be."""
-VIEW = Telemetry(
+VIEW = telemetry(
     Header(epoch=1, sequence=1, sent_s=0.0),
-    state="disarmed",
     tool_position_m=(0.5, 0.0, 0.3),
-    tool_speed_m_s=0.0,
     target="target",
     target_in_tool_m=(0.0, 0.0, 0.3),
-    up_in_tool=(0.0, -1.0, 0.0),
     gripper_opening_m=0.08,
-    holding=False,
     enlargement_m=0.01,
-    l2=0.0,
-    r2=0.0,
 )
 IN_REACH: Vector3 = (0.0, 0.0, -GRASP_M)
 

@@ -1,16 +1,14 @@
 """The robot side's end of the link without a robot: it grants the lease, and its fields are as stiff as it is told."""
 
-from types import TracebackType
-
 from common.clock import MonotonicClock, clock_domain
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
+from common.protocol.messages import Hello, LeaseNotice, MotionCommand, MotionState
 from common.protocol.session import SessionState
-from common.protocol.uniform_field import FAR_M, uniform_field
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.sockets.robot import RobotSockets
+from tests.helpers.felt import felt
 
 TICK_PERIOD_S = 1e-3
 """The robot side's own."""
@@ -39,9 +37,7 @@ class StiffnessSource:
     def __enter__(self) -> "StiffnessSource":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._sockets.close()
 
     @property
@@ -93,13 +89,5 @@ class StiffnessSource:
             session = SessionState.ARMED if self.state == "armed" else SessionState.DISARMED
             notice = LeaseNotice(self._link.stamp(now_s), session=session, why="", token=1, waiting=0)
             self._sockets.send(self._peer, encode(notice))
-        stiffness = StiffnessUpdate(
-            self._link.stamp(self._clock.now()),
-            l2=uniform_field(self.l2),
-            r2=uniform_field(self.r2),
-            speed_m_s=0.0,
-            horizon_m=FAR_M,
-            rumble=0.0,
-            state=self.state,
-        )
+        stiffness = felt(self._link.stamp(self._clock.now()), l2=self.l2, r2=self.r2, state=self.state)
         self._sockets.send(self._peer, encode(stiffness))

@@ -26,7 +26,7 @@ def moved(intent: OperatorIntent) -> tuple[float, ...]:
 
 
 @given(st.lists(st.tuples(intents | st.just(REST), st.integers(1, 12), st.floats(-0.005, 0.005)), max_size=12))
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_what_is_held_is_what_is_meant(steps: Any) -> None:
     held = HeldCommand()
     known, known_s, now_s = None, 0.0, 0.0

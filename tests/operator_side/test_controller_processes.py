@@ -11,24 +11,17 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pytest
 
 from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.output_report import (
-    RELEASED,
-    WARNING_LIGHT,
-    OutputReport,
-    parse_output_report,
-)
+from operator_side.dualsense.reports.output_report import RELEASED, WARNING_LIGHT, OutputReport, parse_output_report
+from tests.helpers.python_process import LIMIT_S, ended
 from tests.helpers.repository import ROOT
 from tests.operator_side.stiffness_source import StiffnessSource
 
 pytestmark = pytest.mark.processes
-LIMIT_S = 600.0
-"""Long enough for a machine that is busy with other things, too."""
 REPORT_LENGTH = 48
 ATTEMPTS = 20
 
@@ -153,9 +146,7 @@ class World:
     def __enter__(self) -> "World":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.process.kill()
         self.process.wait()
         self._reader.join(LIMIT_S)
@@ -290,15 +281,8 @@ main()
 
 
 def test_without_hidapi_it_ends_at_once_and_says_how_to_get_it() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_HIDAPI],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=LIMIT_S,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    assert done.returncode == 2
-    [line] = done.stderr.splitlines()
+    code, _, complaint = ended("-c", WITHOUT_HIDAPI)
+    assert code == 2
+    [line] = complaint.splitlines()
     assert line.startswith("feelahead-operator: hidapi cannot be imported")
     assert "pip install --force-reinstall hidapi" in line

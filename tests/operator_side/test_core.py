@@ -8,13 +8,14 @@ import pytest
 
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Telemetry, Tune
+from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from tests.helpers.felt import telemetry
 from tests.operator_side.operator_bench import Bench
 
 
@@ -135,28 +136,12 @@ def test_an_epoch_that_ended_is_followed_by_another_and_not_by_a_third_for_what_
     assert set(rest) == {rest[0]}
 
 
-def telemetry(robot: LinkEnd, now_s: float, speed: float) -> bytes:
-    return encode(
-        Telemetry(
-            robot.stamp(now_s),
-            state="armed",
-            tool_position_m=(0.0, 0.0, 0.0),
-            tool_speed_m_s=speed,
-            target=None,
-            target_in_tool_m=None,
-            up_in_tool=(0.0, -1.0, 0.0),
-            gripper_opening_m=0.0,
-            holding=False,
-            enlargement_m=0.0,
-            l2=0.0,
-            r2=0.0,
-        )
-    )
-
-
 def test_the_screen_shows_the_newest_view_of_the_present_epoch(bench: Bench) -> None:
-    first, second = (telemetry(bench.robot, bench.now_s, speed) for speed in (0.125, 0.25))
-    stranger = telemetry(LinkEnd("robot", 9, "clock"), bench.now_s, 0.3)
+    ends = (bench.robot, bench.robot, LinkEnd("robot", 9, "clock"))
+    first, second, stranger = (
+        encode(telemetry(robot.stamp(bench.now_s), tool_speed_m_s=speed))
+        for robot, speed in zip(ends, (0.125, 0.25, 0.3), strict=True)
+    )
     for payload in (second, first, stranger):
         bench.side.receive_view(payload, bench.now_s)
         assert bench.side.screen is not None

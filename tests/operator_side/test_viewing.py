@@ -126,8 +126,7 @@ class FakeConsole:
         self.views: list[tuple[bytes, bool]] = []
         self.told: list[str] = []
         self.lacks: tuple[int, int] | None = None
-        self.hands: deque[PageWords] = deque()
-        self.tuning: deque[PageWords] = deque()
+        self.words: deque[PageWords] = deque()
 
     def receive(self) -> None: ...
 
@@ -226,14 +225,14 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
 
 def test_what_pages_say_reaches_whoever_follows_them() -> None:
     looking = Looking()
-    looking.console.hands.append(PageWords(page=3, hands={"page": "ours", "number": 1, "driving": True}))
-    looking.console.tuning.append(PageWords(page=3, tune={"probability": 0.9}))
+    looking.console.words.append((3, {"hands": {"page": "ours", "number": 1, "driving": True}}))
+    looking.console.words.append((3, {"tune": {"probability": 0.9}}))
     looking.turns(0.02)
     pages = looking.viewing._pages
     assert pages.driver == "ours"
     assert (wish := pages.take_wish()) is not None
     assert wish.probability == 0.9
-    looking.console.hands.append(PageWords(page=3))
+    looking.console.words.append((3, None))
     looking.turns(0.02)
     assert pages.driver is None
 

@@ -25,17 +25,9 @@ from common.emulation.spec import LinkSpec
 from feelahead.lab.goals import Goal
 from feelahead.lab.link.clocks import SCENARIOS, errors
 from feelahead.lab.link.pair import Kind, pair
-from feelahead.lab.link.samples import (
-    band_of,
-    compare_one,
-    judge,
-    needs_band,
-    pair_of_runs,
-    play,
-    read_link_sample,
-)
+from feelahead.lab.link.samples import band_of, compare_one, judge, needs_band, pair_of_runs, play, read_link_sample
 from feelahead.lab.shown import shown
-from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.sweep import Question, Sweep, cell_of
 from feelahead.lab.table import Row, Table
 
 _BARE_LIMIT: Final = 1.3
@@ -46,27 +38,15 @@ _PAIRS: Final = 10
 """Pairs of the model's own runs, for each seed."""
 _ESTIMATED: Final = ("offset_error_ms", "one_way_error_ms", "bound_ms")
 _COMPARED: Final = (
-    "seed",
-    "distance",
-    "mean_error_ms",
-    "sd_error_ms",
-    "late_share",
-    "loss_share",
-    "mean_burst",
-    "stalls",
+    *("seed", "distance", "mean_error_ms", "sd_error_ms"),
+    *("late_share", "loss_share", "mean_burst", "stalls"),
 )
 
 
 @dataclass(frozen=True)
-class LinkSweep(Sweep):
-    """Both ends at 1 kHz each way, between law and controller, beside bare ZeroMQ, in turns.
+class Played:
+    """One link in virtual time."""
 
-    With --virtual: the model of the link beside its words, and beside a recording of the kernel's netem.
-    With --estimates: how well each side knows the other's clock and the delays, beside the truth.
-    """
-
-    virtual: bool = False
-    """The emulated link alone, in virtual time."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 50ms 10ms distribution normal"
     """With --virtual: the link, in netem's words; of two directions the one to the operator."""
     link_model: LinkModel = "datagram"
@@ -80,6 +60,22 @@ class LinkSweep(Sweep):
     against: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """With --virtual: a recording to compare with (seq, sent_ns, delay_ns), whose send times replace --rate and
     --count."""
+
+    def profile(self, seed: int) -> LinkProfile:
+        """Parse the link."""
+        return LinkSpec.parse(self.link, seed, self.link_model).profile("to_operator")
+
+
+@dataclass(frozen=True)
+class LinkSweep(Played, Sweep):
+    """Both ends at 1 kHz each way, between law and controller, beside bare ZeroMQ, in turns.
+
+    With --virtual: the model of the link beside its words, and beside a recording of the kernel's netem.
+    With --estimates: how well each side knows the other's clock and the delays, beside the truth.
+    """
+
+    virtual: bool = False
+    """The emulated link alone, in virtual time."""
     estimates: bool = False
     """Estimates of clock offsets and one-way delays instead."""
     seconds: Annotated[float, Meta(ge=1.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 5.0
@@ -87,7 +83,7 @@ class LinkSweep(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        LinkSpec.parse(self.link, 0, self.link_model)
+        self.profile(0)
         if self.against is not None and not self.virtual:
             raise ValueError(f"--against {self.against}: valid: with --virtual")
         if self.virtual and self.estimates:
@@ -100,22 +96,6 @@ class Turns:
 
     rate: float
     turns: int
-
-
-@dataclass(frozen=True)
-class Played:
-    """One link in virtual time."""
-
-    link: str
-    link_model: LinkModel
-    rate: float
-    count: int
-    bytes: int
-    against: str | None
-
-    def profile(self, seed: int) -> LinkProfile:
-        """Parse the link."""
-        return LinkSpec.parse(self.link, seed, self.link_model).profile("to_operator")
 
 
 @dataclass(frozen=True)
@@ -133,14 +113,9 @@ def cells(settings: LinkSweep) -> Iterator[Turns | Played | Clocks]:
         skews = (20.0,) if settings.quick else (20.0, 100.0)
         yield from (Clocks(link, skew, settings.seconds) for link in SCENARIOS for skew in skews)
     elif settings.virtual:
-        yield _played(settings)
+        yield cell_of(Played, settings)
     else:
         yield Turns(settings.rate, 2 if settings.quick else _TURNS)
-
-
-def _played(settings: LinkSweep) -> Played:
-    against = None if settings.against is None else str(settings.against)
-    return Played(settings.link, settings.link_model, settings.rate, settings.count, settings.bytes, against)
 
 
 def run(cell: Turns | Played | Clocks, seed: int) -> Iterator[Row]:
@@ -162,7 +137,7 @@ def run(cell: Turns | Played | Clocks, seed: int) -> Iterator[Row]:
 
 def _play(cell: Played, seed: int) -> Row:
     profile = cell.profile(seed)
-    recorded = None if cell.against is None else read_link_sample(Path(cell.against), "--against")
+    recorded = None if cell.against is None else read_link_sample(cell.against, "--against")
     sent_s = [number / cell.rate for number in range(cell.count)] if recorded is None else recorded.sent_s.tolist()
     before_s = time.process_time()
     sample, line = play(profile, sent_s, cell.bytes)
@@ -223,7 +198,7 @@ def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
         judged = f"{sum(table.values('judged'))} arrivals"
         yield Goal("violations of the bound", sum(table.values("violations")), 0, detail=judged)
     elif settings.against is not None:
-        profile = _played(settings).profile(0)
+        profile = settings.profile(0)
         reference, _ = read_link_sample(settings.against, "--against").without_stalls(profile)
         pairs = [one for row in table for one in row.get("band", ())]
         yield from judge(profile, reference, table.rows, band_of(pairs) if pairs else None)

@@ -4,7 +4,6 @@ feelahead bench pictures --quick
 """
 
 import functools
-import importlib.util
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -20,8 +19,8 @@ from rich.console import RenderableType
 from scipy.ndimage import gaussian_filter
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
 from common.protocol.view_messages import VIEW_NAMES
+from common.recording.packages import require_packages
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
@@ -73,8 +72,7 @@ class Case:
 
 def cells(settings: PicturesSweep) -> Iterator[Case]:
     """Lay out two sizes and two rates."""
-    if importlib.util.find_spec("av") is None:
-        raise ConfigurationError("bench pictures: av is not installed; pip install 'feelahead[robot,operator,video]'")
+    require_packages("bench pictures", "av", extra="robot,operator,video")
     sizes = ((640, 30), (320, 30), (640, 10))
     for width, rate_hz in sizes[:1] if settings.quick else sizes:
         yield Case(width, rate_hz, 3.0 if settings.quick else settings.seconds)

@@ -15,7 +15,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final
 
 import tyro
@@ -33,7 +33,7 @@ from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.real_time import LINK_S, START_S, end, started
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.lab.shown import shown
-from feelahead.lab.sweep import Question, Sweep
+from feelahead.lab.sweep import Question, Sweep, cell_of
 from feelahead.lab.table import Row, Table
 from operator_side.core import OperatorSide
 from operator_side.settings import OperatorSettings
@@ -54,8 +54,8 @@ _GAP: Final = "no command for"
 
 
 @dataclass(frozen=True)
-class SoakSweep(Sweep):
-    """Run both sides for a while, and tell whether memory and descriptors stay flat."""
+class Soak:
+    """One run."""
 
     minutes: Annotated[float, Meta(gt=0.0, le=1440.0), tyro.conf.arg(metavar="N")] = 2.0
     """Length, in the time of the run."""
@@ -66,6 +66,11 @@ class SoakSweep(Sweep):
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 20ms 5ms"
     """Emulated link, in netem's words."""
 
+
+@dataclass(frozen=True)
+class SoakSweep(Soak, Sweep):
+    """Run both sides for a while, and tell whether memory and descriptors stay flat."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         LinkSpec.parse(self.link, 0)
@@ -73,20 +78,10 @@ class SoakSweep(Sweep):
             raise ValueError(f"--observers {self.observers} with --virtual: valid: one of them")
 
 
-@dataclass(frozen=True)
-class Soak:
-    """One run."""
-
-    minutes: float
-    virtual: bool
-    observers: int
-    link: str
-
-
 def cells(settings: SoakSweep) -> Iterator[Soak]:
     """Lay out the one run."""
-    minutes = min(settings.minutes, 0.2) if settings.quick else settings.minutes
-    yield Soak(minutes, settings.virtual, settings.observers, settings.link)
+    soak = cell_of(Soak, settings)
+    yield replace(soak, minutes=min(soak.minutes, 0.2)) if settings.quick else soak
 
 
 def run(cell: Soak, seed: int) -> Iterator[Row]:

@@ -35,11 +35,9 @@ class Listener(Protocol):
 
     def controller_found(self, now_s: float) -> None:
         """There is one, and nothing is known of what its triggers do."""
-        ...
 
     def controller_lost(self, now_s: float) -> None:
         """There is none any more."""
-        ...
 
 
 class Connection:

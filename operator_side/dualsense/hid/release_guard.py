@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import TracebackType
 from typing import Final
 
 _WATCHDOG = Path(__file__).with_name("release_watchdog.py")
@@ -30,9 +29,7 @@ class ReleaseGuard:
         self._process = _started()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._process is None:
             return
         # It still holds a controller only if that could not be released: then it tries once more.

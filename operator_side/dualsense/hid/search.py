@@ -21,22 +21,18 @@ class Device(Protocol):
     @property
     def released(self) -> bool:
         """Both triggers are free of any effect, as far as anybody can know."""
-        ...
 
     def read(self, now_s: float) -> bytes | None:
         """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
-        ...
 
     def write(self, output: OutputReport, now_s: float) -> None:
         """Have the controller do what `output` sets; ValueError, and nothing sent, for an effect never to be sent."""
-        ...
 
     def close(self) -> None:
         """Take trigger effects, rumble and a warning light off if any were written, and let the controller go.
 
         Safe to call again; everything else raises DeviceError afterwards.
         """
-        ...
 
 
 def _never_stalls(now_s: float) -> bool:

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from msgspec import Meta, Struct
 
-from common.limits import Share, check_limits
+from common.limits import Limited, Share, check_limits
 
 Axis = Annotated[float, Meta(ge=-1.0, le=1.0)]
 Stick = tuple[Axis, Axis]
@@ -73,15 +73,12 @@ _CODES: Final = {state: code for code, state in _STATES.items()} | {BatteryState
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
+class Battery(Limited):
     """Charge and charging state."""
 
     fraction: Share | None = 1.0
     """0 to 1 in steps of a tenth, the middle of each; None when the controller reports a fault instead."""
     state: BatteryState = BatteryState.FULL
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 CHARGED: Final = Battery()

@@ -12,7 +12,7 @@ from typing import Annotated, Final, Self
 from msgspec import Meta
 
 from common.errors import RemoteProtocolError
-from common.limits import check_limits
+from common.limits import Limited
 from operator_side.dualsense.reports.transport import CHECKSUM_LENGTH, Seed, Transport, check, described, sealed
 
 CALIBRATION_ID: Final = 0x05
@@ -76,16 +76,13 @@ def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Firmware:
+class Firmware(Limited):
     """The versions of a controller."""
 
     hardware_version: Word
     firmware_version: Word
     update_version: HalfWord
     """Which features of the firmware to expect."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:

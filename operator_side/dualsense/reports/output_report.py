@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final
 from msgspec import Meta
 
 from common.errors import RemoteProtocolError
-from common.limits import Share, check_limits
+from common.limits import Limited, Share, check_limits
 from operator_side.dualsense.effects.official import (
     COMMANDED_CODES,
     DEBUG_CODES,
@@ -53,14 +53,11 @@ _SET_LIGHTBAR, _CLASSIC_RUMBLE_V2 = 0x04, 0x04
 
 
 @dataclass(frozen=True, slots=True)
-class Rumble:
+class Rumble(Limited):
     """The two motors' drive, 0 to 1 each; 256 steps on the wire."""
 
     left: Share = 0.0
     right: Share = 0.0
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from typing import Annotated, Final
 from msgspec import Meta
 
 from common.errors import DeviceError
-from common.limits import check_limits
+from common.limits import Limited
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID, Model
 from operator_side.dualsense.reports.report_descriptors import BLUETOOTH_DESCRIPTOR, USB_DESCRIPTOR
 from operator_side.dualsense.reports.transport import Transport
@@ -56,16 +56,13 @@ _SET_REPLY = struct.Struct("=IIH")
 
 
 @dataclass(frozen=True, slots=True)
-class UhidIdentity:
+class UhidIdentity(Limited):
     """Identity of a DualSense, for the kernel."""
 
     transport: Transport = Transport.USB
     model: Model = Model.DUALSENSE
     unique_id: Annotated[str, Meta(max_length=63)] = ""
     """A Bluetooth address; drivers may refuse a second device that has the same."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
     @property
     def name(self) -> str:

@@ -6,7 +6,6 @@ import os
 import select
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Final
 
 from common.clock import Clock
@@ -43,9 +42,7 @@ class UhidFile:
     def __enter__(self) -> "UhidFile":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def wait(self, timeout_s: float) -> bool:

@@ -1,7 +1,6 @@
 """The first and last moments of a command: signals, encodings, versions and what is not installed."""
 
 import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -11,23 +10,10 @@ from pathlib import Path
 import pytest
 
 from common.command.stop_signal import StopSignal
+from tests.helpers.python_process import LIMIT_S, ended, start
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")
-LIMIT_S = 600.0
-
-
-def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-        env={**os.environ, **environment},
-    )
-
-
 # Each stops there, so that the signal always finds it, however fast the machine is.
 STOPPED_AT = """
 import sys, time
@@ -92,9 +78,8 @@ def test_a_signal_sets_the_flag_and_the_old_handler_comes_back(number: signal.Si
 @pytest.mark.processes
 @pytest.mark.parametrize("module", MODULES)
 def test_every_command_says_its_version(module: str) -> None:
-    with start("-m", module, "--version") as process:
-        said, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, complaint) == (0, "")
+    code, said, complaint = ended("-m", module, "--version")
+    assert (code, complaint) == (0, "")
     assert said.split()[1].count(".") == 2
 
 
@@ -109,9 +94,8 @@ main()
 
 @pytest.mark.processes
 def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
-    with start("-c", WITHOUT_MUJOCO) as process:
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 2
+    code, _, complaint = ended("-c", WITHOUT_MUJOCO)
+    assert code == 2
     assert complaint == (
         "feelahead-robot: mujoco is not installed on this machine; valid: pip install 'feelahead[robot]'\n"
     )
@@ -119,10 +103,9 @@ def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
 
 @pytest.mark.processes
 def test_a_module_of_ours_that_is_missing_is_a_fault_and_not_an_installation() -> None:
-    code = "import sys\nfrom common.command.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
-    with start("-c", code) as process:
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 1
+    program = "from common.command.launch import launch\nlaunch('x', lambda: __import__('common.nothing'))"
+    code, _, complaint = ended("-c", program)
+    assert code == 1
     assert "ModuleNotFoundError" in complaint
 
 
@@ -132,9 +115,7 @@ def test_characters_that_the_terminal_lacks_do_not_end_the_command() -> None:
         "from common.command.launch import launch\n"
         "launch('x', lambda: lambda arguments: print('5 \\u00b1 1 \\u00b5s') or 0)"
     )
-    with start("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") as process:
-        said, complaint = process.communicate(timeout=LIMIT_S)
-    assert (process.returncode, said, complaint) == (0, "5 ? 1 ?s\n", "")
+    assert ended("-c", code, PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C") == (0, "5 ? 1 ?s\n", "")
 
 
 @pytest.mark.processes

@@ -6,16 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.emulation.clauses import LinkModel, Outage
 from common.emulation.delay_line import DelayLine
 from common.emulation.profile import LinkProfile
 from tests.helpers.link_runs import PERIOD_S, Run
-
-repeatable = settings(derandomize=True, deadline=None)
-
 
 # Duplicates, corruption, reordering
 
@@ -214,7 +211,6 @@ def profiles(model: LinkModel) -> Iterator[str]:
             yield f"{one} {other} retransmit 7ms" if model == "stream" else f"{one} {other}"
 
 
-@repeatable
 @given(
     st.lists(st.floats(0.0, 0.01), min_size=1, max_size=60),
     st.sampled_from(["datagram", "stream"]),

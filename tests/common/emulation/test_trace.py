@@ -8,6 +8,7 @@ from common.emulation.delay_line import DelayLine
 from common.emulation.profile import LinkProfile
 from common.emulation.trace import Trace, read_samples
 from common.errors import ConfigurationError
+from tests.helpers.refusal import refusal
 
 
 def written(folder: Path, content: str, name: str = "trace.csv") -> Path:
@@ -67,10 +68,7 @@ def test_lost_messages_were_sent_between_their_neighbours(tmp_path: Path) -> Non
 )
 def test_a_bad_trace_is_refused_in_one_line(tmp_path: Path, content: str, named: str) -> None:
     path = written(tmp_path, content)
-    with pytest.raises(ConfigurationError) as refusal:
-        LinkProfile.parse(f"trace {path}")
-    text = str(refusal.value)
-    assert "\n" not in text
+    text = refusal(LinkProfile.parse, f"trace {path}")
     assert named in text
     assert str(path) in text
     assert "valid: " in text

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.files.toml_file import read_toml
@@ -49,7 +49,6 @@ TOKENS = st.sampled_from(
 
 
 @given(st.lists(TOKENS | st.text(max_size=3), max_size=60), st.integers(1, 400))
-@settings(derandomize=True, deadline=None)
 def test_any_text_is_read_or_refused_in_one_line(
     tmp_path_factory: pytest.TempPathFactory, tokens: list[str], times: int
 ) -> None:

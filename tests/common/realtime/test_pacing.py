@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.clock import VirtualClock
@@ -23,7 +23,6 @@ def test_a_late_turn_skips_what_it_missed_and_returns_to_the_grid(late_s: float,
 
 
 @given(st.lists(st.floats(0.0, 0.02), min_size=1, max_size=200), st.floats(1e-4, 0.1), st.floats(-1e3, 1e6))
-@settings(derandomize=True, deadline=None)
 def test_every_deadline_is_taken_or_counted_once(late_s: list[float], period_s: float, start_s: float) -> None:
     pacer = Pacer(period_s, start_s)
     for late in late_s:

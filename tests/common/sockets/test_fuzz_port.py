@@ -238,13 +238,17 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
         assert is_heard(robot, operator)
 
 
+def within_one_second(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let all happen within the same second of its clock, however long it takes."""
+    monkeypatch.setattr(robot, "_second", 0)
+    monkeypatch.setattr(robot, "_clock", StandingClock())
+
+
 def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
-    # All within the same second of the robot side's clock, however long it takes.
-    monkeypatch.setattr(robot, "_second", 0)
-    monkeypatch.setattr(robot, "_clock", StandingClock())
+    within_one_second(robot, monkeypatch)
     received = 0
     with contextlib.closing(stranger(robot)) as connection:
         for _ in range(ROUNDS):
@@ -259,8 +263,7 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
 
 
 def test_who_sends_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot, "_second", 0)
-    monkeypatch.setattr(robot, "_clock", StandingClock())
+    within_one_second(robot, monkeypatch)
     most = round(20 / MOTION_PERIOD_S)
     with contextlib.closing(stranger(robot)) as connection:
         connection.send(message(b"x") * (most + 1))
@@ -287,8 +290,7 @@ def test_a_flood_whose_sender_has_left_is_only_counted(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
-    monkeypatch.setattr(robot, "_second", 0)
-    monkeypatch.setattr(robot, "_clock", StandingClock())
+    within_one_second(robot, monkeypatch)
     before = descriptors()
     with contextlib.closing(stranger(robot)) as connection:
         connection.send(message(b"flood") * 1000)

@@ -24,6 +24,15 @@ def folder(tmp_path: Path) -> KeyFolder:
     return KeyFolder(tmp_path / "keys")
 
 
+@pytest.fixture
+def allowed(folder: KeyFolder) -> AllowList:
+    """It has read that anna is let in."""
+    folder.allow("anna", KEY)
+    found = AllowList(folder)
+    found.refresh()
+    return found
+
+
 def complaint(call: Callable[[], object]) -> str:
     with pytest.raises(ConfigurationError) as caught:
         call()
@@ -154,10 +163,8 @@ def test_a_running_side_notices_who_came_and_who_went(folder: KeyFolder) -> None
 
 def test_a_peer_whose_file_changed_to_another_key_is_revoked_whatever_the_file_says_of_its_age(
     folder: KeyFolder,
+    allowed: AllowList,
 ) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
-    allowed.refresh()
     path = folder.peer_path("anna")
     before = path.stat()
     path.write_text(OTHER)  # in place: the same number
@@ -176,10 +183,8 @@ def make_broken(path: Path) -> None:
 
 @pytest.mark.parametrize("spoil", [make_dangling, make_broken, Path.mkdir, os.mkfifo])
 def test_a_bad_file_excludes_its_own_key_alone_until_it_is_mended(
-    folder: KeyFolder, spoil: Callable[[Path], None]
+    folder: KeyFolder, allowed: AllowList, spoil: Callable[[Path], None]
 ) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
     folder.allow("ben", OTHER)
     allowed.refresh()
     path = folder.peer_path("ben")
@@ -197,10 +202,8 @@ def test_a_bad_file_excludes_its_own_key_alone_until_it_is_mended(
 
 
 def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
-    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch
+    folder: KeyFolder, allowed: AllowList, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
     folder.allow("ben", OTHER)
     allowed.refresh()
     folder.allow("carl", "ef" * 32)  # so that the list is read anew
@@ -219,11 +222,8 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM])
 @pytest.mark.parametrize("where", ["iterdir", "open"])
 def test_who_was_let_in_stays_in_when_nothing_can_be_opened(
-    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch, where: str, number: int
+    folder: KeyFolder, allowed: AllowList, monkeypatch: pytest.MonkeyPatch, where: str, number: int
 ) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
-    allowed.refresh()
     folder.allow("ben", OTHER)
 
     def short(*_: object) -> None:
@@ -250,10 +250,7 @@ def test_a_list_that_others_may_write_lets_nobody_in(folder: KeyFolder, wrong: i
     assert "chmod 700" in complaint(folder.allowed)
 
 
-def test_a_folder_that_vanished_lets_nobody_in(folder: KeyFolder) -> None:
-    allowed = AllowList(folder)
-    folder.allow("anna", KEY)
-    allowed.refresh()
+def test_a_folder_that_vanished_lets_nobody_in(folder: KeyFolder, allowed: AllowList) -> None:
     folder.allowed_path.rename(folder.path / "elsewhere")
     assert allowed.refresh() == {KEY}
     assert allowed.names == {}

@@ -2,14 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.timing.clock_offset import MAX_SKEW, ClockOffset
 from common.timing.difference_blocks import MOST_BLOCKS
 from tests.helpers.clock_exchanges import ahead, error_s, exchange, talk
-
-repeatable = settings(derandomize=True, deadline=None)
 
 
 def test_nothing_is_known_before_the_first_exchange() -> None:
@@ -21,7 +19,6 @@ def test_nothing_is_known_before_the_first_exchange() -> None:
     assert not offset.settled
 
 
-@repeatable
 @given(st.floats(-1e5, 1e5), st.floats(1e-6, 1.0), st.floats(0.0, 1.0))
 def test_a_symmetric_link_gives_the_exact_offset(apart_s: float, way_s: float, held_s: float) -> None:
     offset = ClockOffset(shared_clock=False)
@@ -34,7 +31,6 @@ def test_a_symmetric_link_gives_the_exact_offset(apart_s: float, way_s: float, h
     assert offset.one_way_from_peer_s(sent_s, received_s + way_s) == pytest.approx(way_s, abs=1e-9 + 2 * loosened_s)
 
 
-@repeatable
 @given(st.floats(1e-6, 1.0), st.floats(1e-6, 1.0))
 def test_an_asymmetric_floor_costs_half_of_itself_and_stays_within_the_bound(there_s: float, back_s: float) -> None:
     offset, clock = ClockOffset(shared_clock=False), ahead(100.0)

@@ -8,9 +8,6 @@ from hypothesis import strategies as st
 from common.timing.clock_offset import MAX_SKEW, ClockOffset
 from tests.helpers.clock_exchanges import ahead, error_s, exchange
 
-repeatable = settings(derandomize=True, deadline=None)
-
-
 delay = st.floats(0.0, 0.5) | st.floats(0.0, 1e-4) | st.just(0.0)
 drift = st.floats(-MAX_SKEW, MAX_SKEW) | st.sampled_from([-MAX_SKEW, MAX_SKEW, 0.0])
 rounds = st.lists(
@@ -18,7 +15,6 @@ rounds = st.lists(
 )
 
 
-@repeatable
 @given(rounds, st.floats(-1e6, 1e6), st.floats(-0.5, 0.5) | st.just(0.0))
 def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
     steps: list[tuple[float, float, float, float, float, bool]], apart_s: float, asymmetry_s: float
@@ -40,7 +36,7 @@ def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
     assert offset.jumps == 0
 
 
-@settings(repeatable, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 1000), st.floats(-0.05, 0.05), st.sampled_from(["normal", "exponential", "constant"]), drift)
 def test_the_bound_holds_while_lines_are_fitted(seed: int, asymmetry_s: float, shape: str, skew: float) -> None:
     generator, clock = np.random.default_rng(seed), ahead(-40.0, skew)

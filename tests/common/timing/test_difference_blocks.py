@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.timing.difference_blocks import MOST_BLOCKS, Block, BlockTrack
 
-repeatable = settings(derandomize=True, deadline=None)
 samples = st.lists(st.tuples(st.floats(0.0, 0.1), st.floats(-0.5, 0.5)), min_size=1, max_size=60)
 
 
@@ -32,13 +31,11 @@ def agrees(block: Block, pairs: list[tuple[float, float]]) -> None:
     assert block.cubes_s3 == pytest.approx((deviations_s**3).sum(), abs=1e-12)
 
 
-@repeatable
 @given(samples)
 def test_a_block_has_the_moments_of_its_samples(pairs: list[tuple[float, float]]) -> None:
     agrees(block_of(pairs), pairs)
 
 
-@repeatable
 @given(samples, samples)
 def test_merged_blocks_are_the_block_of_all(early: list[tuple[float, float]], late: list[tuple[float, float]]) -> None:
     agrees(block_of(early).merged(block_of(late)), early + late)

@@ -2,13 +2,12 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.timing.difference_blocks import Block, BlockTrack
 from common.timing.offset_fits import TYPICAL_SKEW, Average, fit_envelope, fit_mean, typical_skewness
 
-repeatable = settings(derandomize=True, deadline=None)
 MAX_SKEW = 600e-6
 
 
@@ -34,7 +33,6 @@ def both_ways(there_s: np.ndarray, back_s: np.ndarray, offset_s: float, skew: fl
 points = st.lists(st.tuples(st.floats(0.0, 60.0), st.floats(0.0, 0.1)), min_size=1, max_size=40)
 
 
-@repeatable
 @given(points, points, st.floats(-MAX_SKEW, MAX_SKEW))
 def test_the_envelope_lies_under_everything_and_touches_it(
     there: list[tuple[float, float]], back: list[tuple[float, float]], guess: float

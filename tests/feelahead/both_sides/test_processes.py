@@ -26,24 +26,14 @@ from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
 from robot_side.main import KEYS_PERIOD_S
 from robot_side.operators.safety import SafetySettings
+from tests.helpers.python_process import LIMIT_S, ended, start
 
 pytestmark = pytest.mark.processes
-
-LIMIT_S = 600.0
-
-
-def demo(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "feelahead.main", "demo", "--no-console", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+DEMO = ("-P", "-m", "feelahead", "demo", "--no-console")
 
 
 def wait_until(side: SideProcess, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the side's first status from now on for which `condition` holds."""
-    side.events()
+    """Return the side's first unread status for which `condition` holds, however late it is read."""
     for _ in range(5000):
         status = side.wait_for("status", LIMIT_S)
         if condition(status):
@@ -56,20 +46,19 @@ def wait_for_link(side: SideProcess) -> dict[str, Any]:
 
 
 def robot(*arguments: str) -> SideProcess:
-    return SideProcess("robot_side.main", "robot", ["--bind=tcp://127.0.0.1:0", *arguments])
+    return SideProcess("robot_side", "robot", ["--bind=tcp://127.0.0.1:0", *arguments])
 
 
 def operator(listening: dict[str, Any], *arguments: str) -> SideProcess:
     endpoints = [f"--connect={listening['control']}", f"--view-connect={listening['view']}"]
-    return SideProcess("operator_side.main", "operator", [*endpoints, "--device=simulated", *arguments])
+    return SideProcess("operator_side", "operator", [*endpoints, "--device=simulated", *arguments])
 
 
 @pytest.mark.parametrize("more", [("--realtime",), ("--compensation", "robot"), ("--law", "paper")])
 def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: tuple[str, ...]) -> None:
     path = tmp_path / "out.json"
-    with demo("--duration", "4", "--link", "delay 20ms", "--summary", str(path), *more) as process:
-        _, complaint = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 0, complaint
+    code, _, complaint = ended(*DEMO, "--duration", "4", "--link", "delay 20ms", "--summary", str(path), *more)
+    assert code == 0, complaint
     summary = json.loads(path.read_text())
     assert summary["errors"] == []
     assert summary["messages"]["stiffness_received"] > 0
@@ -163,7 +152,7 @@ def test_an_unknown_key_moves_nothing_and_a_revoked_one_is_thrown_out(tmp_path: 
 
 
 def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:
-    with demo("--duration", "60", "--status", "json") as process:
+    with start(*DEMO, "--duration", "60", "--status", "json") as process:
         assert process.stdout is not None
         robot_id = None
         for line in process.stdout:
@@ -211,15 +200,9 @@ def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Pa
     path = tmp_path / "out.json"
     path.write_text("old")
     arguments = [*NOWHERE, "--duration=0.2", f"--summary={path}", "--status=none"]
-    done = subprocess.run(
-        [sys.executable, "-c", FULL, sys.executable, "-P", "-m", "operator_side", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=LIMIT_S,
-        check=False,
-    )
-    assert done.returncode == 2
-    [line] = done.stderr.splitlines()
+    code, _, complaint = ended("-c", FULL, sys.executable, "-P", "-m", "operator_side", *arguments)
+    assert code == 2
+    [line] = complaint.splitlines()
     assert line.startswith(f"feelahead-operator: --summary {path}: cannot be written: File too large; valid: ")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
@@ -259,7 +242,7 @@ def stalled(kind: str) -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def start(module: str, output: int, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
+def stalling(module: str, output: int, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
     command = [sys.executable, "-P", "-m", module, *arguments]
     with subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True) as process:
         try:
@@ -286,7 +269,7 @@ def test_a_signal_ends_a_side_whoever_stalls_its_output(side: str, kind: str, mo
     stalls, other = (robot, operator) if side == "robot" else (operator, robot)
     with (
         stalled(kind) as output,
-        start(f"{side}_side", output, *stalls, f"--status={mode}") as process,
+        stalling(f"{side}_side", output, *stalls, f"--status={mode}") as process,
         SideProcess("operator_side" if side == "robot" else "robot_side", "other", other) as watching,
     ):
         assert any(watching.wait_for("status", LIMIT_S).get("state") == "armed" for _ in range(5000))

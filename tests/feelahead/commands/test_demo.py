@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 import webbrowser
@@ -24,7 +23,7 @@ from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from robot_side.simulation.built_in_scenes import SceneName
-from tests.helpers.repository import ROOT
+from tests.helpers.python_process import start
 from tests.operator_side.terminal_view.on_terminal import OnTerminal
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
@@ -115,19 +114,9 @@ def test_each_side_says_what_it_knows_better() -> None:
     assert both_statuses(robot, {}) == robot
 
 
-def start(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "feelahead", "demo", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    )
-
-
 @pytest.mark.processes
 def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
-    with start("--duration", "60", "--status", "json") as process:
+    with start("-m", "feelahead", "demo", "--duration", "60", "--status", "json") as process:
         assert process.stdout is not None
         assert process.stderr is not None
         assert json.loads(process.stdout.readline())["event"] == "note"
@@ -139,7 +128,9 @@ def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
 
 @pytest.mark.processes
 def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) -> None:
-    with start("--duration", "60", "--status", "json", "--summary", str(tmp_path / "out.json")) as process:
+    with start(
+        "-m", "feelahead", "demo", "--duration", "60", "--status", "json", "--summary", str(tmp_path / "out.json")
+    ) as process:
         assert process.stdout is not None
         assert json.loads(process.stdout.readline())["event"] == "note"
         assert json.loads(process.stdout.readline()) | {"process_id": 0} == {

@@ -15,7 +15,6 @@ from typing import Any
 
 import pytest
 
-from common.errors import ConfigurationError
 from common.protocol.codec import PROTOCOL_VERSION, encode
 from common.protocol.link_end import LinkEnd
 from common.sockets.allow_list import AllowList
@@ -315,24 +314,3 @@ def test_keys_on_both_sides_on_one_and_wrong_ones(doctor: Doctor, tmp_path: Path
         assert line.endswith(f"feelahead keys allow NAME {operator_key}")
     with ServingRobot() as robot:
         assert "runs without keys, and --keys was given" in doctor.of(robot, *flags, robot_key)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--connect", "127.0.0.1:5555"], "'127.0.0.1:5555' is no address"),
-        (["--connect", "tcp://*:5555"], "names no host"),
-        (["--connect", "tcp://robot.invalid:99999"], "'99999'"),
-        (["--connect", "tcp://127.0.0.1:65535"], "--view-connect"),
-        (["--connect", "tcp://127.0.0.1:1", "--view-connect", "view"], "--view-connect: 'view' is no address"),
-        (["--view-connect", "tcp://127.0.0.1:5556"], "--view-connect without --connect"),
-        (["--keys", "/nowhere"], "--keys without --connect"),
-        (["--connect", "tcp://127.0.0.1:1", "--robot-key", "ab"], "--robot-key without --keys"),
-        (["--connect", "tcp://127.0.0.1:1", "--keys", "/nowhere"], "feelahead keys make operator"),
-    ],
-)
-def test_bad_input_is_refused(arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        command(["doctor", *arguments])
-    assert named in str(caught.value)
-    assert "\n" not in str(caught.value)

@@ -5,9 +5,6 @@ from pathlib import Path
 
 import pytest
 
-import operator_side.main
-import robot_side.main
-from common.errors import ConfigurationError
 from feelahead.main import command
 
 
@@ -45,41 +42,3 @@ def test_a_public_file_may_be_handed_over_and_a_file_named_as_no_peer_is_pointed
     listed = said(capsys, "list", *folder)
     assert "alice.smith.public: its name is no peer's; valid: letters" in listed
     assert "hidden" not in listed
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        ([], "ACTION"),
-        (["mkae"], "mkae"),
-        (["make", "camera"], "camera"),
-        (["allow", "anna"], "KEY"),
-        (["allow", "anna", "abc"], "'abc'"),
-        (["allow", "../x", "ab" * 32], "'../x'"),
-        (["revoke", "anna"], "'anna'"),
-        (["show", "robot"], "feelahead keys make robot"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], named: str) -> None:
-    folder = ["--folder", str(tmp_path)] if arguments and arguments != ["mkae"] else []
-    with pytest.raises(ConfigurationError) as caught:
-        command(["keys", *arguments, *folder])
-    assert named in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("side", "arguments", "named"),
-    [
-        (robot_side.main, ["--keys", "missing"], "feelahead keys make robot --folder missing"),
-        (robot_side.main, ["--keys", "missing", "--insecure"], "--insecure with --keys"),
-        (robot_side.main, ["--bind", "tcp://0.0.0.0:5555"], "feelahead keys make robot"),
-        (operator_side.main, ["--keys", "missing"], "feelahead keys make operator --folder missing"),
-        (operator_side.main, ["--robot-key", "ab" * 32], "--keys"),
-    ],
-)
-def test_each_side_says_what_to_run_next(side: object, arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        side.command(arguments)  # type: ignore[attr-defined]
-    assert named in str(caught.value)
-    assert "\n" not in str(caught.value)

@@ -6,12 +6,7 @@ import pytest
 
 from common.clock import VirtualClock
 from common.errors import ConfigurationError
-from feelahead.commands.virtual_dualsense import (
-    DRIVER_PATIENCE_S,
-    PULL_PERIOD_S,
-    VirtualDualSenseSettings,
-    live,
-)
+from feelahead.commands.virtual_dualsense import DRIVER_PATIENCE_S, PULL_PERIOD_S, VirtualDualSenseSettings, live
 from feelahead.main import command
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import ControllerState

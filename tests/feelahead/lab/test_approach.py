@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.errors import ConfigurationError
 from feelahead.lab.approaches.approach import Approach
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, frozen_hash
 from feelahead.lab.approaches.laws import LAWS
@@ -19,6 +18,7 @@ from feelahead.lab.questions import haptics
 from feelahead.lab.questions.approach import QUESTION, ApproachSettings, comparison, figures, sentence
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Table
+from tests.helpers.refusal import refusal
 from tests.helpers.repository import DATA
 
 WALL = str(DATA / "wall.xml")
@@ -236,10 +236,7 @@ def test_the_table_counts_how_runs_ended() -> None:
     ],
 )
 def test_bad_input_is_one_line_before_anything_runs(runs: MadeUp, arguments: list[str], named: str, valid: str) -> None:
-    with pytest.raises(ConfigurationError) as refused:
-        tried(*arguments, *(() if "--model" in arguments else ("--model", WALL)))
-    text = str(refused.value)
-    assert "\n" not in text
+    text = refusal(tried, *arguments, *(() if "--model" in arguments else ("--model", WALL)))
     assert "Settings" not in text
     assert named in text
     assert valid in text

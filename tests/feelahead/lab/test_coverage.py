@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.errors import ConfigurationError
 from common.reaction import HORIZON_S
 from feelahead.lab.approaches.approach import Approach, PullRun
 from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, draws_needed, evaluate, interval
@@ -273,20 +272,6 @@ def test_the_plans() -> None:
     quick = CoverageSettings(quick=True, only=("wall/bell",)).pulls()
     assert [(pulls.pull, pulls.link, pulls.cells) for pulls in quick] == [("bell", "200 ms", (Placed("wall"),))]
     assert set(quick[0].cells) < {cell for _, _, cell in cells}
-
-
-@pytest.mark.parametrize(
-    ("flags", "named"),
-    [
-        (["--probabilities", "0.9", "1"], r"probabilities\[1\] = 1.*above 0 and at most 0.9999"),
-        (["--laws"], "--laws.*one or more of swept"),
-        (["--laws", "swept", "swept"], "--laws swept swept.*each once"),
-        (["--only", "no such cell"], "--only no such cell.*wall/bell/200 ms"),
-    ],
-)
-def test_bad_settings_are_named(flags: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError, match=named):
-        ask(QUESTION, flags)
 
 
 def test_the_question_is_answered_whole(

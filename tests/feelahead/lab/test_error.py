@@ -13,16 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
-from feelahead.lab.approaches.prediction import (
-    AGE_BINS_S,
-    COMPENSATIONS,
-    ToolPath,
-    error_table,
-    judge,
-    moments,
-    over,
-)
+from feelahead.lab.approaches.prediction import AGE_BINS_S, COMPENSATIONS, ToolPath, error_table, judge, moments, over
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.propagation import (
     BATCHES,
@@ -302,18 +293,3 @@ def test_the_question_is_answered_whole_and_the_same_again(
     assert tomllib.loads(tables[0].read_text())["arm"] == load_scene().robot.fingerprint
     assert ask(QUESTION, [*arguments, "--table", str(tables[1])]) == 0
     assert tables[1].read_text() == tables[0].read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--draws", "100001"], "--draws 100001: valid: a multiple of 20"),
-        (["--table", "/"], "--table /: is a folder"),
-        (["--workers", "2"], "--workers 2: bench error measures time"),
-    ],
-)
-def test_bad_input_is_one_line(arguments: list[str], complaint: str) -> None:
-    with pytest.raises(ConfigurationError) as refused:
-        ask(QUESTION, arguments)
-    assert complaint in str(refused.value)
-    assert "\n" not in str(refused.value)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import feelahead.main
-from common.errors import ConfigurationError
 from feelahead.lab import cover
 from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.ticks import DEMO, record, with_cover
@@ -138,23 +137,3 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         begins_mm = before_mm[0] - far[0]["sigma_mm"]
         assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
         assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--ways", "--picture", "out.png"], "--ways has no figure"),
-        (["--ways", "--field"], "--ways and --field exclude each other; valid: one of them"),
-        (["--model", WALL], "--model and --site are for --cover and --field"),
-        (["--cover", "--site", "tcp"], "--cover takes --model and --site together"),
-        (["--field", "--step-mm", "nan"], "--step-mm = nan; valid: 1 to 150"),
-        (["--field", "--model", "no_such.xml"], "no_such.xml: there is no such file"),
-        (["--field", "--model", WALL, "--site", "hand"], "'hand'; valid: tool"),
-        (["--field", "--model", str(DATA / "empty.xml")], "nothing is ahead of the gripper within 2 m"),
-        (["--field", "--workers", "2"], "--workers 2"),
-    ],
-)
-def test_bad_input_is_named(arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError, match=named) as caught:
-        feelahead.main.command(["bench", "felt", *arguments])
-    assert "\n" not in str(caught.value)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from common.emulation.profile import LinkProfile
-from common.errors import ConfigurationError
 from common.protocol.codec import decode
 from common.protocol.messages import MotionCommand, StiffnessUpdate
 from common.sockets.operator import OperatorSockets
@@ -67,23 +66,6 @@ def test_a_comparison_has_a_row_for_each_seed_and_a_verdict(tmp_path: Path, caps
     written = rows(path)
     assert [row["seed"] for row in written] == ["0", "1", "2"]
     assert len({row["distance"] for row in written}) == 3
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--link", "delay 5"], "50ms"),
-        (["--rate", "0"], "1 to 100000"),
-        (["--virtual", "--estimates"], "one of them"),
-        (["--against", "x.csv"], "--virtual"),
-        (["--virtual", "--against", "nowhere.csv"], "delay_ns"),
-        (["--workers", "2"], "--workers 1"),
-    ],
-)
-def test_bad_input_is_one_line(arguments: list[str], named: str) -> None:
-    with pytest.raises(ConfigurationError, match=r"\A.*\Z") as refusal:
-        ask(QUESTION, arguments)
-    assert named in str(refusal.value)
 
 
 # The model beside recordings

@@ -13,7 +13,6 @@ import pytest
 import feelahead.main
 from common.arrays import FloatArray
 from common.clock import VirtualClock
-from common.errors import ConfigurationError
 from feelahead.lab.questions.overlap import HEADER, KERNEL, OURS, OverlapSweep, goals
 from feelahead.lab.reference import published
 from feelahead.lab.reference.approximations import monte_carlo, satellite_points, satellites
@@ -64,22 +63,6 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
     assert {"ours, batch", "29 points", "Monte Carlo 1e3"} <= methods
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert not {"Infinity", "NaN"} & set(summary.read_text().replace(",", "").split())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named", "valid"),
-    [
-        (["--truths", "1"], "truths = 1", "2 to"),
-        (["--workers", "2"], "--workers 2", "measures time"),
-        (["--peer-header", "/nowhere/overlap.hpp"], "/nowhere/overlap.hpp", "pip download"),
-    ],
-)
-def test_bad_input_is_one_line(arguments: list[str], named: str, valid: str) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        feelahead.main.command(["bench", "overlap", *arguments])
-    assert "\n" not in str(caught.value)
-    assert named in str(caught.value)
-    assert valid in str(caught.value)
 
 
 def test_goals_take_the_worst_class_and_the_ratio_to_the_package() -> None:

@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.protocol.messages import Vector2
@@ -30,7 +30,6 @@ def settled_travel(force_n: float) -> float:
     return TriggerTravel().travel(trigger.sensed_travel)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.floats(0.0, 1.0))
 def test_the_force_for_a_travel_holds_a_free_trigger_there(travel: float) -> None:
     assert settled_travel(force_for(travel)) == pytest.approx(travel, abs=1e-9)

@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from common.errors import ConfigurationError
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.lab.questions.soak import QUESTION, flat
 from feelahead.lab.sweep import ask
@@ -49,12 +48,3 @@ def test_a_short_one_with_observers(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     for text in ("robot side", "operator side", "this process"):
         assert text in said
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [["--minutes", "nan"], ["--link", "delay fast"], ["--observers", "9"], ["--observers", "1", "--virtual"]],
-)
-def test_bad_input_is_one_line(arguments: list[str]) -> None:
-    with pytest.raises(ConfigurationError, match=r"\A.*valid.*\Z"):
-        ask(QUESTION, arguments)

@@ -1,9 +1,9 @@
 """A robot side without an arm: its real sockets, lease and safety, and stiffness as the test says."""
 
 from common.protocol.codec import encode
-from common.protocol.messages import StiffnessUpdate
-from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
+from common.protocol.uniform_field import STRENGTHS
 from robot_side.operators.safety import SafetySettings
+from tests.helpers.felt import felt
 from tests.helpers.serving_robot import ServingRobot
 
 SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
@@ -43,13 +43,5 @@ class ArmlessRobot(ServingRobot):
             return
         [owner] = owners
         self._next_s = now_s + _FIELD_PERIOD_S
-        felt = StiffnessUpdate(
-            owner.header,
-            l2=uniform_field(0),
-            r2=uniform_field(round(STRENGTHS * self.r2_stiffness)),
-            speed_m_s=0.0,
-            horizon_m=FAR_M,
-            rumble=0.0,
-            state=permission.state,
-        )
-        self.sockets.send(owner.peer, encode(felt), everywhere=owner.everywhere)
+        stiffness = felt(owner.header, r2=round(STRENGTHS * self.r2_stiffness), state=permission.state)
+        self.sockets.send(owner.peer, encode(stiffness), everywhere=owner.everywhere)

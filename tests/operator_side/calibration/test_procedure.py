@@ -11,7 +11,6 @@ from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from tests.helpers.calibrating_hands import REPORT_S, Hands, Wear
 
-REPEATABLE = settings(derandomize=True, deadline=None, max_examples=25)
 ENDS = st.tuples(st.floats(0.0, 0.2), st.floats(0.7, 1.0))
 PLACES = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
 
@@ -35,7 +34,7 @@ def test_a_worn_controller() -> None:
 
 
 @given(ENDS, ENDS, PLACES, PLACES, st.floats(0.0, 0.014), st.integers(0, 2**32 - 1))
-@REPEATABLE
+@settings(max_examples=25)
 def test_the_result_makes_rest_zero_and_a_full_pull_one(
     l2: tuple[float, float],
     r2: tuple[float, float],

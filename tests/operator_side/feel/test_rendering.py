@@ -1,6 +1,6 @@
 """From fields and time to what both triggers and the motors do."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.protocol.messages import Header, StiffnessUpdate, TriggerField
@@ -12,7 +12,6 @@ from operator_side.feel.rendering import RenderedTrigger, RenderingSettings, Tri
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.helpers.felt import felt, field, ways
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 USUAL = RenderingSettings()
 STILL = Displacement(0.0, 0.0)
 LET_GO = (0.0, 0.0)
@@ -56,7 +55,6 @@ def test_a_release_does_not_fall() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 8), st.floats(0.0, 0.2)), max_size=30), st.integers(0, 8))
-@REPEATABLE
 def test_after_any_past_it_is_never_weaker_than_asked_for_and_soon_no_stronger(
     past: list[tuple[int, float]], last: int
 ) -> None:

@@ -62,7 +62,7 @@ def assert_released_as_told(run: Run, fields: Fields) -> None:
 
 
 @given(st.lists(st.tuples(FELT, st.integers(1, 20)), min_size=1, max_size=8))
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_whatever_comes_it_is_bounded_releases_at_once_and_lets_danger_through(
     repeated: list[tuple[Fields, int]],
 ) -> None:

@@ -1,7 +1,7 @@
 """The ten zones: exact where worked out by hand, and monotone wherever a finger or the arm may be."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
@@ -12,7 +12,6 @@ from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_tr
 from operator_side.hands.travel_calibration import TriggerTravel
 from tests.helpers.felt import field, ways
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 USUAL = zone_travels(TriggerTravel())
 STILL = Displacement(0.0, 0.0)
 HORIZON_M = 0.4
@@ -69,7 +68,6 @@ def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, mo
 
 
 @given(fields(), TRAVEL, MOVING, st.floats(0.0, 0.4))
-@REPEATABLE
 def test_each_zone_is_what_the_equation_gives(
     ahead: TriggerField, other: float, moving: Displacement, away: float
 ) -> None:

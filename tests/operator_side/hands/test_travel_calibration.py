@@ -3,19 +3,17 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 
-REPEATABLE = settings(derandomize=True, deadline=None)
 TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))
 STICKS = st.builds(StickRest, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.0, 0.6))
 AXES = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), TRIGGERS)
-@REPEATABLE
 def test_travel_is_monotone_and_in_range(one: float, other: float, trigger: TriggerTravel) -> None:
     low, high = (trigger.travel(raw) for raw in sorted((one, other)))
     assert 0.0 <= low <= high <= 1.0
@@ -24,7 +22,6 @@ def test_travel_is_monotone_and_in_range(one: float, other: float, trigger: Trig
 
 
 @given(st.floats(0.0, 1.0), TRIGGERS)
-@REPEATABLE
 def test_raw_undoes_travel(travel: float, trigger: TriggerTravel) -> None:
     assert trigger.dead_zone <= trigger.raw(travel) <= trigger.saturation
     assert trigger.travel(trigger.raw(travel)) == pytest.approx(travel, abs=1e-12)
@@ -38,7 +35,6 @@ def test_a_full_pull_reaches_so_many_zones(saturation: float, zones: int) -> Non
 
 
 @given(AXES, st.floats(0.0, 0.9))
-@REPEATABLE
 def test_sticks_keep_their_direction_and_lose_the_dead_zone(raw: tuple[float, float], dead_zone: float) -> None:
     x, y = StickRest(dead_zone=dead_zone).deflection(raw)
     radius = math.hypot(*raw)
@@ -50,7 +46,6 @@ def test_sticks_keep_their_direction_and_lose_the_dead_zone(raw: tuple[float, fl
 
 
 @given(STICKS, st.floats(0.0, 2.0 * math.pi), AXES)
-@REPEATABLE
 def test_a_worn_stick_rests_at_zero_and_reaches_the_end_in_every_direction(
     stick: StickRest, angle: float, raw: tuple[float, float]
 ) -> None:

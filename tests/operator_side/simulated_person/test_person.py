@@ -9,10 +9,7 @@ from common.protocol.messages import Telemetry, Vector3
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport, Rumble
-from operator_side.dualsense.simulated.trigger_model import (
-    SPRING_PRELOAD_N,
-    SPRING_RISE_N,
-)
+from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.simulated_person.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.simulated_person.settings import PersonSettings
 from tests.helpers.felt import feedback

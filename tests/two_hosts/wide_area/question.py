@@ -4,19 +4,18 @@ python -m tests.two_hosts.wide_area --delay 100 --loss 0 0.1 1 --control reno cu
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from itertools import product
 from typing import Annotated, Final, Literal
 
 import tyro
 from rich.console import RenderableType
-from rich.text import Text
 
 from feelahead.lab.goals import short
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from tests.two_hosts.wide_area.running import CONNECTIONS, run_trial
+from tests.two_hosts.wide_area.running import run_trial
 from tests.two_hosts.wide_area.trial import Trial
 
 _Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
@@ -65,17 +64,14 @@ _VARIED: Final = tuple(one.name for one in fields(Trial) if one.name != "seconds
 
 
 def cells(settings: WideSweep) -> Iterator[Trial]:
-    """Lay out the grid; one number of connections where the operator side knows no other."""
-    values = [getattr(settings, name) for name in _VARIED]
-    if not CONNECTIONS:
-        values[_VARIED.index("connections")] = (0,)
-    for chosen in product(*values):
+    """Lay out the grid."""
+    for chosen in product(*(getattr(settings, name) for name in _VARIED)):
         yield Trial(**dict(zip(_VARIED, chosen, strict=True)), seconds=settings.seconds)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
     """Run one trial."""
-    yield asdict(run_trial(cell, seed))
+    yield run_trial(cell, seed)
 
 
 def show(_: WideSweep, table: Table) -> Iterator[RenderableType]:
@@ -88,8 +84,6 @@ def show(_: WideSweep, table: Table) -> Iterator[RenderableType]:
         for row in table
     )
     yield shown("a wide area", (*varied, *columns), lines)
-    if not CONNECTIONS:
-        yield Text("this operator side has one connection")
 
 
 _COLUMNS: Final[Mapping[str, Sequence[str]]] = {

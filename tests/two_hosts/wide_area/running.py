@@ -6,7 +6,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,13 +15,11 @@ from common.recording.entries import Kind, split_text, unpack_block
 from common.recording.reading import open_recording
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
-from operator_side.settings import OperatorSettings
+from feelahead.lab.table import Row
 from tests.two_hosts.wide_area.forwarder import ADDRESSES
-from tests.two_hosts.wide_area.trial import Outcome, Trial
+from tests.two_hosts.wide_area.trial import Trial
 from tests.two_hosts.wide_area.tunnels import Child, Host, WideArea
 
-CONNECTIONS: Final = "connections" in {one.name for one in fields(OperatorSettings)}
-"""Whether the operator side can be told how many connections to use."""
 _STARTS_S: Final = 120.0
 _LOOKS_S: Final = 0.05
 _LATE_S: Final = 0.1
@@ -29,7 +27,7 @@ _ENDPOINT: Final = f"{ADDRESSES['robot']}:5555"
 _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
 
 
-def run_trial(trial: Trial, seed: int = 0) -> Outcome:
+def run_trial(trial: Trial, seed: int = 0) -> Row:
     """Run it; FeelaheadError where there can be no wide area, or a side fails."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="feelahead-wide-")))
@@ -41,7 +39,7 @@ def run_trial(trial: Trial, seed: int = 0) -> Outcome:
         codes = sides.robot.stop(), sides.operator.stop()
         assert codes == (0, 0), f"the sides ended with codes {codes}"
         robot, operator = (read_summary(folder / f"{host}.json") for host in ("robot", "operator"))
-        return sides.outcome(_total(parts), robot, operator)
+        return sides.row(_total(parts), robot, operator)
 
 
 @dataclass
@@ -91,7 +89,7 @@ class _Sides:
 
     def _operator(self, name: str, *more: str) -> SideProcess:
         """One that has spoken."""
-        connections = (f"--connections={self.trial.connections}",) if self.trial.connections and CONNECTIONS else ()
+        connections = (f"--connections={self.trial.connections}",) if self.trial.connections else ()
         device = f"--device={_DEVICES[self.trial.person]}"
         side = self._side("operator", name, f"--connect=tcp://{_ENDPOINT}", device, *connections, *more)
         side.wait_for("status", _STARTS_S)
@@ -150,43 +148,33 @@ class _Sides:
                         late_s = max(late_s, entry.now_s - self.fell_s)
         return late_s
 
-    def outcome(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Outcome:
-        """Make the row of both summaries, the statuses, and what was counted."""
-        there, here = operator["applied_age_ms"]["to_operator"], robot["applied_age_ms"]["to_robot"]
-        up, back = total["to_operator"], total["to_robot"]
-        return Outcome(
-            to_operator_p50_ms=there["p50"],
-            to_operator_p95_ms=there["p95"],
-            to_operator_p99_ms=there["p99"],
-            to_robot_p50_ms=here["p50"],
-            to_robot_p95_ms=here["p95"],
-            to_robot_p99_ms=here["p99"],
-            slowest_to_operator_ms=operator["delay_ms"]["to_operator"]["p99"],
-            slowest_to_robot_ms=robot["delay_ms"]["to_robot"]["p99"],
-            to_operator_gaps_min=60.0 * operator["gaps"]["to_operator"] / total["seconds"],
-            to_robot_gaps_min=60.0 * robot["gaps"]["to_robot"] / total["seconds"],
-            queueing_p95_ms=None if there["p95"] is None else there["p95"] - self.trial.delay,
-            armed=self.armed / max(self.statuses, 1),
-            armed_after_s=self.armed_after_s,
-            stops=len(robot["stops"]),
-            why="; ".join(dict.fromkeys(stop["reason"] for stop in robot["stops"])),
-            done=robot["task"]["placing"]["placed"],
-            to_operator_kbit_s=8e-3 * up["bytes"] / total["seconds"],
-            to_operator_packets_s=up["packets"] / total["seconds"],
-            to_robot_kbit_s=8e-3 * back["bytes"] / total["seconds"],
-            to_robot_packets_s=back["packets"] / total["seconds"],
-            lost=up["lost"] + back["lost"],
-            dropped=up["dropped"] + back["dropped"],
-            link_queue_p95_ms=up["queue_p95_ms"],
-            late_after_fall_s=self._late_after_fall_s(),
-            pictures_s=self.beside.get("pictures_s"),
-            picture_p50_ms=self.beside.get("picture_p50_ms"),
-            picture_p95_ms=self.beside.get("picture_p95_ms"),
-            bulk_kbit_s=self.beside.get("bulk_kbit_s"),
-            late_p99_ms=total["late_p99_ms"],
-            late_max_ms=total["late_max_ms"],
-            realtime=total["realtime"],
-        )
+    def row(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Row:
+        """Make the row of both summaries, the statuses, and what was counted; None where nothing was measured.
+
+        Ages are those of what is applied: at the operator on arrival, at the robot in each tick that moves the arm. A
+        late message was overtaken, and counts as `slowest` alone. `armed` is a share of the statuses.
+        """
+        row: Row = {}
+        for way, summary in (("to_operator", operator), ("to_robot", robot)):
+            row |= {f"{way}_{name}_ms": summary["applied_age_ms"][way][name] for name in ("p50", "p95", "p99")}
+            row[f"slowest_{way}_ms"] = summary["delay_ms"][way]["p99"]
+            row[f"{way}_gaps_min"] = 60.0 * summary["gaps"][way] / total["seconds"]
+            row[f"{way}_kbit_s"] = 8e-3 * total[way]["bytes"] / total["seconds"]
+            row[f"{way}_packets_s"] = total[way]["packets"] / total["seconds"]
+        age_ms = row["to_operator_p95_ms"]
+        return row | {
+            "queueing_p95_ms": None if age_ms is None else age_ms - self.trial.delay,
+            "link_queue_p95_ms": total["to_operator"]["queue_p95_ms"],
+            "armed": self.armed / max(self.statuses, 1),
+            "armed_after_s": self.armed_after_s,
+            "stops": len(robot["stops"]),
+            "why": "; ".join(dict.fromkeys(stop["reason"] for stop in robot["stops"])),
+            "done": robot["task"]["placing"]["placed"],
+            **{name: total["to_operator"][name] + total["to_robot"][name] for name in ("lost", "dropped")},
+            "late_after_fall_s": self._late_after_fall_s(),
+            **self.beside,
+            **{name: total[name] for name in ("late_p99_ms", "late_max_ms", "realtime")},
+        }
 
 
 _ADDED: Final = ("seconds", "packets", "bytes", "lost", "dropped")

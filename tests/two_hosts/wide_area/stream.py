@@ -13,7 +13,7 @@ from msgspec import Meta
 from rich.console import RenderableType
 
 from common.emulation.spec import LinkSpec
-from common.limits import check_limits
+from common.limits import Limited
 from feelahead.lab.link.samples import play
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -52,7 +52,7 @@ class StreamSweep(Sweep):
 
 
 @dataclass(frozen=True)
-class Cell:
+class Cell(Limited):
     """One link, and what carries the messages."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)]
@@ -61,9 +61,6 @@ class Cell:
     control: str
     """A congestion control, or `stream`"""
     seconds: float
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 def cells(settings: StreamSweep) -> Iterator[Cell]:

@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta
 
-from common.limits import Share, check_limits
+from common.limits import Limited, Share
 
 Direction = Literal["to_operator", "to_robot"]
 
 
 @dataclass(frozen=True)
-class WayWords:
+class WayWords(Limited):
     """Delay, loss, rate and queue of one direction; the forwarder gets them as JSON."""
 
     delay_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
@@ -27,9 +27,6 @@ class WayWords:
     """0: free."""
     queue_s: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.2
     """A packet that would wait for longer is dropped."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
 
 
 @dataclass
