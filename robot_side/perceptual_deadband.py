@@ -23,7 +23,6 @@ from common.protocol.messages import MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array, output_array, record_array
-from robot_side.field.scratch import STRENGTHS
 from robot_side.laws.sensed import (
     ACCELERATION,
     DISPLACEMENT,
@@ -105,7 +104,7 @@ def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patie
 
     A way at the horizon is no nearer: nothing is known from there on, and the last message still holds.
     """
-    for place in range(side * OF_A_SIDE, side * OF_A_SIDE + 2 * STRENGTHS):
+    for place in range(side * OF_A_SIDE, side * OF_A_SIDE + DISPLACEMENT):
         way = numbers[place]
         apart = way - sent[place] + moved
         if apart < -_NEARER * _DEADBAND_M:

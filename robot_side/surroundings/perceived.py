@@ -1,8 +1,9 @@
 """What the camera reports: objects as spheres, boxes, tetrahedra, half-spaces, meshes, ellipsoids, each with a role."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphe
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
-    from robot_side.surroundings.movers import Movers
 
 
 class Role(Enum):
@@ -82,8 +82,23 @@ class PerceivedObjects:
     """(k, 3, 3) object to world, with `positions_m`"""
     velocities_m_s: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
-    since: "tuple[Movers, FloatArray] | None" = field(default=None, init=False, repr=False)
+    since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
     """Which objects may be elsewhere than in an earlier frame, and their numbers; None: any may be."""
+
+
+class SomeObjects(Protocol):
+    """Objects of a frame that may be elsewhere in the next ones; `movers` says what each of these is."""
+
+    first: PerceivedObjects
+    things: IntArray
+    first_rows: IntArray
+    measured: bool
+    parts: Mapping[str, Any]
+
+    @property
+    def at_first(self) -> FloatArray:
+        """Their numbers in `first`."""
+        ...
 
 
 class ObjectSource(Protocol):

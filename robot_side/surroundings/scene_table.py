@@ -9,9 +9,8 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.surroundings.blocks import TOGETHER, Blocks
 from robot_side.surroundings.kinds.layout import MESH, NUMBERS
-from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.moving_rows import FLAT, WRITTEN, write_movers
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
 from robot_side.surroundings.placing import Rows, numbers_of, placed_rows, primitives_of
 from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.validity import require_valid
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 class Moving:
     """The movers' part of a table."""
 
-    def __init__(self, movers: Movers, table: "SceneTable") -> None:
+    def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
         self.movers = movers
         self.places = table.blocks.places(movers.things)
         self.blocks = np.unique(self.places[self.places >= 0] // TOGETHER)

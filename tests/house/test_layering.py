@@ -54,7 +54,7 @@ ARROWS = """
     robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
         robot_side/surroundings
     robot_side/simulation: common common/files robot_side/arm robot_side/compiled robot_side/field robot_side/gripper
-        robot_side/overlap/meshes robot_side/surroundings
+        robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
     robot_side: common common/command common/emulation common/files common/protocol common/rate common/realtime
         common/recording common/sockets common/timing robot_side/arm robot_side/cameras robot_side/compiled

@@ -150,7 +150,7 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     roles = {name: value for name, value in roles.items() if f'"{name}"' in world}
     assembled = assemble(RobotSettings(model=model, site="tcp", roles=roles), 1, "clock")
     needed = {kernel.name.rpartition(".")[2] for kernel in assembled.kernels}
-    assert needed >= {"look", "feel", "drive"}
+    assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
     # Those of the library of overlaps are not for ticks.
     assert not needed & {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"}

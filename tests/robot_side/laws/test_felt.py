@@ -30,7 +30,7 @@ from robot_side.laws.sensed import (
     STIFFNESS,
     TOOL_SPEED,
 )
-from tests.helpers.laws import feel, keep, look_from, memory
+from tests.helpers.field.law_memory import feel, keep, look_from, memory
 from tests.helpers.perceived_scenes import random_rotation
 
 

@@ -18,9 +18,9 @@ from robot_side.laws.sideways import SPACING_M
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import RADIUS_M, ball_pose
+from tests.helpers.field.law_memory import farthest_m_s, fingers_m_s, memory, moments, moved
 from tests.helpers.field.situations import ACCELERATION_M_S2, FULL_SPEED_M_S, situation, swept
 from tests.helpers.gripper_poses import free_pose
-from tests.helpers.laws import farthest_m_s, fingers_m_s, memory, moments, moved
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOP_S = 0.1
