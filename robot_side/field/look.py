@@ -7,7 +7,7 @@ where a strength may begin sooner than those known by then (`profile`).
 """
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.bundle import BUNDLE
@@ -24,21 +24,20 @@ from robot_side.compiled.kernel import (
 from robot_side.compiled.vectors import Vector, load
 from robot_side.field.inflation import around_spheres, inflate
 from robot_side.field.nearest_first import drop_first, push
-from robot_side.field.object_class import PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
 from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH, Contact
+from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
 from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
 
 MARGIN_M: Final = 0.012
 """m: over this distance before the one at which full strength is due, strength grows."""
 LEAST_DEPTH_M: Final = 0.0005
 """A shallower overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
-_ROUNDED: Final = 5e-3
-"""The cosine at a contact may be off by this where rounding chose another nearest point."""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
@@ -94,80 +93,6 @@ def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, r
 
 
 @building_block
-def _meet_sphere(
-    bundles: Bundles, i: int, rows: int, radius: float, along: Vector, reach: float, clear: bool
-) -> Contact:
-    """Where a sphere first touches any of the first rows kept."""
-    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
-    for k in range(rows):
-        row = scratch.rows[k]
-        near = min(reach, least)
-        if least > 0.0 and (scene.kinds[row] == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius)):
-            found, closing = contact_with(scene, row, center, along, radius, near, clear)
-            if found < least:
-                least, least_closing = found, closing
-    return least, least_closing
-
-
-@building_block
-def _pair(
-    bundles: Bundles,
-    place: int,
-    i: int,
-    uninflated: bool,
-    rows: int,
-    thing: int,
-    object_class: int,
-    early: float,
-    along: Vector,
-    widest: float,
-    reach: float,
-    clear: bool,
-) -> Any:
-    """Write the pair of a sphere and an object; where they do not touch within the reach, its contact is infinite."""
-    scratch = scratch_at(bundles.scratch)
-    pair, inflated = scratch.pairs[place], scratch.sigma_m[i, 0]
-    if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
-        inflated = widest
-        scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
-    sooner = inflated if uninflated else 0.0
-    pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
-    pair.lead, pair.touchable = early + sooner, object_class in (TOUCHABLE, TARGET)
-    pair.expected = inflated - min(scratch.sigma_m[i, 1], inflated) if pair.touchable else 0.0
-    pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + sooner, clear)
-    pair.overlaps = pair.contact == 0.0
-    return pair
-
-
-@inlined
-def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
-    """Write an entry without tangents."""
-    entry.row, entry.enters, entry.again, entry.volume, entry.slope = row, enters, math.inf, 0.0, 0.0
-    entry.closing = min(closing + _ROUNDED, 1.0) if closing > 0.0 else 0.0
-    entry.root_0, entry.root_1 = math.inf, math.inf
-    entry.at_0, entry.at_1, entry.steep_0, entry.steep_1 = 0.0, 0.0, 0.0, 0.0
-
-
-@building_block
-def _enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
-    """Write which of the rows kept a pair's sphere enters, and where; how many."""
-    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    if rows == 1:
-        _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
-        return 1
-    count, center = 0, load(scratch.spheres, pair.sphere)
-    for k in range(rows):
-        row = scratch.rows[k]
-        if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
-            enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
-            if enters <= reach:
-                _write_entry(scratch.entries[count], row, enters, closing)
-                count += 1
-    return count
-
-
-@building_block
 def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, reach: float, waits: bool) -> bool:
     """Follow the overlap profile of the pair at a place; see `follow`."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
@@ -175,36 +100,9 @@ def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, r
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
     # No sample that matters lies more than a margin beyond the last distance that counts.
     entered = min(end, _last_to_count(scratch, MARGIN_M) + MARGIN_M + pair.lead)
-    entries = _enter(bundles, pair, rows, along, entered)
+    entries = enter(bundles, pair, rows, along, entered)
     least = min(math.pi * pair.radius * LEAST_DEPTH_M * LEAST_DEPTH_M, 0.5 * scene.object_volumes[thing])
     return follow(Profile(pair, entries, center, along, MARGIN_M, end), least, waits, bundles)
-
-
-@building_block
-def _pairs(
-    bundles: Bundles,
-    place: int,
-    i: int,
-    rows: int,
-    thing: int,
-    object_class: int,
-    early: float,
-    along: Vector,
-    widest: float,
-    reach: float,
-    clear: bool,
-) -> int:
-    """Write the pairs of a sphere and an object that touch within the reach; how many."""
-    found = 0
-    for uninflated in (False, True):
-        pair = _pair(
-            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, widest, reach, clear
-        )
-        found += 1 if pair.contact < math.inf else 0
-        # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
-        if not pair.overlaps:
-            break
-    return found
 
 
 @building_block
@@ -255,7 +153,7 @@ def _look_at(
         else:
             clear = first > -math.inf
             for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
-                met = _pairs(bundles, pairs, i, rows, thing, object_class, early, along, widest, last, clear)
+                met = pairs_of(bundles, pairs, i, rows, thing, object_class, early, along, widest, last, clear)
                 for place in range(pairs, pairs + met):
                     pair = scratch.pairs[place]
                     count = push(keys, items, count, pair.contact - pair.lead, place)

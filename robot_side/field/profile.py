@@ -237,10 +237,11 @@ def _is_late(
         return False
     late = True
     for level in range(STRENGTHS):
-        at = min(latest_of(profile, level, distances) + _DOUBT * (full.at - half.at), full.at)
+        latest = latest_of(profile, level, distances)
+        at = min(latest + _DOUBT * (full.at - half.at), full.at)
         a, b = (free, half) if at < half.at else (half, full)
         reached = cubic(a, b, max(at - a.at, 0.0) / (b.at - a.at))
-        late = late and reached - floor < (level + 0.5) / STRENGTHS * reference
+        late = late and latest <= full.at and reached - floor < (level + 0.5) / STRENGTHS * reference
     return late
 
 

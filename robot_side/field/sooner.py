@@ -83,7 +83,8 @@ def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray
         part = entries[k]
         if part.enters > at:
             continue
-        rises = rises and part.closing > 0.0 and part.slope >= falls
+        rises = rises and part.closing > 0.0 and part.slope >= (falls if part.volume > least else 0.0)
+        rises = rises and part.volume > 0.0
         root, steep = _touched(part, least)
         if second:
             part.at_1, part.root_1, part.steep_1 = at, root, steep
@@ -94,10 +95,10 @@ def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray
 
 @inlined
 def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
-    """The most that a cube root is; where it falls, nothing is known of what has been before."""
+    """The most that a cube root has been; where it falls, nothing is known of what has been before."""
     if steep > 0.0:
         return root + steep * (at - touches)
-    return root if at >= touches else math.inf
+    return root if touches == 0.0 else math.inf
 
 
 @inlined

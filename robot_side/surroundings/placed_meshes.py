@@ -12,8 +12,8 @@ from robot_side.compiled.columns import FLAGS, INDICES, NUMBERS, Declared, matri
 from robot_side.compiled.kernel import NUMBER, compiled, inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.overlap.meshes.mesh_kernels import to_world
-from robot_side.overlap.meshes.mesh_overlap import rounded_overlap
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
+from robot_side.overlap.meshes.rounded_overlap import rounded_overlap
 from robot_side.overlap.meshes.tree_queries import is_clear_of
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
 from robot_side.surroundings.kinds.layout import CONTACT, LEAST_WAY_M, MESH_CONTACT, NEVER, OVERLAP, Contact

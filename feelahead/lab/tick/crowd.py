@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
-from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """The middle of the built-in table's things."""
@@ -51,7 +51,7 @@ class CrowdedCamera:
         self._camera, self._count, self._only = camera, count, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
-        self._own_movers: Movers | None = None
+        self._own_movers: SomeObjects | None = None
         self._movers: Movers | None = None
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 

@@ -6,13 +6,11 @@ from typing import NamedTuple
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.transpose import transpose_four
-from robot_side.compiled.vectors import Vector, add, dot, scale, subtract
-from robot_side.overlap.closed_forms.half_space import cap
+from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.overlap.closed_forms.solid import (
     Overlap,
     bounded,
     nothing,
-    sphere_volume,
     whole_solid,
     whole_sphere,
 )
@@ -22,9 +20,7 @@ from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.small_mesh_overlap import beyond_face
 from robot_side.overlap.meshes.tree_queries import (
-    corner_of,
     gather_near,
-    is_inside,
     nearest_triangle,
     squared_distance,
     winding_number,
@@ -58,8 +54,6 @@ _SMALL_VOLUME = 1e-5
 """A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
 _CLOSE = 0.02
 """A centre farther than this from the surface (in radii) cannot be inside where the volume is small."""
-_SAME_PLANE = 1e-9
-"""Triangles lie in one plane if their normals, and their distances in radii, are off by no more."""
 
 
 class Sums(NamedTuple):
@@ -89,7 +83,7 @@ def mesh_overlap(
     mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
     """
     center = highs(precise_center)
-    least_2, most_2 = _box_distances_2(tables, mesh, center)
+    least_2, most_2 = box_distances_2(tables, mesh, center)
     if least_2 >= radius * radius or radius == 0.0:
         return nothing(), 0
     if most_2 <= radius * radius * (1.0 - 1e-12):
@@ -101,15 +95,15 @@ def mesh_overlap(
         return nothing(), 0
     sums = NO_SUMS
     for first in range(0, count, LANES):
-        size, large = _measure(center, _lows(precise_center), radius, tables, near, first, count, scratch)
+        size, large = measured(center, _lows(precise_center), radius, tables, near, first, count, scratch)
         if large:
             for lane in range(size):
                 triangle = near[first + lane]
                 if tables.triangles[triangle, 15] > FAR * radius and is_far(scratch, lane):
                     refine_lane(scratch, lane, tables, triangle, precise_center, radius)
-        sums = _with_lanes(sums, size, scratch)
+        sums = with_lanes(sums, size, scratch)
     push = sums.push
-    covered = _covered(sums, tables, mesh, center, radius)
+    covered = solid_angle_inside(sums, tables, mesh, center, radius)
     moment = sums.moment
     volume = (moment + covered) / 3.0
     if volume < _SMALL_VOLUME:
@@ -122,76 +116,8 @@ def mesh_overlap(
     return bounded(overlap, radius, tables.volumes[mesh]), count
 
 
-@building_block
-def rounded_overlap(
-    center: Vector, radius: float, tables: MeshTables, mesh: int, near: IntArray, scratch: FloatArray
-) -> tuple[float, Vector]:
-    """(volume, gradient) as of `mesh_overlap`, without what saves digits: exact to 1e-13 of the sphere."""
-    least_2, most_2 = _box_distances_2(tables, mesh, center)
-    if least_2 >= radius * radius or radius == 0.0:
-        return 0.0, (0.0, 0.0, 0.0)
-    if most_2 <= radius * radius * (1.0 - 1e-12):
-        return tables.volumes[mesh], (0.0, 0.0, 0.0)
-    count = _keep_near(tables, center, radius, near, gather_near(tables, mesh, center, radius, near))
-    count, flat = _keep_touched(tables, center, radius, near, count)
-    if count == 0:
-        return sphere_volume(radius) if is_inside(tables, mesh, center) else 0.0, (0.0, 0.0, 0.0)
-    if flat:
-        # Where the ball meets no other plane, the triangles of this one cover all of the disc.
-        normal = corner_of(tables, near[0], 3)
-        height = dot(normal, subtract(center, corner_of(tables, near[0], 0)))
-        volume, gradient, _ = cap(radius - height, radius + height, radius, normal)
-        return volume, gradient
-    sums = NO_SUMS
-    for first in range(0, count, LANES):
-        size, _ = _measure(center, (0.0, 0.0, 0.0), radius, tables, near, first, count, scratch)
-        sums = _with_lanes(sums, size, scratch)
-    volume = (sums.moment + _covered(sums, tables, mesh, center, radius)) / 3.0
-    area = radius * radius
-    overlap = bounded((volume * area * radius, scale(-area, sums.push), 0.0), radius, tables.volumes[mesh])
-    return overlap[0], overlap[1]
-
-
-@building_block
-def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> int:
-    """Keep those triangles in `near` whose planes the ball meets; how many."""
-    kept = 0
-    for index in range(count):
-        triangle = near[index]
-        apart = dot(corner_of(tables, triangle, 3), subtract(center, corner_of(tables, triangle, 0)))
-        near[kept] = triangle
-        kept += 1 if abs(apart) < radius else 0
-    return kept
-
-
-@building_block
-def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
-    """Keep those triangles in `near` that the ball touches, until two planes are; how many, and whether it is one."""
-    kept = 0
-    for index in range(count):
-        triangle = near[index]
-        if squared_distance(tables, triangle, center) < radius * radius:
-            near[kept] = triangle
-            kept += 1
-            if not _in_plane(tables, near[0], triangle, radius):
-                for other in range(index + 1, count):
-                    near[kept] = near[other]
-                    kept += 1
-                return kept, False
-    return kept, True
-
-
 @inlined
-def _in_plane(tables: MeshTables, triangle: int, other: int, radius: float) -> bool:
-    """Whether two triangles lie in one plane."""
-    normal = corner_of(tables, triangle, 3)
-    off = subtract(normal, corner_of(tables, other, 3))
-    lifted = dot(normal, subtract(corner_of(tables, triangle, 0), corner_of(tables, other, 0)))
-    return dot(off, off) <= _SAME_PLANE * _SAME_PLANE and abs(lifted) <= _SAME_PLANE * radius
-
-
-@inlined
-def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, float]:
+def box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, float]:
     """The squared distances (m²) from `point` to the nearest and the farthest point of a mesh's box."""
     least, most = 0.0, 0.0
     root = tables.roots[mesh]
@@ -204,7 +130,7 @@ def _box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
 
 
 @inlined
-def _measure(
+def measured(
     center: Vector,
     center_rest: Vector,
     radius: float,
@@ -226,7 +152,7 @@ def _measure(
 
 
 @inlined
-def _with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
+def with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
     """Add what has been measured."""
     triangle_terms(scratch, (size + (WIDTH - 1)) // WIDTH)
     reduce_lanes(scratch, size)
@@ -241,7 +167,7 @@ def _with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
 
 
 @inlined
-def _covered(sums: Sums, tables: MeshTables, mesh: int, center: Vector, radius: float) -> float:
+def solid_angle_inside(sums: Sums, tables: MeshTables, mesh: int, center: Vector, radius: float) -> float:
     """The part of the sphere (sr) that lies inside the mesh."""
     covered = -2.0 * (math.atan2(sums.product[1], sums.product[0]) + sums.turn)
     covered -= _WHOLE * math.floor(covered / _WHOLE)

@@ -1,0 +1,118 @@
+"""Pairs of one gripper sphere and one object: where they touch, and which of its primitives the sphere enters."""
+
+import math
+from typing import Any, Final
+
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.compiled.vectors import Vector, load
+from robot_side.field.object_class import TARGET, TOUCHABLE
+from robot_side.field.scratch import SCRATCH, Bundles, Count
+from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
+from robot_side.surroundings.scene_columns import SCENE, contact_with
+
+_ROUNDED: Final = 5e-3
+"""The cosine at a contact may be off by this where rounding chose another nearest point."""
+
+scene_at, scratch_at = SCENE.at, SCRATCH.at
+
+
+@building_block
+def _meet_sphere(
+    bundles: Bundles, i: int, rows: int, radius: float, along: Vector, reach: float, clear: bool
+) -> Contact:
+    """Where a sphere first touches any of the first rows kept."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
+    for k in range(rows):
+        row = scratch.rows[k]
+        near = min(reach, least)
+        if least > 0.0 and (scene.kinds[row] == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius)):
+            found, closing = contact_with(scene, row, center, along, radius, near, clear)
+            if found < least:
+                least, least_closing = found, closing
+    return least, least_closing
+
+
+@building_block
+def _pair(
+    bundles: Bundles,
+    place: int,
+    i: int,
+    uninflated: bool,
+    rows: int,
+    thing: int,
+    object_class: int,
+    early: float,
+    along: Vector,
+    widest: float,
+    reach: float,
+    clear: bool,
+) -> Any:
+    """Write the pair of a sphere and an object; where they do not touch within the reach, its contact is infinite."""
+    scratch = scratch_at(bundles.scratch)
+    pair, inflated = scratch.pairs[place], scratch.sigma_m[i, 0]
+    if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
+        inflated = widest
+        scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
+    sooner = inflated if uninflated else 0.0
+    pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
+    pair.lead, pair.touchable = early + sooner, object_class in (TOUCHABLE, TARGET)
+    pair.expected = inflated - min(scratch.sigma_m[i, 1], inflated) if pair.touchable else 0.0
+    pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + sooner, clear)
+    pair.overlaps = pair.contact == 0.0
+    return pair
+
+
+@inlined
+def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
+    """Write an entry without tangents."""
+    entry.row, entry.enters, entry.again, entry.volume, entry.slope = row, enters, math.inf, 0.0, 0.0
+    entry.closing = min(closing + _ROUNDED, 1.0) if closing > 0.0 else 0.0
+    entry.root_0, entry.root_1 = math.inf, math.inf
+    entry.at_0, entry.at_1, entry.steep_0, entry.steep_1 = 0.0, 0.0, 0.0, 0.0
+
+
+@building_block
+def enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
+    """Write which of the rows kept a pair's sphere enters, and where; how many."""
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    if rows == 1:
+        _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
+        return 1
+    count, center = 0, load(scratch.spheres, pair.sphere)
+    for k in range(rows):
+        row = scratch.rows[k]
+        if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
+            enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
+            if enters <= reach:
+                _write_entry(scratch.entries[count], row, enters, closing)
+                count += 1
+    return count
+
+
+@building_block
+def pairs_of(
+    bundles: Bundles,
+    place: int,
+    i: int,
+    rows: int,
+    thing: int,
+    object_class: int,
+    early: float,
+    along: Vector,
+    widest: float,
+    reach: float,
+    clear: bool,
+) -> int:
+    """Write the pairs of a sphere and an object that touch within the reach; how many."""
+    found = 0
+    for uninflated in (False, True):
+        pair = _pair(
+            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, widest, reach, clear
+        )
+        found += 1 if pair.contact < math.inf else 0
+        # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
+        if not pair.overlaps:
+            break
+    return found

@@ -1,0 +1,82 @@
+"""Overlaps with one mesh of a scene, against those of the library; which meshes are convex."""
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray, IntArray
+from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of, torus
+from robot_side.overlap import Mesh, MeshLibrary
+from robot_side.overlap.meshes.mesh_library import mesh_pairs
+from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
+from robot_side.surroundings.placed_meshes import overlap_one_mesh
+from robot_side.surroundings.scene_table import scene_table
+from tests.helpers.perceived_scenes import Scene, random_rotation
+from tests.helpers.scene_meshes import cup
+
+COUNT, EQUAL = 300, 1e-12
+Surface = tuple[FloatArray, IntArray]
+
+
+def hollow() -> Surface:
+    """A cube with a cubic cavity in its middle."""
+    places, tetrahedra = grid_tetrahedra(3)
+    middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
+    used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
+    return 0.03 * (places[used] - 1.5), numbers.reshape(-1, 3)
+
+
+SURFACES: dict[str, tuple[Surface, bool]] = {
+    "cube": ((0.05 * CUBE_CORNERS, CUBE_TRIANGLES), True),
+    "plate": ((CUBE_CORNERS * [0.4, 0.3, 0.0005], CUBE_TRIANGLES), True),
+    "ball": ((0.05 * round_mesh(6)[0], round_mesh(6)[1]), True),
+    "capsule": (capsule_mesh(0.02, 0.05, 4)[:2], True),
+    "cup": (cup(), False),
+    "hollow": (hollow(), False),
+    "torus": ((0.03 * torus(12, 6)[0], torus(12, 6)[1]), False),
+}
+
+
+def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
+    """Points (n, 3) all about a mesh, some of them right above a corner or an edge of it."""
+    size = mesh.highest_m - mesh.lowest_m
+    centers: FloatArray = rng.uniform(mesh.lowest_m - 0.3 * size, mesh.highest_m + 0.3 * size, (COUNT, 3))
+    corners = mesh.tables.triangles[:, :9].reshape(-1, 3)[rng.integers(3 * mesh.triangle_count, size=COUNT)]
+    shared = rng.random((COUNT, 3)) < [[0.0], [0.4], [0.7]][rng.integers(3)][0]
+    return np.where(shared, corners, centers)
+
+
+@pytest.mark.parametrize("radius_m", [0.0005, 0.004, 0.02, 0.08])
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> None:
+    """Before its faces, edges and corners, within it, swallowing it, and where one plane alone is met."""
+    rng = np.random.default_rng(len(name))
+    library, rotation, position = MeshLibrary([Mesh(*SURFACES[name][0])]), random_rotation(rng), rng.normal(size=3)
+    mesh = Mesh(*SURFACES[name][0])
+    centers, radii = position + centers_about(mesh, rng) @ rotation.T, np.full(COUNT, radius_m)
+    table = scene_table(Scene().add().mesh(mesh, position, rotation).objects())
+    volumes, gradients = np.empty(COUNT), np.empty((COUNT, 3))
+    for k, center in enumerate(centers):
+        volumes[k] = overlap_one_mesh(table.shapes, 0, *center.tolist(), radius_m, table.meshes, gradients[k])
+    placed = np.tile(position, (COUNT, 1)), np.tile(rotation, (COUNT, 1, 1))
+    expected = mesh_pairs(centers, radii, library, np.zeros(COUNT, dtype=np.int64), *placed)
+    assert (np.abs(volumes - expected[0])).max() <= EQUAL * 4.0 / 3.0 * np.pi * radius_m**3
+    # Right on an edge, the gradient is either face's.
+    np.testing.assert_allclose(gradients, expected[1], rtol=0.0, atol=1e-9 * np.pi * radius_m**2)
+
+
+def test_convex_meshes_are_told_from_those_with_dents_and_cavities() -> None:
+    library = MeshLibrary([Mesh(*surface) for surface, _ in SURFACES.values()])
+    assert library.convex.tolist() == [convex for _, convex in SURFACES.values()]
+
+
+def test_a_dent_counts_from_a_tenth_of_a_micrometre_on() -> None:
+    vertices, triangles = round_mesh(6)
+    for depth_m, convex in ((1e-9, True), (1e-5, False)):
+        flat = 0.05 * CUBE_CORNERS
+        top = np.flatnonzero(flat[:, 2] > 0.0)
+        dented = np.concatenate([flat, [[0.0, 0.0, 0.05 - depth_m]]])
+        kept = [one for one in CUBE_TRIANGLES.tolist() if not set(one) <= set(top.tolist())]
+        ring = sorted(top.tolist(), key=lambda k: np.arctan2(flat[k, 1], flat[k, 0]))
+        lid = [[ring[k], ring[(k + 1) % 4], 8] for k in range(4)]
+        assert MeshLibrary([Mesh(dented, kept + lid)]).convex.tolist() == [convex]
+    assert MeshLibrary([Mesh(vertices, triangles)]).convex.all()
