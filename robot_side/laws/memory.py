@@ -161,20 +161,25 @@ class Memory:
         self.limits_rad_s = np.ascontiguousarray(limits.velocity_rad_s)
         self.accelerations_rad_s2 = np.ascontiguousarray(limits.acceleration_rad_s2)
         self.encoder_variance: FloatArray = encoder_sigma_rad * encoder_sigma_rad
-        self.kernels: IntArray = np.array([find_ability.address, look.address, sum_overlaps.address])
+        self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
         self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
-        self.make_room(0, 0)
+        self.early_m: FloatArray = np.zeros(0)
+        """By how much each object's ways are shorter, as it comes nearer"""
+        self.own_m_s: FloatArray = np.zeros((0, 3))
+        """(m, 3) of each sphere against the tool: the fingers', in the world frame"""
 
     def make_room(self, spheres: int, objects: int) -> None:
-        """Have room for a gripper of m spheres among k objects."""
-        self.own_m_s: FloatArray = np.zeros((spheres, 3))
-        """(m, 3) of each sphere against the tool: the fingers', in the world frame"""
-        self.finger_poses_m: FloatArray = np.zeros((FINGER_POSES * spheres, 3))
-        """Where the spheres were in the tool frame, pose after pose"""
-        self.centers_m: FloatArray = np.zeros((spheres, 3))
-        """Of the spheres at the place that is looked from"""
-        self.early_m: FloatArray = np.zeros(objects)
-        """By how much each object's ways are shorter, as it comes nearer"""
+        """Have room for a gripper of m spheres among k objects; what is known of the same spheres stays."""
+        if objects > len(self.early_m):
+            self.early_m = np.zeros(objects)
+        if spheres > len(self.own_m_s):
+            self.own_m_s = np.zeros((spheres, 3))
+            self.finger_poses_m: FloatArray = np.zeros((FINGER_POSES * spheres, 3))
+            """Where the spheres were in the tool frame, pose after pose"""
+            self.centers_m: FloatArray = np.zeros((spheres, 3))
+            """Of the spheres at the place that is looked from"""
+        # Not before the first tick: whoever starts has compiled them by then, several at a time.
+        self.kernels[:] = find_ability.address, look.address, sum_overlaps.address
         self.bundle = MEMORY.bundle(self)
 
     def fits(self, spheres: int, objects: int) -> bool:

@@ -104,8 +104,7 @@ class SweptLaw:
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick; ValueError that says what is not finite, and nothing that was seen is changed."""
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
-        if self._room != (len(pose.sphere_radii_m), scene):
-            self._make_room(len(pose.sphere_radii_m), scene)
+        self._make_room(pose, scene)
         _, classes, closing = self._classes_of(situation)
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
         if not sense(
@@ -146,6 +145,7 @@ class SweptLaw:
     def asked(self, side: int, situation: Situation, place: int = 0) -> Asked:
         """What a look along one side is asked, where the gripper is or at a place that it is yet to come to."""
         pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
+        self._make_room(pose, self.surroundings.see(situation.objects))
         where = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m
         by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
         if not fill_prospect(memory.bundle, side, place, *where, right, up, age_s, by_operator):
@@ -172,7 +172,10 @@ class SweptLaw:
         closes = place > 0 and bool(memory.state["moves_fingers"][0])
         return Asked(there, closing if closes else classes, along, _widest_m(situation), float(found["prediction_sd"]))
 
-    def _make_room(self, spheres: int, scene: SceneTable) -> None:
+    def _make_room(self, pose: GripperPose, scene: SceneTable) -> None:
+        spheres = len(pose.sphere_radii_m)
+        if self._room == (spheres, scene):
+            return
         self._room, needed = (spheres, scene), (spheres, len(scene.kinds), len(scene.first_rows))
         if not self._scratch.fits(*needed):
             self._scratch = Scratch(*needed)

@@ -15,14 +15,14 @@ from robot_side.laws.memory import Memory
 def memory(spheres: int = 0) -> Memory:
     """One as at the start, with room for a gripper of so many spheres."""
     made = Memory(JointLimits(np.ones(6), np.ones(6)), np.zeros(6), [np.zeros((0, 3))] * 2)
-    made.make_room(spheres, 0)
+    made.make_room(max(spheres, 1), 1)
     return made
 
 
 def moved(kept: Memory, pose: GripperPose, after_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The tool's position (3,) and rotation (3, 3), and the spheres' centres (m, 3), then."""
     _move(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, after_s)
-    return kept.tool_m.copy(), kept.rotation.copy(), kept.centers_m.copy()
+    return kept.tool_m.copy(), kept.rotation.copy(), kept.centers_m[: len(pose.sphere_centers_m)].copy()
 
 
 def moments(kept: Memory, pose: GripperPose, until_s: float, ahead_m: float = 0.0) -> tuple[float, ...]:

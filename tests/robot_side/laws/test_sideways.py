@@ -247,3 +247,13 @@ def test_fingers_move_by_the_difference_in_the_tool_frame(seed: int) -> None:
     expected = (in_tool[1] - in_tool[0]) / 0.05 @ now.tool_rotation.T
     np.testing.assert_allclose(fingers_m_s(kept, now, 1.05), expected, atol=1e-11)
     assert not fingers_m_s(kept, then, 1.06, changed=True).any()
+
+
+def test_what_is_known_of_the_fingers_stays_when_more_objects_come() -> None:
+    rng, kept = np.random.default_rng(3), memory(5)
+    then, now = random_pose(rng, 5), random_pose(rng, 5)
+    expected = memory(5)
+    for one in (kept, expected):
+        fingers_m_s(one, then, 1.0)
+    kept.make_room(5, 1000)
+    np.testing.assert_array_equal(fingers_m_s(kept, now, 1.05), fingers_m_s(expected, now, 1.05))
