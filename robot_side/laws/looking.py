@@ -16,7 +16,7 @@ from robot_side.field.scratch import SCRATCH, Count
 from robot_side.field.total_overlap import SUM_OVERLAPS
 from robot_side.laws.felt import MOST_M
 from robot_side.laws.memory import Kernel, Total, memory_at
-from robot_side.laws.prospect import find_prospect, stopping
+from robot_side.laws.prospect import FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import keep, longest_waiting
 from robot_side.laws.sensed import L2, R2
 from robot_side.laws.sideways import move
@@ -32,6 +32,7 @@ _FAR_BEHIND: Final = 5.0
 _ALL: Final = 1000
 
 scratch_at = SCRATCH.at
+_find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
 _look = call_at_address(TRUTH, LOOK)
 _sum_overlaps = call_at_address(NUMBER, SUM_OVERLAPS)
 
@@ -83,7 +84,7 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     after = memory.moments_s[place - 1] if place > 0 else 0.0
     move(bundle, moment.tool, moment.rotation, moment.centers, after)
     where = memory.rotation, moment.jacobian, moment.right, moment.up, moment.loop_age, moment.by_operator
-    if not find_prospect(bundle, side, *where):
+    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, side, *where)):
         return False
     _fill_early(bundle, moment.velocities, stopping(prospect.speed, prospect.acceleration, moment.loop_age))
     classes = moment.closing if place > 0 and state.moves_fingers == 1 else moment.classes

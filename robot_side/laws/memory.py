@@ -7,11 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.arm.ability import JointLimits, find_ability
+from robot_side.arm.ability import JointLimits
 from robot_side.compiled.columns import INDICES, NUMBERS, Declared, records, rows
-from robot_side.field.look import look
 from robot_side.field.scratch import STRENGTHS, Count
-from robot_side.field.total_overlap import sum_overlaps
 
 SIDES: Final = 3
 MOST_PLACES: Final = 8
@@ -26,8 +24,9 @@ class Kernel(IntEnum):
     """Kernels that are called by their addresses: compiled in anew, each would cost seconds at the start."""
 
     ABILITY = 0
-    LOOK = 1
-    OVERLAPS = 2
+    PROSPECT = 1
+    LOOK = 2
+    OVERLAPS = 3
 
 
 class Total(IntEnum):
@@ -162,6 +161,7 @@ class Memory:
         self.accelerations_rad_s2 = np.ascontiguousarray(limits.acceleration_rad_s2)
         self.encoder_variance: FloatArray = encoder_sigma_rad * encoder_sigma_rad
         self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
+        """Their addresses"""
         self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
         self.early_m: FloatArray = np.zeros(0)
         """By how much each object's ways are shorter, as it comes nearer"""
@@ -178,8 +178,6 @@ class Memory:
             """Where the spheres were in the tool frame, pose after pose"""
             self.centers_m: FloatArray = np.zeros((spheres, 3))
             """Of the spheres at the place that is looked from"""
-        # Not before the first tick: whoever starts has compiled them by then, several at a time.
-        self.kernels[:] = find_ability.address, look.address, sum_overlaps.address
         self.bundle = MEMORY.bundle(self)
 
     def fits(self, spheres: int, objects: int) -> bool:

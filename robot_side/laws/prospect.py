@@ -9,11 +9,9 @@ from robot_side.arm.ability import ABILITY
 from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array
-from robot_side.compiled.vectors import load
 from robot_side.enlargement.prediction_errors import prediction_error
 from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.sensed import R2, STICK
-from robot_side.laws.sideways import move
 
 BEYOND_M: Final = 0.05
 """So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
@@ -39,7 +37,11 @@ def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
     return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
 
 
-@inlined
+FIND_PROSPECT: Final = (BUNDLE, COUNT, input_array(2), input_array(2), NUMBER, NUMBER, NUMBER, TRUTH)
+"""What `find_prospect` takes, for who calls it by its address."""
+
+
+@compiled(*FIND_PROSPECT, returns=TRUTH)
 def find_prospect(
     bundle: IntArray,
     side: int,
@@ -52,8 +54,8 @@ def find_prospect(
 ) -> bool:
     """Fill the memory's prospect and direction for one side; False for a Jacobian by which nothing can be resolved.
 
-    rotation (3, 3), jacobian (6, n): of the tool at the place that is looked from. right, up: the stick's deflection.
-    by_operator: the operator side predicts what is under way.
+    bundle: the memory's. rotation (3, 3), jacobian (6, n): of the tool at the place that is looked from. right, up: the
+    stick's deflection. by_operator: the operator side predicts what is under way.
     """
     memory = memory_at(bundle)
     settings, found, able = memory.settings[0], memory.prospect[0], memory.able
@@ -78,39 +80,3 @@ def find_prospect(
     found.mean, found.prediction_sd, found.variance = mean, sd, settings.camera_variance + sd * sd
     found.reach = horizon_m(found.speed, found.acceleration, loop_age) + 2.0 * FIELD_PERIOD_S * full_speed
     return True
-
-
-@compiled(
-    *(
-        BUNDLE,
-        COUNT,
-        COUNT,
-        input_array(1),
-        input_array(2),
-        input_array(2),
-        input_array(2),
-        NUMBER,
-        NUMBER,
-        NUMBER,
-        TRUTH,
-    ),
-    returns=TRUTH,
-)
-def fill_prospect(
-    bundle: IntArray,
-    side: int,
-    place: int,
-    tool: FloatArray,
-    rotation: FloatArray,
-    jacobian: FloatArray,
-    centers: FloatArray,
-    right: float,
-    up: float,
-    loop_age: float,
-    by_operator: bool,
-) -> bool:
-    """Go to a place and do the same, for people who look; bundle: the memory's; tool (3,), centers (m, 3)."""
-    memory = memory_at(bundle)
-    after = memory.moments_s[place - 1] if place > 0 else 0.0
-    move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after)
-    return find_prospect(bundle, side, memory.rotation, jacobian, right, up, loop_age, by_operator)

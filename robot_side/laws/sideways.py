@@ -7,7 +7,8 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import inlined
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.kernel import COUNT, compiled, inlined, input_array
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract, unit
 from robot_side.laws.memory import FINGER_POSES, MOST_PLACES, memory_at
 
@@ -84,6 +85,13 @@ def move(bundle: IntArray, origin: Vector, rotation: FloatArray, centers: FloatA
             center = add(moved, _turned(lever, axis, sine, versine))
         for row in range(3):
             memory.centers_m[i, row] = center[row]
+
+
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), COUNT)
+def go_to_place(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, place: int) -> None:
+    """Move to a place that is looked from, for people who look; bundle: the memory's; tool (3,)."""
+    after = memory_at(bundle).moments_s[place - 1] if place > 0 else 0.0
+    move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after)
 
 
 @inlined

@@ -7,8 +7,6 @@ where the gripper just passes something, encoder noise alone can flip no strengt
 While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from where that will have brought it,
 too, at several moments until a command that is sent now has stopped it: the shortest ways hold. What comes towards the
 gripper by itself shortens its ways by what it covers in that time.
-
-    measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep ─▶ feel        one compiled call a tick
 """
 
 import math
@@ -17,29 +15,18 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray, IntArray, require_finite
+from common.arrays import FloatArray, IntArray, require_finite
 from common.touch_speed import touch_speed_m_s
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.ability import JointLimits, find_ability
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.kernel import (
-    NUMBER,
-    TRUTH,
-    building_block,
-    compiled,
-    inlined,
-    input_array,
-    input_flags,
-    input_indices,
-    output_array,
-)
-from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.field import Along
+from robot_side.field.look import look
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.field.scratch import Count, Scratch
+from robot_side.field.total_overlap import sum_overlaps
 from robot_side.laws.explanation import (
     Trigger,
     TriggerExplained,
@@ -47,14 +34,13 @@ from robot_side.laws.explanation import (
     moved_and_inflated,
     overlaps_by_object,
 )
-from robot_side.laws.felt import feel, room_to_feel
+from robot_side.laws.felt import room_to_feel
 from robot_side.laws.law import Situation
-from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
-from robot_side.laws.memory import Memory, Total, memory_at
-from robot_side.laws.prospect import FIELD_PERIOD_S, fill_prospect, find_prospect, stopping, stopping_s
-from robot_side.laws.recent_looks import longest_ago, look_from
-from robot_side.laws.sensed import ENLARGEMENT, L2, NUMBERS, OVERLAP, R2, STICK, Sensed
-from robot_side.laws.sideways import measure_fingers, plan_moments
+from robot_side.laws.memory import Memory, Total
+from robot_side.laws.prospect import find_prospect, stopping_s
+from robot_side.laws.sense import sense
+from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
+from robot_side.laws.sideways import go_to_place
 from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
@@ -146,9 +132,10 @@ class SweptLaw:
         """What a look along one side is asked, where the gripper is or at a place that it is yet to come to."""
         pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
         self._make_room(pose, self.surroundings.see(situation.objects))
-        where = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m
         by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
-        if not fill_prospect(memory.bundle, side, place, *where, right, up, age_s, by_operator):
+        go_to_place(memory.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, place)
+        motion = memory.rotation, pose.tool_jacobian, right, up, age_s, by_operator
+        if not find_prospect(memory.bundle, side, *motion):
             self._refuse(situation)
         found, early_m, velocities = memory.prospect[0], None, situation.objects.velocities_m_s
         if velocities is not None:
@@ -181,6 +168,8 @@ class SweptLaw:
             self._scratch = Scratch(*needed)
         if not self.memory.fits(spheres, len(scene.first_rows)):
             self.memory.make_room(spheres, len(scene.first_rows))
+        # Not before the first tick: whoever starts has compiled them by then, several at a time.
+        self.memory.kernels[:] = [kernel.address for kernel in (find_ability, find_prospect, look, sum_overlaps)]
 
     def _classes_of(self, situation: Situation) -> tuple[object, IntArray, IntArray]:
         """What each object is to the field (k,), and what while the fingers move: what they close on, they touch."""
@@ -210,101 +199,3 @@ class SweptLaw:
 def _widest_m(situation: Situation) -> float:
     """Half the gap between the fingers, the most by which their spheres are inflated towards the target (§3.4)."""
     return math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)
-
-
-@inlined
-def _sum(values: FloatArray) -> float:
-    """The sum of all elements, which is no number where one is none."""
-    total = 0.0
-    for value in values.reshape(-1):
-        total += value
-    return total
-
-
-@inlined
-def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
-    """What three rows of the Jacobian make of joint rates (n,)."""
-    found = 0.0, 0.0, 0.0
-    for joint in range(rates.size):
-        column = jacobian[first, joint], jacobian[first + 1, joint], jacobian[first + 2, joint]
-        found = add(found, scale(rates[joint], column))
-    return found
-
-
-@building_block
-def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector, changed: bool) -> bool:
-    """Measure what moves the gripper besides the triggers; False for a Jacobian by which nothing can be resolved."""
-    memory = memory_at(bundle)
-    state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
-    for axis in range(3):
-        memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
-    measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
-    if not find_prospect(bundle, R2, moment.rotation, moment.jacobian, 0.0, 0.0, moment.loop_age, moment.by_operator):
-        return False
-    able = memory.prospect[0]
-    until = stopping(able.speed, able.acceleration, moment.loop_age)
-    plan_moments(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
-    state.measured, state.spheres = moment.now, moment.radii.size
-    return True
-
-
-@compiled(
-    *(input_array(1), input_array(2), input_array(2), input_array(2), input_array(1), input_flags(), input_array(1)),
-    *(NUMBER, NUMBER, TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, input_indices(), input_indices(), input_array(2)),
-    *(BUNDLE, BUNDLE, BUNDLE, output_array(1)),
-    returns=TRUTH,
-)
-def sense(
-    tool_position: FloatArray,
-    rotation: FloatArray,
-    jacobian: FloatArray,
-    centers: FloatArray,
-    radii: FloatArray,
-    on_finger: BoolArray,
-    rates: FloatArray,
-    now: float,
-    loop_age: float,
-    is_known: bool,
-    by_operator: bool,
-    widest: float,
-    right: float,
-    up: float,
-    classes: IntArray,
-    closing: IntArray,
-    velocities: FloatArray,
-    scene_bundle: IntArray,
-    scratch_bundle: IntArray,
-    bundle: IntArray,
-    felt: FloatArray,
-) -> bool:
-    """Fill `felt`, that of `room_to_feel`; False for what is not finite, which would compare as far away.
-
-    tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
-    others are those of `Moment`; is_known: the loop age is.
-    """
-    memory = memory_at(bundle)
-    state, tool = memory.state[0], load(tool_position.reshape(1, 3), 0)
-    check = _sum(tool_position) + _sum(rotation) + _sum(jacobian) + _sum(centers) + _sum(radii) + _sum(rates)
-    if not math.isfinite(check + now + loop_age + right + up):
-        return False
-    approach, velocity = (rotation[0, 2], rotation[1, 2], rotation[2, 2]), _velocity(jacobian, 0, rates)
-    deflected, changed = right != 0.0 or up != 0.0, state.spheres != radii.size
-    if now >= state.next or changed or deflected != (memory.places[STICK] > 0):
-        moment = Moment(
-            *(rotation, jacobian, centers, radii, on_finger, tool, approach, dot(velocity, approach), now, loop_age),
-            *(by_operator, widest, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
-        )
-        at_most = 1
-        # What is gripped or let go changes which spheres there are.
-        if changed or now - state.measured >= FIELD_PERIOD_S - ROUNDING_S:
-            if not _measure(bundle, moment, velocity, _velocity(jacobian, 3, rates), changed):
-                return False
-            at_most = 0
-        for side in (R2, L2):
-            look_from(bundle, side, 1 + state.moments)
-        look_from(bundle, STICK, 1 if deflected else 0)
-        if not look_at_due(bundle, moment, at_most):
-            return False
-        state.next = min(state.measured, longest_ago(bundle)) + FIELD_PERIOD_S - ROUNDING_S
-    feel(bundle, tool, approach, velocity, loop_age, is_known, math.hypot(right, up), felt)
-    return math.isfinite(felt[ENLARGEMENT] + felt[OVERLAP])

@@ -21,7 +21,7 @@ def test_warm_up_prepares_the_kernels_of_the_whole_pipeline() -> None:
         "robot_side.field.look",
         "robot_side.laws.prospect",
         "robot_side.surroundings.placing",
-        "robot_side.laws.swept",
+        "robot_side.laws.sense",
         "robot_side.field.total_overlap",
         "robot_side.arm.ability",
         "robot_side.arm.commanded",

@@ -1,0 +1,121 @@
+"""The swept law's one compiled call a tick, from a situation to what is felt.
+
+measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep ─▶ feel
+"""
+
+import math
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.kernel import (
+    NUMBER,
+    TRUTH,
+    building_block,
+    compiled,
+    inlined,
+    input_array,
+    input_flags,
+    input_indices,
+    output_array,
+)
+from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
+from robot_side.laws.felt import feel
+from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
+from robot_side.laws.memory import Kernel, memory_at
+from robot_side.laws.prospect import FIELD_PERIOD_S, FIND_PROSPECT, stopping
+from robot_side.laws.recent_looks import longest_ago, look_from
+from robot_side.laws.sensed import ENLARGEMENT, L2, OVERLAP, R2, STICK
+from robot_side.laws.sideways import measure_fingers, plan_moments
+
+_find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
+
+
+@inlined
+def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
+    """What three rows of the Jacobian make of joint rates (n,)."""
+    found = 0.0, 0.0, 0.0
+    for joint in range(rates.size):
+        column = jacobian[first, joint], jacobian[first + 1, joint], jacobian[first + 2, joint]
+        found = add(found, scale(rates[joint], column))
+    return found
+
+
+@building_block
+def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector, changed: bool) -> bool:
+    """Measure what moves the gripper besides the triggers; False for a Jacobian by which nothing can be resolved."""
+    memory = memory_at(bundle)
+    state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
+    for axis in range(3):
+        memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
+    measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
+    where = moment.rotation, moment.jacobian, 0.0, 0.0, moment.loop_age, moment.by_operator
+    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, R2, *where)):
+        return False
+    able = memory.prospect[0]
+    until = stopping(able.speed, able.acceleration, moment.loop_age)
+    plan_moments(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
+    state.measured, state.spheres = moment.now, moment.radii.size
+    return True
+
+
+@compiled(
+    *(input_array(1), input_array(2), input_array(2), input_array(2), input_array(1), input_flags(), input_array(1)),
+    *(NUMBER, NUMBER, TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, input_indices(), input_indices(), input_array(2)),
+    *(BUNDLE, BUNDLE, BUNDLE, output_array(1)),
+    returns=TRUTH,
+)
+def sense(
+    tool_position: FloatArray,
+    rotation: FloatArray,
+    jacobian: FloatArray,
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
+    rates: FloatArray,
+    now: float,
+    loop_age: float,
+    is_known: bool,
+    by_operator: bool,
+    widest: float,
+    right: float,
+    up: float,
+    classes: IntArray,
+    closing: IntArray,
+    velocities: FloatArray,
+    scene_bundle: IntArray,
+    scratch_bundle: IntArray,
+    bundle: IntArray,
+    felt: FloatArray,
+) -> bool:
+    """Fill `felt`, that of `room_to_feel`; False for what is not finite, which would compare as far away.
+
+    tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
+    others are those of `Moment`; is_known: the loop age is.
+    """
+    memory = memory_at(bundle)
+    state, tool = memory.state[0], load(tool_position.reshape(1, 3), 0)
+    approach, velocity = (rotation[0, 2], rotation[1, 2], rotation[2, 2]), _velocity(jacobian, 0, rates)
+    # Of spheres and the rest of the pose a look sees for itself.
+    if not math.isfinite(dot(tool, approach) + dot(velocity, velocity) + now + loop_age + right + up):
+        return False
+    deflected, changed = right != 0.0 or up != 0.0, state.spheres != radii.size
+    if now >= state.next or changed or deflected != (memory.places[STICK] > 0):
+        moment = Moment(
+            *(rotation, jacobian, centers, radii, on_finger, tool, approach, dot(velocity, approach), now, loop_age),
+            *(by_operator, widest, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
+        )
+        at_most = 1
+        # What is gripped or let go changes which spheres there are.
+        if changed or now - state.measured >= FIELD_PERIOD_S - ROUNDING_S:
+            if not _measure(bundle, moment, velocity, _velocity(jacobian, 3, rates), changed):
+                return False
+            at_most = 0
+        for side in (R2, L2):
+            look_from(bundle, side, 1 + state.moments)
+        look_from(bundle, STICK, 1 if deflected else 0)
+        if not look_at_due(bundle, moment, at_most):
+            return False
+        state.next = min(state.measured, longest_ago(bundle)) + FIELD_PERIOD_S - ROUNDING_S
+    feel(bundle, tool, approach, velocity, loop_age, is_known, math.hypot(right, up), felt)
+    return math.isfinite(felt[ENLARGEMENT] + felt[OVERLAP])
