@@ -38,7 +38,10 @@ from robot_side.surroundings.surroundings import Surroundings
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """So many objects are named in a note about all of them."""
-_LIBRARY = ("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise.")
+_LIBRARY = (
+    *("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise."),
+    "robot_side.arm.resolved_rate.",
+)
 """Batches and precise forms are for programs that use the overlaps as a library: no tick calls them."""
 
 

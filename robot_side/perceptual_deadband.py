@@ -95,7 +95,7 @@ class StiffnessDeadband:
 
 @inlined
 def _braking_m(speed: float, acceleration: float) -> float:
-    return max(0.0, speed) ** 2 / (2.0 * acceleration)
+    return max(0.0, speed) * max(0.0, speed) / (2.0 * acceleration)
 
 
 @inlined
