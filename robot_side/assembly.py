@@ -42,7 +42,7 @@ _LIBRARY = (
     *("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise."),
     "robot_side.arm.resolved_rate.",
 )
-"""Batches and precise forms are for programs that use the overlaps as a library: no tick calls them."""
+"""Batches, precise forms and joint velocities alone are for programs that use them as a library: no tick runs them."""
 
 
 class SimulationObserver:
