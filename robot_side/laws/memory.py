@@ -121,6 +121,11 @@ MEMORY: Final = Declared(
 memory_at = MEMORY.at
 
 
+def _floats(values: FloatArray) -> FloatArray:
+    """As kernels take them; a bundle knows no types."""
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
 class Memory:
     """What is kept; `bundle` is what kernels take."""
 
@@ -156,10 +161,9 @@ class Memory:
         self.push: FloatArray = np.zeros(3)
         self.nothing: FloatArray = np.zeros(0)
         self.settings: np.ndarray = np.zeros(1, dtype=SETTINGS)
-        self.missed_by_operator, self.missed_by_robot = missed
-        self.limits_rad_s = np.ascontiguousarray(limits.velocity_rad_s)
-        self.accelerations_rad_s2 = np.ascontiguousarray(limits.acceleration_rad_s2)
-        self.encoder_variance: FloatArray = encoder_sigma_rad * encoder_sigma_rad
+        self.missed_by_operator, self.missed_by_robot = map(_floats, missed)
+        self.limits_rad_s, self.accelerations_rad_s2 = map(_floats, (limits.velocity_rad_s, limits.acceleration_rad_s2))
+        self.encoder_variance = _floats(encoder_sigma_rad) ** 2
         self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
         """Their addresses"""
         self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
@@ -167,17 +171,19 @@ class Memory:
         """By how much each object's ways are shorter, as it comes nearer"""
         self.own_m_s: FloatArray = np.zeros((0, 3))
         """(m, 3) of each sphere against the tool: the fingers', in the world frame"""
+        self.finger_poses_m: FloatArray = np.zeros((0, 3))
+        """Where the spheres were in the tool frame, pose after pose"""
+        self.centers_m: FloatArray = np.zeros((0, 3))
+        """Of the spheres at the place that is looked from"""
 
     def make_room(self, spheres: int, objects: int) -> None:
         """Have room for a gripper of m spheres among k objects; what is known of the same spheres stays."""
         if objects > len(self.early_m):
             self.early_m = np.zeros(objects)
         if spheres > len(self.own_m_s):
-            self.own_m_s = np.zeros((spheres, 3))
-            self.finger_poses_m: FloatArray = np.zeros((FINGER_POSES * spheres, 3))
-            """Where the spheres were in the tool frame, pose after pose"""
-            self.centers_m: FloatArray = np.zeros((spheres, 3))
-            """Of the spheres at the place that is looked from"""
+            self.own_m_s, self.centers_m = np.zeros((spheres, 3)), np.zeros((spheres, 3))
+            self.finger_poses_m = np.zeros((FINGER_POSES * spheres, 3))
+            self.state["spheres"], self.state["finger_poses"] = -1, 0
         self.bundle = MEMORY.bundle(self)
 
     def fits(self, spheres: int, objects: int) -> bool:

@@ -49,13 +49,14 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
     for axis in range(3):
         memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
     measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
+    state.spheres = moment.radii.size
     where = moment.rotation, moment.jacobian, 0.0, 0.0, moment.loop_age, moment.by_operator
     if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, R2, *where)):
         return False
     able = memory.prospect[0]
     until = stopping(able.speed, able.acceleration, moment.loop_age)
     plan_moments(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
-    state.measured, state.spheres = moment.now, moment.radii.size
+    state.measured = moment.now
     return True
 
 
@@ -88,12 +89,17 @@ def sense(
     bundle: IntArray,
     felt: FloatArray,
 ) -> bool:
-    """Fill `felt`, that of `room_to_feel`; False for what is not finite, which would compare as far away.
+    """Fill `felt`, that of `room_to_feel`; False for what does not fit, or is not finite and would compare as far away.
 
     tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
     others are those of `Moment`; is_known: the loop age is.
     """
     memory = memory_at(bundle)
+    joints, spheres = rates.size, radii.size
+    if not (jacobian.shape[1] == memory.limits_rad_s.size == memory.encoder_variance.size == joints):
+        return False
+    if not (centers.shape[0] == on_finger.size == spheres):
+        return False
     state, tool = memory.state[0], load(tool_position.reshape(1, 3), 0)
     approach, velocity = (rotation[0, 2], rotation[1, 2], rotation[2, 2]), _velocity(jacobian, 0, rates)
     # Of spheres and the rest of the pose a look sees for itself.

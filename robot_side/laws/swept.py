@@ -88,7 +88,7 @@ class SweptLaw:
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick; ValueError that says what is not finite, and nothing that was seen is changed."""
+        """Work out one tick; ValueError for what is not finite or does not fit: what was seen before still holds."""
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
         self._make_room(pose, scene)
         _, classes, closing = self._classes_of(situation)
@@ -101,7 +101,7 @@ class SweptLaw:
             *(_NO_VELOCITIES if velocities is None else velocities, scene.bundle),
             *(self._scratch.bundle, self.memory.bundle, self._felt),
         ):
-            self._refuse(situation)
+            self._refuse(situation, now_s)
         return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
@@ -118,7 +118,7 @@ class SweptLaw:
         return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": flat}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """What D_σ is made of along one trigger, and what overlaps at the robot side's δ."""
+        """What D_σ is made of along one trigger, and what overlaps at the robot side's δ; in the ticks' thread."""
         felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
         asked, camera_sd_m = self.asked(side, situation), self._uncertainty.camera_sd_m
         terms, sigma_m = enlargement_terms(
@@ -186,13 +186,24 @@ class SweptLaw:
             self._classes = (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
         return self._classes
 
-    def _refuse(self, situation: Situation) -> NoReturn:
-        """Raise the ValueError that says what is not finite."""
-        pose, limits_rad_s = situation.pose, self._limits.velocity_rad_s
+    def _refuse(self, situation: Situation, now_s: float = 0.0) -> NoReturn:
+        """Raise the ValueError that says what is not finite, or of which there are too few or too many."""
+        pose, limits_rad_s, rates = situation.pose, self._limits.velocity_rad_s, situation.joint_velocities_rad_s
+        joints, spheres = len(self.encoder_sigma_rad), len(pose.sphere_radii_m)
+        for name, count, valid in (
+            ("joint_velocities_rad_s", len(rates), joints),
+            ("limits.velocity_rad_s", len(limits_rad_s), joints),
+            ("pose.tool_jacobian's columns", pose.tool_jacobian.shape[1], joints),
+            ("pose.sphere_centers_m", len(pose.sphere_centers_m), spheres),
+            ("pose.sphere_on_finger", len(pose.sphere_on_finger), spheres),
+        ):
+            if count != valid:
+                raise ValueError(f"{name} = {count}; valid: {valid}, as many as there are joints or spheres")
         for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
             require_finite(f"pose.{name}", getattr(pose, name))
-        require_finite("joint_velocities_rad_s", situation.joint_velocities_rad_s)
-        require_finite("loop_age_s", np.array([situation.loop_age_s]))
+        require_finite("joint_velocities_rad_s", rates)
+        for name, numbers in (("loop_age_s", situation.loop_age_s), ("lateral", situation.lateral), ("now_s", now_s)):
+            require_finite(name, np.atleast_1d(np.array(numbers)))
         refuse(pose.tool_jacobian, np.ones(6), limits_rad_s)
 
 

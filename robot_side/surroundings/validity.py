@@ -42,10 +42,11 @@ def require_valid(objects: PerceivedObjects) -> None:
     _require_known_meshes(objects)
     velocities = objects.velocities_m_s
     if velocities is not None:
-        if velocities.shape != (len(objects.names), 3):
+        as_floats = velocities.dtype == np.float64 and velocities.flags.c_contiguous
+        if velocities.shape != (len(objects.names), 3) or not as_floats:
             raise ValueError(
-                f"objects.velocities_m_s holds {_described(velocities)}; valid: a row of 3 for each of"
-                f" {len(objects.names)} objects"
+                f"objects.velocities_m_s holds {_described(velocities)}; valid: contiguous float64, a row of 3 for each"
+                f" of {len(objects.names)} objects"
             )
         require_finite("objects.velocities_m_s", velocities)
     if not _are_possible(numbers_of(objects), primitives_of(objects).kinds):

@@ -30,8 +30,12 @@ class ObjectVelocities:
     def see(self, time_s: float, positions_m: FloatArray) -> FloatArray:
         """Take in a frame, no older than the last one; velocities (k, 3) in m/s of the k objects, 0 in the first.
 
-        positions_m (k, 3): of one point of each object.
+        positions_m (k, 3): of one point of each object. ValueError for another number of objects than before.
         """
+        if self._kept and positions_m.size != self._positions_m.shape[1]:
+            raise ValueError(
+                f"positions_m holds {len(positions_m)}; valid: {self._positions_m.shape[1] // 3}, as before"
+            )
         if self._kept == len(self._times_s):
             rows = max(2 * self._kept, _FRAMES)
             seen_m = self._positions_m.reshape(self._kept, positions_m.size)

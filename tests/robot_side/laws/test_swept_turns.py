@@ -12,6 +12,7 @@ from robot_side.laws.recent_looks import STEADY_S
 from robot_side.laws.sensed import L2, R2, STICK
 from tests.helpers.field.fields import EQUAL_M, ball_pose
 from tests.helpers.field.situations import Senses, at, situation, swept, walls
+from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene
 
 # When it looks
@@ -142,3 +143,37 @@ def test_what_was_seen_along_another_direction_holds_no_more() -> None:
     for _ in range(2):
         found = senses.sense(turned, ball)
     assert found.r2.fast_m[0] == found.horizon_m
+
+
+# What does not fit
+
+
+def test_a_gripper_of_more_spheres_that_is_refused_leaves_the_fingers_at_rest() -> None:
+    law, objects = swept(), walls(0.1)
+    few, many = (free_pose([[0.01 * k, 0.0, 0.0] for k in range(count)], [0.008] * count) for count in (6, 9))
+    expected = law.sense(situation(few, objects), 1.0)
+    with pytest.raises(ValueError, match="tool_position_m"):
+        law.sense(situation(replace(many, tool_position_m=np.full(3, np.nan)), objects), 1.001)
+    for tick in range(2, 40):
+        found = law.sense(situation(few, objects), 1.0 + 0.001 * tick)
+    assert law.memory.state["moves_fingers"][0] == 0
+    np.testing.assert_allclose(found.r2.fast_m, expected.r2.fast_m, atol=EQUAL_M)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"joint_velocities_rad_s": np.zeros(7)}, "joint_velocities_rad_s = 7; valid: 6"),
+        ({"lateral": (np.nan, 0.0)}, "lateral"),
+        ({"pose": replace(ball_pose(), sphere_centers_m=np.zeros((4, 3)))}, "pose.sphere_centers_m = 4; valid: 1"),
+        ({"pose": replace(ball_pose(), tool_jacobian=np.zeros((6, 5)))}, "columns = 5; valid: 6"),
+    ],
+)
+def test_what_does_not_fit_is_named(changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        swept().sense(replace(situation(ball_pose(), walls(0.1)), **changes), 1.0)
+
+
+def test_without_spheres_nothing_is_ahead() -> None:
+    sensed = swept().sense(situation(free_pose(np.zeros((0, 3)), np.zeros(0)), walls(0.1)), 1.0)
+    assert sensed.r2.fast_m == (sensed.horizon_m,) * 8

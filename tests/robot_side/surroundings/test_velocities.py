@@ -43,3 +43,10 @@ def test_noise_of_a_frame_counts_little() -> None:
 def test_a_window_that_is_none_is_refused(window_s: float) -> None:
     with pytest.raises(ValueError, match=r"window_s = .*; valid: above 0"):
         ObjectVelocities(window_s)
+
+
+def test_another_number_of_objects_is_refused() -> None:
+    seen = ObjectVelocities()
+    seen.see(0.0, np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="positions_m holds 3; valid: 2"):
+        seen.see(0.1, np.zeros((3, 3)))
