@@ -53,8 +53,8 @@ _BELIEF: Final = np.dtype(
         *((name, np.int64) for name in ("known", "state", "obeyed")),
     ]
 )
-"""What the receiver takes for true. sent, now: times (s). way, speed, target: along R2, since the message, by commands.
-told: what the message says that the arm was told (m/s). known: a message has been sent. obeyed: the newest command."""
+"""The receiver's belief. sent, now: times (s). way, speed, target: along R2, since the message, by commands.
+told: the arm's commanded speed in the message (m/s). known: a message has been sent. obeyed: the newest command."""
 
 _follow = inlined(follow)
 

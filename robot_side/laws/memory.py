@@ -17,7 +17,7 @@ MOST_PLACES: Final = 8
 ROOM: Final = 12 * (1 + MOST_PLACES)
 """Looks of one side: a place is looked from a hundred times a second at most."""
 FINGER_POSES: Final = 8
-"""So many are kept of the last 0.06 s."""
+"""The most that are kept, of the last 0.06 s."""
 
 
 class Kernel(IntEnum):
@@ -187,5 +187,5 @@ class Memory:
         self.bundle = MEMORY.bundle(self)
 
     def fits(self, spheres: int, objects: int) -> bool:
-        """Whether there is room for so many."""
+        """Whether there is room for these numbers of spheres and objects."""
         return spheres <= len(self.own_m_s) and objects <= len(self.early_m)

@@ -14,7 +14,7 @@ from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.sensed import R2, STICK
 
 BEYOND_M: Final = 0.05
-"""So much farther than what a reaction, the loop age and braking take is looked, as the loop age varies."""
+"""The distance looked beyond what a reaction, the loop age and braking take, as the loop age varies."""
 FIELD_PERIOD_S: Final = 0.01
 """A controller is written to no more often. From where the gripper is yet to come, it is looked half as often."""
 

@@ -11,14 +11,14 @@ from robot_side.laws.memory import ROOM, SIDES, memory_at
 from robot_side.laws.prospect import FIELD_PERIOD_S
 
 STEADY_S: Final = 0.1
-"""For so long a way that was found holds; as long as strength takes to fall in the trigger."""
+"""A way that was found holds for this time, in which strength falls in the trigger."""
 _SAME_DIRECTION: Final = 0.999
 """Cosine: 2.6° to either side."""
 
 
 @inlined
 def look_from(bundle: IntArray, side: int, places: int) -> None:
-    """Look along one side from so many places from now on; what was seen from others is forgotten."""
+    """Look along one side from this number of places from now on, and forget what was seen from others."""
     memory = memory_at(bundle)
     first, kept = ROOM * side, 0
     for place in range(memory.places[side], places):

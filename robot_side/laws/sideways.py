@@ -20,7 +20,7 @@ _LEAST_M: Final = 0.003
 _NOISE_M_S: Final = 0.015
 """Slower than this, fingers rest: their readings are noisy."""
 _FINGERS_S: Final = 0.06
-"""Over so long their speed is measured."""
+"""The time over which the fingers' speed is measured."""
 
 
 @inlined
