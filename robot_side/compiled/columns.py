@@ -72,7 +72,7 @@ class Declared(Generic[_Columns]):
 
 
 def _view(columns: Any, views: tuple[View, ...]) -> Any:
-    # Numba takes no loop over views of several types. Written out as source, they are one call. Joined a view at a time,
+    # Numba takes no loop over views of several types. Written out as source, they are one call. Joined one at a time,
     # they would be a tuple of each length: a kernel of 30 columns took half as long again to compile.
     scope = {"__name__": __name__, "columns": columns} | {f"view_{place}": view for place, view in enumerate(views)}
     given = ", ".join(f"view_{place}(found, {place})" for place in range(len(views)))
