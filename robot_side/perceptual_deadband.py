@@ -180,7 +180,8 @@ def _due(
         later = travel * sent[R2 * OF_A_SIDE + FULL_SPEED]
         belief.target = belief.told if obeyed == belief.obeyed else later
         return False
-    sent[:] = numbers
+    for i in range(sent.size):
+        sent[i] = numbers[i]
     belief.known, belief.state, belief.sent, belief.obeyed = 1, state, now, obeyed
     belief.way, belief.speed, belief.told, belief.target = 0.0, numbers[SPEED], told, told
     return True

@@ -10,11 +10,15 @@ from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.stack import on_stack
 
 _MET = 1e-6
 """A tool that moves as asked but for this share is held back by nothing."""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
+FOUND: Final = 3
+"""Of what `find_ability` finds, the numbers before the joints' rates."""
+_twist = on_stack(6)
 
 
 @dataclass(frozen=True)
@@ -54,14 +58,14 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
     full_speed_m_s: v_max as it is set.
     """
-    found = np.empty(3)
+    found = np.empty(FOUND + limits.velocity_rad_s.size)
     direction = np.ascontiguousarray(direction)
     usable = find_ability(
         *(pose.tool_jacobian, direction, full_speed_m_s, limits.velocity_rad_s, limits.acceleration_rad_s2, found)
     )
     if not usable:
         refuse(pose.tool_jacobian, full_speed_m_s * direction, limits.velocity_rad_s)
-    speed_m_s, acceleration_m_s2, off_m_s = found.tolist()
+    speed_m_s, acceleration_m_s2, off_m_s = found[:FOUND].tolist()
     return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
 
 
@@ -78,13 +82,13 @@ def find_ability(
     accelerations: FloatArray,
     found: FloatArray,
 ) -> bool:
-    """Fill `found` (3,): the speed, the least acceleration, and by how much the tool's motion differs at most.
+    """Fill `found` (3 + n,): speed, least acceleration, by how much the tool's motion differs at most, joints' rates.
 
     jacobian (6, n), direction (3,), limits and accelerations (n,). False where `resolve` can use none of them.
     """
-    twist, rates = np.zeros(6), np.empty(limits.size)
+    twist, rates = _twist(), found[FOUND:]
     for i in range(3):
-        twist[i] = full_speed * direction[i]
+        twist[i], twist[3 + i] = full_speed * direction[i], 0.0
     if not resolve(jacobian, twist, limits, rates):
         return False
     speed, off, changing = 0.0, 0.0, _LEAST_RATE_RAD_S

@@ -11,9 +11,11 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
 """A joint that holds at its end is this near to it: encoders are noisy."""
+_twist = on_stack(6)
 
 
 def commanded(
@@ -68,7 +70,7 @@ def _command_loop(
     """Fill `velocity`; the speed along the approach axis, NaN where an argument is none."""
     if not jacobian.shape[1] == positions.size == limits.size == lower.size == upper.size:
         return math.nan
-    twist = np.empty(6)
+    twist = _twist()
     for row in range(3):
         x, y, z = rotation[row, 0], rotation[row, 1], rotation[row, 2]
         twist[row] = x * right + y * down + z * ahead

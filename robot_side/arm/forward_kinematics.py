@@ -7,10 +7,12 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, output_array, record_array
-from robot_side.compiled.vectors import Vector, add, cross, load, scale, subtract
+from robot_side.compiled.vectors import Vector, add, cross, scale, subtract
 
 Quaternion = tuple[float, float, float, float]
 """w first"""
+Rotation = tuple[Vector, Vector, Vector]
+"""Rows of the matrix"""
 Records = np.ndarray[Any, Any]
 
 LINK: Final = np.dtype(
@@ -110,22 +112,24 @@ def _turned(q: Quaternion, v: Vector) -> Vector:
 
 
 @inlined
-def _fill_rotation(q: Quaternion, rotation: FloatArray) -> None:
-    """The rotation matrix of a unit quaternion, to `rotation` (3, 3)."""
+def _rotation(q: Quaternion) -> Rotation:
+    """The rotation matrix of a unit quaternion."""
     ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
     wx, wy, wz, xy, xz, yz = q[0] * q[1], q[0] * q[2], q[0] * q[3], q[1] * q[2], q[1] * q[3], q[2] * q[3]
-    rotation[0, 0], rotation[0, 1], rotation[0, 2] = ww + xx - yy - zz, 2.0 * (xy - wz), 2.0 * (xz + wy)
-    rotation[1, 0], rotation[1, 1], rotation[1, 2] = 2.0 * (xy + wz), ww - xx + yy - zz, 2.0 * (yz - wx)
-    rotation[2, 0], rotation[2, 1], rotation[2, 2] = 2.0 * (xz - wy), 2.0 * (yz + wx), ww - xx - yy + zz
+    return (
+        (ww + xx - yy - zz, 2.0 * (xy - wz), 2.0 * (xz + wy)),
+        (2.0 * (xy + wz), ww - xx + yy - zz, 2.0 * (yz - wx)),
+        (2.0 * (xz - wy), 2.0 * (yz + wx), ww - xx - yy + zz),
+    )
 
 
 @inlined
-def _on_link(pose: FloatArray, rotation: FloatArray, v: Vector) -> Vector:
+def _on_link(pose: FloatArray, rotation: Rotation, v: Vector) -> Vector:
     """Where in the world the point v of a link is that stands so."""
     return (
-        rotation[0, 0] * v[0] + rotation[0, 1] * v[1] + rotation[0, 2] * v[2] + pose[0],
-        rotation[1, 0] * v[0] + rotation[1, 1] * v[1] + rotation[1, 2] * v[2] + pose[1],
-        rotation[2, 0] * v[0] + rotation[2, 1] * v[1] + rotation[2, 2] * v[2] + pose[2],
+        rotation[0][0] * v[0] + rotation[0][1] * v[1] + rotation[0][2] * v[2] + pose[0],
+        rotation[1][0] * v[0] + rotation[1][1] * v[1] + rotation[1][2] * v[2] + pose[1],
+        rotation[2][0] * v[0] + rotation[2][1] * v[1] + rotation[2][2] * v[2] + pose[2],
     )
 
 
@@ -161,10 +165,9 @@ def _place_links(
     arm: FloatArray,
     fingers: FloatArray,
     poses: FloatArray,
-    rotations: FloatArray,
     axes: FloatArray,
 ) -> None:
-    """Fill the links' poses (l, 7) and rotations (l, 3, 3), and each joint's axis and anchor (j, 6), in the world.
+    """Fill the links' poses (l, 7), and in columns (6, n) each arm joint's axis and anchor, in the world.
 
     In MuJoCo's order of operations, so that nearly all digits are the same.
     """
@@ -172,8 +175,9 @@ def _place_links(
         link = links[row]
         position, turn = _vector(link.position), _quaternion(link.quaternion, 0)
         if row > 0:
-            position = _on_link(poses[link.parent], rotations[link.parent], position)
-            turn = _product(_quaternion(poses[link.parent], 3), turn)
+            parent = _quaternion(poses[link.parent], 3)
+            position = _on_link(poses[link.parent], _rotation(parent), position)
+            turn = _product(parent, turn)
         for number in range(link.first_joint, link.end_joint):
             joint = joints[number]
             anchor, axis = _vector(joint.anchor), _turned(turn, _vector(joint.axis))
@@ -185,10 +189,9 @@ def _place_links(
                 turn = _product(turn, _about(_vector(joint.axis), way))
                 # The anchor stays where it was.
                 position = subtract(held, _turned(turn, anchor))
-            for i in range(3):
-                axes[number, i], axes[number, 3 + i] = axis[i], held[i]
+            for i in range(3 if joint.of_arm else 0):
+                axes[i, joint.reading], axes[3 + i, joint.reading] = axis[i], held[i]
         turn = _normalised(turn)
-        _fill_rotation(turn, rotations[row])
         for i in range(3):
             poses[row, i] = position[i]
         for i in range(4):
@@ -220,30 +223,38 @@ def _place(
         of_arm += joints[number].of_arm
     if arm.size != of_arm or fingers.size != joints.size - of_arm or poses.shape[0] != links.size:
         return False
-    rotations, axes = np.empty((links.size, 3, 3)), np.empty((joints.size, 6))
-    _place_links(links, joints, arm, fingers, poses, rotations, axes)
+    _place_links(links, joints, arm, fingers, poses, jacobian)
 
     carrier = tool[0].link
-    position = _on_link(poses[carrier], rotations[carrier], _vector(tool[0].position))
-    _fill_rotation(_product(_quaternion(poses[carrier], 3), _quaternion(tool_quaternion, 0)), tool_rotation)
+    turn = _quaternion(poses[carrier], 3)
+    position, rotation = (
+        _on_link(poses[carrier], _rotation(turn), _vector(tool[0].position)),
+        _rotation(_product(turn, _quaternion(tool_quaternion, 0))),
+    )
     for i in range(3):
         tool_position[i] = position[i]
+        for j in range(3):
+            tool_rotation[i, j] = rotation[i][j]
 
     for number in range(joints.size):
         joint = joints[number]
         if not joint.of_arm:
             continue
-        axis, turned = load(axes, number), (0.0, 0.0, 0.0)
+        of = joint.reading
+        axis, turned = (jacobian[0, of], jacobian[1, of], jacobian[2, of]), (0.0, 0.0, 0.0)
         linear = axis
         if not joint.slides:
-            lever = subtract(position, (axes[number, 3], axes[number, 4], axes[number, 5]))
+            lever = subtract(position, (jacobian[3, of], jacobian[4, of], jacobian[5, of]))
             linear, turned = cross(axis, lever), axis
         for i in range(3):
-            jacobian[i, joint.reading], jacobian[3 + i, joint.reading] = linear[i], turned[i]
+            jacobian[i, of], jacobian[3 + i, of] = linear[i], turned[i]
 
+    before = -1
     for number in range(points.size):
         point = points[number]
-        center = _on_link(poses[point.link], rotations[point.link], _vector(point.position))
+        if point.link != before:
+            before, rotation = point.link, _rotation(_quaternion(poses[point.link], 3))
+        center = _on_link(poses[point.link], rotation, _vector(point.position))
         for i in range(3):
             centers[number, i] = center[i]
     return True

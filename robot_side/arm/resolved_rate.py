@@ -9,13 +9,15 @@ from typing import Final, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, require_finite
-from robot_side.compiled.kernel import TRUTH, building_block, compiled, input_array, output_array
+from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, output_array
+from robot_side.compiled.stack import on_stack
 
 _THRESHOLD_2: Final = 0.06 * 0.06
 """Of the singular values, squared"""
 _LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
 """After so many the smallest eigenvalue is known to the last digit."""
+_gram, _factor, _solution = on_stack(6, 6), on_stack(6, 6), on_stack(6)
 
 
 def joint_velocities(
@@ -87,14 +89,9 @@ def _factorise_damped(gram: FloatArray, factor: FloatArray) -> bool:
 
 
 @building_block
-def _solve_damped(rows: FloatArray, solution: FloatArray) -> bool:
-    """Solve (G + λ²) x = `solution` in place, G = A Aᵀ for the matrix A of these rows."""
-    size = rows.shape[0]
-    gram, factor = np.zeros((size, size)), np.zeros((size, size))
-    for row in range(size):
-        for column in range(size):
-            for k in range(rows.shape[1]):
-                gram[row, column] += rows[row, k] * rows[column, k]
+def _solve_damped(gram: FloatArray, solution: FloatArray) -> bool:
+    """Solve (G + λ²) x = `solution` in place."""
+    size, factor = gram.shape[0], _factor()
     if not _factorise_damped(gram, factor):
         return False
     for row in range(size):
@@ -106,6 +103,12 @@ def _solve_damped(rows: FloatArray, solution: FloatArray) -> bool:
             solution[row] -= factor[k, row] * solution[k]
         solution[row] /= factor[row, row]
     return True
+
+
+@inlined
+def _of_rows(jacobian: FloatArray, wide: bool, row: int, k: int) -> float:
+    """An element of A, whose rows are the shorter side: A = J, or Jᵀ with fewer than six joints."""
+    return float(jacobian[row, k] if wide else jacobian[k, row])
 
 
 @building_block
@@ -123,18 +126,21 @@ def resolve(
     """
     wide = velocity.size >= 6
     size, length = (6, velocity.size) if wide else (velocity.size, 6)
-    rows, solution = np.empty((size, length)), np.zeros(size)
+    gram, solution = _gram()[:size, :size], _solution()
     for row in range(size):
-        for k in range(length):
-            rows[row, k] = jacobian[row, k] if wide else jacobian[k, row]
-            solution[row] += 0.0 if wide else rows[row, k] * twist[k]
-        solution[row] += twist[row] if wide else 0.0
-    if not _solve_damped(rows, solution):
+        for column in range(size):
+            gram[row, column] = 0.0
+            for k in range(length):
+                gram[row, column] += _of_rows(jacobian, wide, row, k) * _of_rows(jacobian, wide, column, k)
+        solution[row] = twist[row] if wide else 0.0
+        for k in range(0 if wide else length):
+            solution[row] += jacobian[k, row] * twist[k]
+    if not _solve_damped(gram, solution):
         return False
     for joint in range(velocity.size):
         velocity[joint] = 0.0 if wide else solution[joint]
         for row in range(6 if wide else 0):
-            velocity[joint] += rows[row, joint] * solution[row]
+            velocity[joint] += jacobian[row, joint] * solution[row]
     return _limit(velocity, limits)
 
 

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from importlib import import_module
+from queue import SimpleQueue
 from types import FunctionType
 from typing import Final
 
@@ -17,26 +18,31 @@ from robot_side.compiled.sources import code_sizes
 
 _MOST_PROCESSES: Final = 4
 """With more, half of the work would be done twice; each takes 0.4 GB."""
-_OWN: Final = 1000
-"""What a kernel costs by itself: as much as so many bytes of bytecode."""
 
 
-def shares(kernels: Sequence[Compiled], count: int) -> list[list[Compiled]]:
-    """The kernels in at most `count` shares that take about the same time, the largest first in each.
+class Queue:
+    """Kernels for several processes, which each ask for the next: the largest first, so that all end at about one time.
 
-    A function that several kernels of a share call is compiled once there.
+    A function that several kernels call is compiled once in each process that needs it. So what counts of a kernel is
+    the bytecode of functions that no other process has.
     """
-    sizes = {kernel: code_sizes(kernel.function) for kernel in kernels}
-    compiled: list[dict[FunctionType, int]] = [{} for _ in range(count)]
-    costs, found = [0] * count, [list[Compiled]() for _ in range(count)]
-    for kernel in sorted(kernels, key=lambda kernel: -sum(sizes[kernel].values())):
-        more = [_OWN + sum(size for part, size in sizes[kernel].items() if part not in there) for there in compiled]
-        # What is new counts twice: else each would compile what it could leave to the one that has most of it.
-        least = min(range(count), key=lambda place: costs[place] + 2 * more[place])
-        costs[least] += more[least]
-        compiled[least] |= sizes[kernel]
-        found[least].append(kernel)
-    return [share for share in found if share]
+
+    def __init__(self, kernels: Sequence[Compiled], processes: int) -> None:
+        self._sizes = {kernel: code_sizes(kernel.function) for kernel in kernels}
+        self._has: list[set[FunctionType]] = [set() for _ in range(processes)]
+
+    def take(self, process: int) -> Compiled | None:
+        """The next for a process, by its number; None when there is none left."""
+        if not self._sizes:
+            return None
+        elsewhere = set[FunctionType]().union(*self._has) - self._has[process]
+
+        def own_size(kernel: Compiled) -> int:
+            return sum(size for part, size in self._sizes[kernel].items() if part not in elsewhere)
+
+        taken = max(self._sizes, key=own_size)
+        self._has[process] |= self._sizes.pop(taken).keys()
+        return taken
 
 
 def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
@@ -45,35 +51,48 @@ def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str]
     Nothing is promised: a process may be killed, or find no room on the disk. What is not there then, `prepare`
     compiles.
     """
+    count = min(count, _MOST_PROCESSES, len(kernels))
+    waiting = Queue(kernels, count)
     with ExitStack() as processes:
-        channels = [
-            processes.enter_context(Companion(__name__, [kernel.name for kernel in share])).channel
-            for share in shares(kernels, min(count, _MOST_PROCESSES))
-        ]
+        channels = [processes.enter_context(Companion(__name__)).channel for _ in range(count)]
+
+        def hand_on(place: int) -> None:
+            kernel = waiting.take(place)
+            if kernel is None:
+                channels[place].close()
+            else:
+                channels[place].send(kernel.name.encode())
+
+        for place in range(count):
+            hand_on(place)
         while running := [channel for channel in channels if not channel.ended]:
             for channel in select.select(running, [], [])[0]:
                 for name in channel.receive():
                     done(name.decode())
+                    hand_on(channels.index(channel))
 
 
-def _end_with(owner: Channel) -> None:
-    """A compilation cannot be asked to stop."""
+def _end_with(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -> None:
+    """Take names of kernels; a compilation cannot be asked to stop."""
     while not owner.ended:
         select.select([owner], [], [])
-        owner.receive()
+        with speaking:
+            for name in owner.receive():
+                names.put(name.decode())
     os._exit(0)
 
 
 def main() -> None:
-    """Compile the kernels that the arguments name, each of which says its module, too."""
-    owner, names = companion_channel(sys.argv[1:])
-    threading.Thread(target=_end_with, args=(owner,), daemon=True).start()
-    for name in names:
+    """Compile each kernel whose name comes, which says its module, too."""
+    owner, _ = companion_channel(sys.argv[1:])
+    speaking, names = threading.Lock(), SimpleQueue[str]()
+    threading.Thread(target=_end_with, args=(owner, speaking, names), daemon=True).start()
+    while True:
+        name = names.get()
         import_module(name.rpartition(".")[0])
-    known = {kernel.name: kernel for kernel in imported_kernels()}
-    for name in names:
-        known[name].prepare()
-        owner.send(name.encode())
+        next(kernel for kernel in imported_kernels() if kernel.name == name).prepare()
+        with speaking:
+            owner.send(name.encode())
 
 
 if __name__ == "__main__":

@@ -1,80 +1,100 @@
-"""Columns that go to a kernel together: declared once, from which the view in kernels and the addresses follow."""
+"""Arrays that go to a kernel together, by their addresses: declared once, for whoever hands them on and for kernels.
+
+One argument costs a fifth of what twenty do.
+"""
 
 import functools
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Final, Generic, NamedTuple, TypeVar, cast
+
+import numba
+import numba.extending
+import numpy as np
 
 from common.arrays import IntArray
-from robot_side.compiled import bundle
-from robot_side.compiled.bundle import addresses
-from robot_side.compiled.kernel import inlined
+from robot_side.compiled.numba_inside import array_at, element_of
 
 _Columns = TypeVar("_Columns", bound=tuple[Any, ...])
-View = Callable[[IntArray, int], Any]
 
-NUMBERS: View = bundle.numbers
+BUNDLE: Final = numba.types.Array(numba.types.int64, 2, "C", readonly=True)
+"""The Numba type of `Declared.bundle`."""
+
+
+class Form(NamedTuple):
+    """What a column is to a kernel: an array (n, *inner) of elements of one type."""
+
+    dtype: np.dtype
+    inner: tuple[int, ...] = ()
+
+
+NUMBERS: Final = Form(np.dtype(np.float64))
 """(n,) floats"""
-INDICES: View = bundle.indices
+INDICES: Final = Form(np.dtype(np.int64))
 """(n,) int64"""
-FLAGS: View = bundle.flags
+FLAGS: Final = Form(np.dtype(np.bool_))
 """(n,) bools"""
-BUNDLED: View = bundle.bundled
+BUNDLED: Final = Form(np.dtype(np.int64), (2,))
 """(n, 2) another bundle"""
 
 
-@functools.cache
-def rows(width: int) -> View:
+def rows(width: int) -> Form:
     """(n, width) floats."""
-
-    @inlined
-    def view(found: IntArray, place: int) -> Any:
-        return bundle.rows(found, place, width)
-
-    return view
+    return Form(NUMBERS.dtype, (width,))
 
 
-@functools.cache
-def matrices(height: int, width: int) -> View:
+def matrices(height: int, width: int) -> Form:
     """(n, height, width) floats."""
-
-    @inlined
-    def view(found: IntArray, place: int) -> Any:
-        return bundle.matrices(found, place, height, width)
-
-    return view
+    return Form(NUMBERS.dtype, (height, width))
 
 
-@functools.cache
-def records(dtype: Any) -> View:
+def records(dtype: Any) -> Form:
     """(n,) records of `dtype`."""
-
-    @inlined
-    def view(found: IntArray, place: int) -> Any:
-        return bundle.records(found, place, dtype)
-
-    return view
+    return Form(dtype)
 
 
 class Declared(Generic[_Columns]):
-    """A named tuple of arrays, with how kernels view each of them."""
+    """A named tuple of arrays, with the form of each of them."""
 
-    def __init__(self, columns: type[_Columns], *views: View) -> None:
-        """views: one for each field, in order; TypeError for another number of them."""
+    def __init__(self, columns: type[_Columns], *forms: Form) -> None:
+        """forms: one for each field, in order; TypeError for another number of them."""
         self._fields: tuple[str, ...] = cast(Any, columns)._fields
-        if len(views) != len(self._fields):
-            raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(views)}")
-        self.at: Callable[[IntArray], _Columns] = _view(columns, views)
+        if len(forms) != len(self._fields):
+            raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(forms)}")
+        self._forms = forms
+        self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
         """From a bundle to the columns; in kernels only"""
 
     def bundle(self, owner: object) -> IntArray:
-        """Bundle the addresses of the owner's attributes of these names; the owner must keep the arrays."""
-        return addresses(*(getattr(owner, name) for name in self._fields))
+        """Address and number of rows (n, 2) of the owner's arrays of these names; the owner must keep them.
+
+        ValueError for an array with gaps between its rows, or of other elements than declared.
+        """
+        arrays = [getattr(owner, name) for name in self._fields]
+        for name, array, form in zip(self._fields, arrays, self._forms, strict=True):
+            if not array.flags.c_contiguous or array.dtype != form.dtype or array.shape[1:] != form.inner:
+                raise ValueError(
+                    f"{name}: {array.dtype} {array.shape} with steps {array.strides} cannot be bundled;"
+                    f" valid: C-contiguous {form.dtype} (n, {', '.join(map(str, form.inner))})"
+                )
+        return np.array([(array.__array_interface__["data"][0], len(array)) for array in arrays], dtype=np.int64)
 
 
-def _view(columns: Any, views: tuple[View, ...]) -> Any:
-    # Numba takes no loop over views of several types. Written out as source, they are one call. Joined one at a time,
-    # they would be a tuple of each length: a kernel of 30 columns took half as long again to compile.
-    scope = {"__name__": __name__, "columns": columns} | {f"view_{place}": view for place, view in enumerate(views)}
-    given = ", ".join(f"view_{place}(found, {place})" for place in range(len(views)))
-    exec(compile(f"def at(found):\n    return columns({given})\n", __file__, "exec"), scope)  # noqa: S102
-    return inlined(cast(Any, scope["at"]))
+def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
+    # One intrinsic: as many calls as there are columns take longer to compile than what is done with them.
+    def at(_typing: Any, bundle: Any) -> Any:
+        arrays = [numba.types.Array(numba.from_dtype(form.dtype), 1 + len(form.inner), "C") for form in forms]
+        together = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)
+
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            values = []
+            for place, (array, form) in enumerate(zip(arrays, forms, strict=True)):
+                read = functools.partial(element_of, context, builder, bundle, arguments[0], place)
+                address, length = read(0), read(1)
+                pointer = builder.inttoptr(address, context.get_value_type(numba.types.voidptr))
+                shape = [length, *(length.type(size) for size in form.inner)]
+                values.append(array_at(context, builder, array, pointer, shape))
+            return context.make_tuple(builder, together, values)
+
+        return together(BUNDLE), generate
+
+    return cast(Any, numba.extending.intrinsic)(at)

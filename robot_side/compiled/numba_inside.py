@@ -12,12 +12,14 @@ from typing import Any, Final, cast
 import llvmlite
 import numba
 from numba.core.caching import _Cache
+from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.core.typed_passes import NativeLowering
+from numba.np.arrayobj import get_itemsize, make_array, populate_array
 
 from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
@@ -40,7 +42,10 @@ class _ForCallers(LoweringPass):
 
 
 class _ForLinking(JITCodeLibrary):
-    """Optimised, to be linked into kernels; never in memory as something to run."""
+    """To be linked into kernels; never in memory as something to run."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the kernel, which is optimised with all of its functions."""
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
@@ -128,3 +133,28 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, given: lis
     with cast(Any, builder).if_then(status.is_error):
         convention.return_status_propagate(builder, status)
     return result
+
+
+def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, shape: list[Any]) -> Any:
+    """Build the C-contiguous array of this type and shape (integers of 64 bits) at a pointer; nobody frees it."""
+    array = make_array(array_type)(context, builder)  # type: ignore[no-untyped-call]
+    itemsize = shape[0].type(get_itemsize(context, array_type))  # type: ignore[no-untyped-call]
+    strides = [itemsize]
+    for size in reversed(shape[1:]):
+        strides.insert(0, builder.mul(size, strides[0]))
+    data = builder.bitcast(pointer, context.get_data_type(array_type.dtype).as_pointer())
+    populate_array(array, data, shape, strides, itemsize, meminfo=None)  # type: ignore[no-untyped-call]
+    return array._getvalue()
+
+
+def element_of(context: Any, builder: Any, table_type: Any, table: Any, row: int, column: int) -> Any:
+    """Build the read of one element of a C-contiguous table of two columns."""
+    array = make_array(table_type)(context, builder, table)  # type: ignore[no-untyped-call]
+    return builder.load(builder.gep(array.data, [array.itemsize.type(2 * row + column)]))
+
+
+def room_on_stack(context: Any, builder: Any, element: Any, count: int) -> Any:
+    """Build the pointer to so many elements in the frame of the function, at the start of a cache line."""
+    room = alloca_once(builder, context.get_data_type(element), count)  # type: ignore[no-untyped-call]
+    room.align = 64
+    return room

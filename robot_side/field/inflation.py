@@ -2,34 +2,43 @@
 
 import math
 
-import numpy as np
-
 from common.arrays import BoolArray, FloatArray
 from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
-from robot_side.compiled.vectors import Vector, cross, dot, load, norm, subtract
+from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
 from robot_side.field.scratch import CLUSTER, ScratchColumns
 
-
-@inlined
-def joint_levers(jacobian: FloatArray, along: Vector) -> FloatArray:
-    """For each joint (n, 4): û × ω and û·v, from which a point's share follows; jacobian (6, n)."""
-    levers = np.empty((jacobian.shape[1], 4))
-    for joint in range(levers.shape[0]):
-        turning = cross(along, (jacobian[3, joint], jacobian[4, joint], jacobian[5, joint]))
-        levers[joint, 0], levers[joint, 1], levers[joint, 2] = turning
-        levers[joint, 3] = dot(along, (jacobian[0, joint], jacobian[1, joint], jacobian[2, joint]))
-    return levers
+Spread = tuple[float, Vector, Vector, Vector]
+"""A quadratic form: its value at the tool, the factors of x, y and z, of their squares, and of yz, zx and xy."""
 
 
 @inlined
-def variance_along(arm: Vector, levers: FloatArray, encoder_variance: FloatArray) -> float:
-    """ûᵀ J diag(σ_θ²) Jᵀ û in m² of the point at `arm` from the tool (eq. 5): û·(v + ω × r) for each joint."""
-    total = 0.0
+def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> Spread:
+    """ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of any point that moves with the tool, as a quadratic in where it is.
+
+    A joint moves the point r from the tool by û·(v + ω × r) = û·v + (û × ω)·r. jacobian (6, n): the tool's.
+    """
+    at_tool, linear, xx, yy, zz, others = 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
     for joint in range(encoder_variance.size):
-        part = levers[joint, 3] + dot(load(levers, joint), arm)
-        total += encoder_variance[joint] * part * part
-    return total
+        lever = cross(along, (jacobian[3, joint], jacobian[4, joint], jacobian[5, joint]))
+        straight = dot(along, (jacobian[0, joint], jacobian[1, joint], jacobian[2, joint]))
+        x, y, z = scale(encoder_variance[joint], lever)
+        at_tool += encoder_variance[joint] * straight * straight
+        linear = add(linear, scale(2.0 * straight, (x, y, z)))
+        xx, yy, zz = xx + x * lever[0], yy + y * lever[1], zz + z * lever[2]
+        others = add(others, (2.0 * y * lever[2], 2.0 * z * lever[0], 2.0 * x * lever[1]))
+    return at_tool, linear, (xx, yy, zz), others
+
+
+@inlined
+def variance_at(spread: Spread, arm: Vector) -> float:
+    """The variance (m²) of the point at `arm` from the tool."""
+    at_tool, linear, squares, others = spread
+    x, y, z = arm
+    products = others[0] * y * z + others[1] * z * x + others[2] * x * y
+    variance = at_tool + dot(linear, arm) + dot(squares, (x * x, y * y, z * z)) + products
+    # Rounding may bring what is nearly 0 below it. A maximum would hide NaN.
+    return 0.0 if variance < 0.0 else variance
 
 
 @inlined
@@ -50,11 +59,12 @@ def inflate(
 
     centers (m, 3), radii (m,), on_finger (m,). D_σ has two columns: at P, and expected (P = 0.5).
     """
-    spheres, sigmas, levers, check = scratch.spheres, scratch.sigma_m, joint_levers(jacobian, along), 0.0
+    spheres, sigmas, check = scratch.spheres, scratch.sigma_m, 0.0
+    spread = spread_along(jacobian, encoder_variance, along)
     scratch.largest_m[0] = 0.0
     for i in range(radii.size):
         arm = subtract(load(centers, i), tool)
-        kinematic = variance_along(arm, levers, encoder_variance)
+        kinematic = variance_at(spread, arm)
         found = statistical_distance(mean, kinematic + variance, quantile)
         spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = *load(centers, i), radii[i]
         sigmas[i, 0], sigmas[i, 1] = found, max(0.0, mean)
@@ -99,7 +109,7 @@ def explain_inflation(
 ) -> None:
     """Fill ûᵀΣû (m,) in m² and D_σ (m,) in m of points (m, 3), as `inflate` has them, for people who look."""
     along = load(direction.reshape(1, 3), 0)
-    levers, origin = joint_levers(jacobian, along), load(tool.reshape(1, 3), 0)
+    spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
     for i in range(distances.size):
-        kinematic_variance[i] = variance_along(subtract(load(centers, i), origin), levers, encoder_variance)
+        kinematic_variance[i] = variance_at(spread, subtract(load(centers, i), origin))
         distances[i] = statistical_distance(mean, kinematic_variance[i] + variance, quantile)

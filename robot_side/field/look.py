@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import (
     NUMBER,
     TRUTH,

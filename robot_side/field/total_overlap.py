@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
 from robot_side.compiled.vectors import add, load
 from robot_side.field.inflation import around_spheres

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.ability import FOUND, JointLimits
 from robot_side.compiled.columns import INDICES, NUMBERS, Declared, records, rows
 from robot_side.field.scratch import STRENGTHS, Count
 
@@ -154,7 +154,7 @@ class Memory:
         """Of the tool at the place that is looked from"""
         self.prospect: np.ndarray = np.zeros(1, dtype=PROSPECT)
         self.direction: FloatArray = np.zeros(3)
-        self.able: FloatArray = np.zeros(3)
+        self.able: FloatArray = np.zeros(FOUND + limits.velocity_rad_s.size)
         """Speed and acceleration there, and by how much the motion is off"""
         self.displacement_m: FloatArray = np.zeros(3)
         """δ of the overlap that is looked at"""

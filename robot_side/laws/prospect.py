@@ -6,8 +6,8 @@ from typing import Final
 from common.arrays import FloatArray, IntArray
 from common.reaction import HORIZON_S
 from robot_side.arm.ability import ABILITY
-from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array
 from robot_side.enlargement.prediction_errors import prediction_error
 from robot_side.laws.memory import Kernel, memory_at

@@ -6,8 +6,8 @@ measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep �
 import math
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
 from robot_side.compiled.calls import call_at_address
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import (
     NUMBER,
     TRUTH,

@@ -7,7 +7,7 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, compiled, inlined, input_array
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract, unit
 from robot_side.laws.memory import FINGER_POSES, MOST_PLACES, memory_at

@@ -10,12 +10,11 @@ from common.arrays import FloatArray
 from common.clock import Clock
 from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
-from robot_side.compiled.bundle import addresses
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.simulation.gripper_measurement import measure_gripper
 from robot_side.simulation.joint_reference import JointReference, MotionLimits
-from robot_side.simulation.plant import LIMITS, Plant, drive, inertia_table, sense
+from robot_side.simulation.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
 from robot_side.simulation.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -94,7 +93,7 @@ class MujocoArm:
             data.ctrl,
             np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
         )
-        self._addresses = addresses(*self._plant)
+        self._addresses = PLANT.bundle(self._plant)
 
     @property
     def joint_count(self) -> int:

@@ -5,8 +5,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE, indices, numbers, records, rows
-from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, inlined, output_array
+from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, records, rows
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, output_array
 from robot_side.simulation.encoders import reading
 from robot_side.simulation.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
 from robot_side.simulation.joint_drives import DRIVE, control, motor_acceleration
@@ -72,31 +72,14 @@ def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
     return np.array(found, INERTIA)
 
 
-@inlined
-def _plant_at(bundle: IntArray) -> Plant:
-    """The plant by its addresses, in kernels."""
-    return Plant(
-        records(bundle, 0, REFERENCE),
-        records(bundle, 1, DRIVE),
-        records(bundle, 2, INERTIA),
-        records(bundle, 3, GRIPPER),
-        rows(bundle, 4, 3),
-        records(bundle, 5, GRIPPER_INPUT),
-        indices(bundle, 6),
-        indices(bundle, 7),
-        indices(bundle, 8),
-        indices(bundle, 9),
-        numbers(bundle, 10),
-        numbers(bundle, 11),
-        numbers(bundle, 12),
-        numbers(bundle, 13),
-        numbers(bundle, 14),
-        numbers(bundle, 15),
-        numbers(bundle, 16),
-        numbers(bundle, 17),
-        numbers(bundle, 18),
-        records(bundle, 19, LIMITS),
-    )
+PLANT: Final = Declared(
+    Plant,
+    *(records(REFERENCE), records(DRIVE), records(INERTIA), records(GRIPPER), rows(3), records(GRIPPER_INPUT)),
+    *(INDICES,) * 4,
+    *(NUMBERS,) * 9,
+    records(LIMITS),
+)
+_plant_at = PLANT.at
 
 
 @compiled(BUNDLE, TRUTH, TRUTH, NUMBER, NUMBER)

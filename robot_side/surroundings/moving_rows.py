@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, TRUTH, compiled, inlined, input_array, input_indices, output_array
 from robot_side.surroundings.blocks import bound_blocks
 from robot_side.surroundings.bounds import write_around

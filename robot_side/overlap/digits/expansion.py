@@ -4,16 +4,16 @@ The terms of a sum are distilled by two-sums until one of them is all of it (Ogi
 dot product", 2005): slow, and only asked where double-double cannot tell a value well from 0.
 """
 
-import numpy as np
-
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block
+from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import norm
 from robot_side.overlap.digits.double_double import two_product, two_sum
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_cross, precise_dot
 
 _UNCERTAIN = 1e-15
 """Determinants below this, for vectors of length 1, are taken again without rounding."""
+_power_terms, _determinant_terms = on_stack(20), on_stack(192)
 
 
 @building_block
@@ -33,7 +33,7 @@ def exact_sum(terms: FloatArray) -> float:
 @building_block
 def exact_power(point: PreciseVector, radius: float) -> float:
     """R² - |point|² to a relative error of 1e-15."""
-    terms = np.empty(20)
+    terms = _power_terms()
     terms[0], terms[1] = two_product(radius, radius)
     count = 2
     for axis in range(3):
@@ -57,7 +57,7 @@ def determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
 @building_block
 def _exact_determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
     """The determinant a · (b × c) to a relative error of 1e-15."""
-    terms = np.empty(192)
+    terms = _determinant_terms()
     count = 0
     for first in range(3):
         for cyclic in range(1, 3):

@@ -13,6 +13,7 @@ from robot_side.compiled.kernel import (
     output_indices,
     power_of_two_below,
 )
+from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.checks.arguments import LARGEST, ORTHONORMALITY
 from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
@@ -43,7 +44,7 @@ from robot_side.overlap.lanes.lanes import (
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
 _BOUNDS, _SOLID_VOLUME, _RESULT = 19, 20, 21
-_COLUMNS = _RESULT + RESULT_COLUMNS
+_lanes, _indices = on_stack((_RESULT + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
 
 _SLACK = 1e-5
 """Share of all lengths by which bounds must settle a pair: rotations are orthonormal only to 1e-6."""
@@ -84,8 +85,7 @@ def overlap_boxes(
     worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
     where a number may be NaN or out of range.
     """
-    block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    block, waiting, pairs, own = _lanes(), _lanes(), _indices(), _indices()
     waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):

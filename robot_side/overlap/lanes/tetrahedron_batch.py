@@ -13,6 +13,7 @@ from robot_side.compiled.kernel import (
     output_indices,
     power_of_two_below,
 )
+from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.checks.arguments import LARGEST
 from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
@@ -43,7 +44,7 @@ from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
 _BOUNDS, _SOLID_VOLUME, _RESULT = 16, 17, 18
-_COLUMNS = _RESULT + RESULT_COLUMNS
+_lanes, _indices = on_stack((_RESULT + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
 
 _SURE = 1.0 + 1e-9
 """Bounds settle a pair only with this margin for what they round."""
@@ -77,8 +78,7 @@ def overlap_tetrahedra(
     worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
     where a number may be NaN or out of range.
     """
-    block, waiting = np.empty(_COLUMNS * LANES), np.empty(_COLUMNS * LANES)
-    pairs, own = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    block, waiting, pairs, own = _lanes(), _lanes(), _indices(), _indices()
     waiting_count = unsettled = partial = doubtful = 0
     total = radii.size
     for first in range(0, total, LANES):

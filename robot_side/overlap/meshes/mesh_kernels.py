@@ -4,8 +4,6 @@ Nothing is validated here, see `kernels`. A placed mesh is queried in its own fr
 Qᵀ (centre - position), Q being the rotation from the mesh's frame to the world.
 """
 
-import numpy as np
-
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import (
     building_block,
@@ -16,6 +14,7 @@ from robot_side.compiled.kernel import (
     output_array,
     output_indices,
 )
+from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, dot, load, negative, norm, scale, subtract
 from robot_side.overlap.digits.double_double import DoubleDouble, multiple, plus, two_sum
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs
@@ -33,6 +32,7 @@ PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
 
 _ON_SURFACE = 1e-12
 """A point is on the surface within this share of the mesh's size: its side is then the nearest triangle's."""
+_scratch = on_stack(SCRATCH)
 
 
 @inlined
@@ -66,7 +66,7 @@ def to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
 @compiled(
     *(input_array(2), input_array(1), input_indices(), *PLACED_ARGUMENTS),
     *MESH_ARGUMENTS,
-    *(output_array(1), output_array(2), output_array(1), output_indices()),
+    *(output_array(1), output_array(2), output_array(1), output_indices(), output_indices()),
 )
 def overlap_loop(
     centers: FloatArray,
@@ -86,13 +86,15 @@ def overlap_loop(
     gradients: FloatArray,
     areas: FloatArray,
     touched: IntArray,
+    near: IntArray,
 ) -> None:
     """Fill volumes, gradients (in the world's frame), areas, and how many triangles each pair evaluated.
 
     placed (p,): which of the placed meshes, rows of the three arrays that follow, each sphere is paired with.
+    near: room for one triangle more than there are.
     """
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
-    near, scratch = np.empty(len(triangles) + 1, np.int64), np.empty(SCRATCH)
+    scratch = _scratch()
     for pair in range(radii.size):
         place, radius = placed[pair], radii[pair]
         mesh = mesh_index[place]

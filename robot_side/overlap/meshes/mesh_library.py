@@ -104,8 +104,9 @@ def mesh_pairs(
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
     touched = np.empty(count, dtype=np.int64)
-    arrays = mesh_index, positions, rotations
-    overlap_loop(centers, radii, np.arange(count), *arrays, *library.tables, volumes, gradients, areas, touched)
+    arrays, tables = (mesh_index, positions, rotations), library.tables
+    results = volumes, gradients, areas, touched
+    overlap_loop(centers, radii, np.arange(count), *arrays, *tables, *results, tables.room())
     return volumes, gradients, areas
 
 

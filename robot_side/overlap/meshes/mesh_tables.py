@@ -30,6 +30,10 @@ class MeshTables(NamedTuple):
     volumes: FloatArray
     """(m,): each mesh's own volume (m³)."""
 
+    def room(self) -> IntArray:
+        """Room (t + 1,) for the triangles near a sphere, and one more; anything is in it."""
+        return np.empty(len(self.triangles) + 1, dtype=np.int64)
+
 
 def mesh_tables(corners: FloatArray, volume: float) -> MeshTables:
     """The tables of one mesh with the triangles `corners` (t, 3, 3)."""

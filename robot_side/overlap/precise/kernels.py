@@ -5,10 +5,9 @@ Nothing is validated here, as in `kernels`. Each function overwrites the results
 
 import math
 
-import numpy as np
-
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import compiled, inlined, input_array, input_indices, output_array
+from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, dot
 from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.overlap.digits.double_double import two_product, two_sum
@@ -26,6 +25,7 @@ from robot_side.overlap.precise.polyhedron import polyhedron_overlap
 LARGEST_REACH = 1e3
 """Boxes are cut off so many radii from the sphere's centre."""
 
+_features = on_stack(ROWS, 3, 2)
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
 
@@ -40,7 +40,7 @@ def precise_tetrahedra(
     areas: FloatArray,
 ) -> None:
     """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
-    features = np.empty((ROWS, 3, 2))
+    features = _features()
     for index in range(rows.size):
         pair = rows[index]
         radius, scale = _scaled_radius(radii[pair])
@@ -72,7 +72,7 @@ def precise_boxes(
     areas: FloatArray,
 ) -> None:
     """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows` (k,)."""
-    features = np.empty((ROWS, 3, 2))
+    features = _features()
     for index in range(rows.size):
         pair = rows[index]
         radius, scale = _scaled_radius(radii[pair])

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array, together
 from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import sphere_volume

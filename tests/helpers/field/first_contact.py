@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import NUMBER, compiled, input_array
 from robot_side.compiled.vectors import load
 from robot_side.surroundings.perceived import PerceivedObjects

@@ -5,7 +5,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
-from robot_side.compiled.bundle import BUNDLE
+from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.laws import felt, recent_looks, sideways

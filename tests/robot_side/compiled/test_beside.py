@@ -1,4 +1,4 @@
-"""Compiling in other processes: fair shares, what they leave on disk, and what happens when they cannot."""
+"""Compiling in other processes: who gets which, what they leave on disk, and what happens when they cannot."""
 
 import os
 import select
@@ -13,7 +13,7 @@ import pytest
 from common.companion.process import Companion
 from robot_side.compiled import beside
 from robot_side.compiled import warm_up as warm_up_module
-from robot_side.compiled.beside import compile_beside, shares
+from robot_side.compiled.beside import Queue, compile_beside
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
@@ -24,33 +24,38 @@ def ours() -> list[Compiled]:
     return [kernel for kernel in imported_kernels() if kernel.is_ours]
 
 
-def size(share: list[Compiled]) -> int:
-    return sum({part: bytes_ for kernel in share for part, bytes_ in code_sizes(kernel.function).items()}.values())
+def taken_in_turns(kernels: Sequence[Compiled], processes: int) -> list[list[Compiled]]:
+    """What each gets when all take as long as their bytecode is."""
+    queue, busy, found = Queue(kernels, processes), [0] * processes, [list[Compiled]() for _ in range(processes)]
+    while (kernel := queue.take(place := busy.index(min(busy)))) is not None:
+        before = size(found[place])
+        found[place].append(kernel)
+        busy[place] += size(found[place]) - before
+    return found
 
 
-def place_of(share_of: list[list[Compiled]], name: str) -> int:
-    (place,) = (place for place, share in enumerate(share_of) if name in [kernel.function.__name__ for kernel in share])
-    return place
+def size(kernels: Sequence[Compiled]) -> int:
+    return sum({part: bytes_ for kernel in kernels for part, bytes_ in code_sizes(kernel.function).items()}.values())
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_each_kernel_is_in_one_share_and_shares_are_alike(count: int) -> None:
-    found = shares(ours(), count)
-    assert sorted(kernel.name for share in found for kernel in share) == sorted(kernel.name for kernel in ours())
-    sizes = [size(share) for share in found]
-    assert len(sizes) == count
-    assert min(sizes) > 0.5 * max(sizes)
+def test_each_kernel_goes_to_one_process_and_all_end_alike(count: int) -> None:
+    found = taken_in_turns(ours(), count)
+    assert sorted(kernel.name for part in found for kernel in part) == sorted(kernel.name for kernel in ours())
+    sizes = [size(part) for part in found]
+    assert min(sizes) > 0.8 * max(sizes)
     # What is compiled twice stays little.
     assert sum(sizes) < 1.25 * size(ours())
 
 
-def test_kernels_of_the_same_blocks_are_in_one_share() -> None:
-    found = shares(ours(), 2)
-    assert place_of(found, "precise_boxes") == place_of(found, "precise_tetrahedra")
-
-
-def test_more_processes_than_kernels_leave_no_empty_share() -> None:
-    assert [len(share) for share in shares(fresh_kernels(), 8)] == [1, 1, 1]
+def test_what_another_process_has_compiled_most_of_is_taken_last() -> None:
+    boxes, tetrahedra, small = (
+        next(kernel for kernel in ours() if kernel.function.__name__ == name)
+        for name in ("precise_boxes", "precise_tetrahedra", "find_prospect")
+    )
+    queue = Queue([boxes, tetrahedra, small], 2)
+    assert queue.take(0) is boxes
+    assert [queue.take(1), queue.take(1), queue.take(1)] == [small, tetrahedra, None]
 
 
 @pytest.mark.processes
@@ -68,12 +73,12 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
 
 
 @pytest.mark.processes
-def test_a_process_that_is_killed_leaves_its_share_to_us(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_is_killed_leaves_the_rest_to_us(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 
     class Killed(Companion):
-        def __init__(self, module: str, arguments: Sequence[str]) -> None:
-            super().__init__(module, arguments)
+        def __init__(self, module: str) -> None:
+            super().__init__(module)
             os.kill(self.process_id, signal.SIGKILL)
 
     monkeypatch.setattr(beside, "Companion", Killed)

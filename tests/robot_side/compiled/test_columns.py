@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.compiled.bundle import BUNDLE
-from robot_side.compiled.columns import BUNDLED, FLAGS, INDICES, NUMBERS, Declared, matrices, records, rows
+from robot_side.compiled.columns import BUNDLE, BUNDLED, FLAGS, INDICES, NUMBERS, Declared, matrices, records, rows
 from robot_side.compiled.kernel import NUMBER, compiled
 
 RECORD = np.dtype([("place", np.int64), ("way", np.float64)])
@@ -71,5 +70,18 @@ def test_another_number_of_views_than_of_columns_is_refused() -> None:
 
 def test_an_array_with_gaps_is_refused() -> None:
     owner = Owner(points=np.zeros((4, 6))[:, ::2])
-    with pytest.raises(ValueError, match="C-contiguous"):
+    with pytest.raises(ValueError, match=r"points: float64 \(4, 3\) .*valid: C-contiguous float64 \(n, 3\)"):
+        DECLARED.bundle(owner)
+
+
+@pytest.mark.parametrize(
+    "owner",
+    [
+        Owner(indices=np.zeros(3, dtype=np.int32)),
+        Owner(points=np.zeros((4, 2))),
+        Owner(turns=np.zeros((3, 2, 3), dtype=np.float32)),
+    ],
+)
+def test_an_array_of_another_form_than_declared_is_refused(owner: Owner) -> None:
+    with pytest.raises(ValueError, match=r"cannot be bundled; valid: C-contiguous"):
         DECLARED.bundle(owner)

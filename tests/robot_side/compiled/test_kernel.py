@@ -140,6 +140,16 @@ def _halve(pairs: np.ndarray, halved: int) -> None:
         pairs[k].way[1] = 0.5 * pairs[k].way[0]
 
 
+def test_a_kernel_that_allocates_is_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_module, "_kernels", [])
+
+    def allocates(values: FloatArray, doubled: FloatArray) -> None:
+        doubled[:] = np.zeros(values.size)
+
+    with pytest.raises(numba.TypingError):
+        compiled(input_array(1), output_array(1))(allocates).prepare()
+
+
 def test_records_with_named_fields_are_read_and_filled() -> None:
     kernel = compiled(record_array(_PAIR), COUNT)(_halve)
     pairs = np.zeros(3, dtype=_PAIR)

@@ -9,16 +9,19 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import compiled, input_array, output_indices
+from robot_side.compiled.stack import on_stack
 from robot_side.field.nearest_first import drop_first, push
 
 DROP = math.nan
 """Instead of a key: remove the first."""
+MOST = 60
+_heap, _items = on_stack(2 * MOST), on_stack(2 * MOST, dtype=np.int64)
 
 
 @compiled(input_array(1), output_indices())
 def _dropped(keys: FloatArray, dropped: IntArray) -> None:
     """Push and drop; which items were dropped, one after another."""
-    heap, items, count, drops = np.empty(keys.size), np.empty(keys.size, np.int64), 0, 0
+    heap, items, count, drops = _heap(), _items(), 0, 0
     for item in range(keys.size):
         if not math.isnan(keys[item]):
             count = push(heap, items, count, keys[item], item)
@@ -28,7 +31,7 @@ def _dropped(keys: FloatArray, dropped: IntArray) -> None:
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
-@given(keys=st.lists(st.one_of(st.just(DROP), st.floats(allow_nan=False)), max_size=60))
+@given(keys=st.lists(st.one_of(st.just(DROP), st.floats(allow_nan=False)), max_size=MOST))
 def test_the_item_with_the_least_key_is_always_the_next(keys: list[float]) -> None:
     # In the end all of them are dropped.
     keys = keys + [DROP] * len(keys)

@@ -1,0 +1,32 @@
+"""Small arrays in a kernel's own frame: kernels allocate nothing."""
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numba
+import numba.extending
+import numpy as np
+
+from robot_side.compiled.kernel import COUNT
+from robot_side.compiled.numba_inside import array_at, room_on_stack
+
+
+def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
+    """Make the function by which a kernel gets an array of this shape, with anything in it; in kernels only.
+
+    It is gone when the function that asked returns. Each place that asks has its own, in a loop the same each time.
+    """
+    element = np.dtype(dtype)
+
+    def array(_typing: Any) -> Any:
+        array_type = numba.types.Array(numba.from_dtype(element), len(shape), "C")
+
+        def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+            room = room_on_stack(context, builder, array_type.dtype, math.prod(shape))
+            integer = context.get_value_type(COUNT)
+            return array_at(context, builder, array_type, room, [integer(size) for size in shape])
+
+        return array_type(), generate
+
+    return cast(Callable[[], np.ndarray], cast(Any, numba.extending.intrinsic)(array))
