@@ -16,7 +16,13 @@ import numba.extending
 import numpy as np
 
 from robot_side.compiled.machine_code import kept
-from robot_side.compiled.numba_inside import WithoutMachineCode, entry_point, keep_on_disk, machine
+from robot_side.compiled.numba_inside import (
+    WithoutMachineCode,
+    entry_point,
+    keep_on_disk,
+    machine,
+    once_for_all_constants,
+)
 from robot_side.compiled.sources import digest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -83,7 +89,7 @@ def inlined(function: _Function) -> _Function:
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
-    return cast(_Function, numba.njit(**_FOR_CALLERS)(function))
+    return cast(_Function, once_for_all_constants(numba.njit(**_FOR_CALLERS)(function)))
 
 
 def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:

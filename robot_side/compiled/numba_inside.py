@@ -19,6 +19,7 @@ from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.core.typed_passes import NativeLowering
+from numba.core.types import unliteral
 from numba.np.arrayobj import get_itemsize, make_array, populate_array
 
 from robot_side.compiled.machine_code import keep, kept, machine_code_folder
@@ -71,6 +72,17 @@ class WithoutMachineCode(CompilerBase):
         passes.add_pass_after(_ForCallers, NativeLowering)
         passes.finalize()
         return [passes]
+
+
+def once_for_all_constants(dispatcher: Any) -> Any:
+    """Let callers share one version of a function: by default Numba compiles another for each constant argument."""
+    of_types, plain = dispatcher.get_call_template, cast(Any, unliteral)
+
+    def of_plain_types(args: Any, kws: Any) -> Any:
+        return of_types(tuple(map(plain, args)), {name: plain(value) for name, value in kws.items()})
+
+    dispatcher.get_call_template = of_plain_types
+    return dispatcher
 
 
 def machine() -> str:
