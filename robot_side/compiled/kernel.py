@@ -21,7 +21,7 @@ from robot_side.compiled.numba_inside import (
     entry_point,
     keep_on_disk,
     machine,
-    once_for_all_constants,
+    once_for_both,
 )
 from robot_side.compiled.sources import digest
 
@@ -89,7 +89,7 @@ def inlined(function: _Function) -> _Function:
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
-    return cast(_Function, once_for_all_constants(numba.njit(**_FOR_CALLERS)(function)))
+    return cast(_Function, once_for_both(numba.njit(**_FOR_CALLERS)(function)))
 
 
 def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
