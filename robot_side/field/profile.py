@@ -34,7 +34,8 @@ _FINE: Final = 1.0 / 6.0
 _COARSE: Final = 0.5
 """The distance between samples beyond the margin, in margins: where another primitive is entered, and elsewhere."""
 _EARLY: Final = 0.4
-"""A second sample of a smooth profile lies at this share of the margin, where early strengths begin."""
+"""A second sample of a smooth profile lies at this share of the margin, where early strengths begin; of others in its
+middle, as one of those that are kept."""
 
 
 class Rise(NamedTuple):
@@ -134,14 +135,19 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
 
 
 @building_block
-def _most_over_margin(profile: Profile, rise: Rise, full: Sample, bundles: Bundles) -> float:
-    """W(d + m), with samples over the margin that are kept; full: the last of them."""
+def _most_over_margin(profile: Profile, rise: Rise, half: Sample, full: Sample, bundles: Bundles) -> float:
+    """W(d + m), with samples over the margin that are kept; half, full: the one in the middle, and the last of them."""
     scratch = scratch_at(bundles.scratch)
     samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.floor)
     last = rise.free
     for k in range(SAMPLES + 1):
-        found = rise.free if k == 0 else full
-        if 0 < k < SAMPLES:
+        if k == 0:
+            found = rise.free
+        elif k == SAMPLES // 2:
+            found = half
+        elif k == SAMPLES:
+            found = full
+        else:
             found, _, _ = sample(profile, rise.free.at + k * step, bundles)
         samples[k, 0], samples[k, 1] = found.volume, found.slope
         most = max(most, found.volume - rise.floor)
@@ -210,7 +216,7 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
     reference, smooth = max(rise.least, full.volume - floor), keep_tangents(profile, full.at, False, entries)
     if not may_count(profile, floor, reference, distances, entries):
         return False
-    half, _, _ = sample(profile, free.at + _EARLY * margin, bundles)
+    half, _, _ = sample(profile, free.at + (_EARLY if smooth else 0.5) * margin, bundles)
     keep_tangents(profile, half.at, True, entries)
     if not may_count(profile, floor, reference, distances, entries):
         return False
@@ -223,7 +229,7 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
     elif _is_late(profile, free, half, full, floor, reference, distances):
         return False
     else:
-        reference, stored = max(reference, _most_over_margin(profile, rise, full, bundles)), SAMPLES
+        reference, stored = max(reference, _most_over_margin(profile, rise, half, full, bundles)), SAMPLES
     _go_on(profile, level, last, stored, may_rise, rise, reference, bundles)
     return False
 
