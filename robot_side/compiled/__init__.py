@@ -1,1 +1,1 @@
-"""What compiling with Numba takes: decorators, a safe cache, vectors in registers."""
+"""Compile with Numba: decorators, a safe cache, columns, arrays on the stack, vectors in registers."""

@@ -46,10 +46,9 @@ class Queue:
 
 
 def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
-    """Compile kernels of our modules in `count` processes, 4 at most; `done` is told the name of each.
+    """Compile kernels of our modules in `count` processes, 4 at most; call `done` with the name of each.
 
-    Nothing is promised: a process may be killed, or find no room on the disk. What is not there then, `prepare`
-    compiles.
+    A process may be killed, or find no room on the disk. `prepare` compiles what is missing then.
     """
     count = min(count, _MOST_PROCESSES, len(kernels))
     waiting = Queue(kernels, count)

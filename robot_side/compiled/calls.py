@@ -1,4 +1,4 @@
-"""Calling one kernel from another by its address: Numba itself would compile the called one in anew, at full cost."""
+"""Call one kernel from another by its address: Numba itself would compile the called one again, at full cost."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -32,7 +32,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
 
 
 def _fits(given: Any, wanted: Any) -> bool:
-    """Whether the two are alike in memory: an array may be read-only here and not there."""
+    """Whether the two look the same in memory: an array may be read-only here and not there."""
     if isinstance(wanted, numba.types.Array):
         of = ("dtype", "ndim", "layout")
         return isinstance(given, numba.types.Array) and all(getattr(given, a) == getattr(wanted, a) for a in of)

@@ -1,4 +1,4 @@
-"""Arrays that go to a kernel together, by their addresses: declared once, for whoever hands them on and for kernels.
+"""Declare arrays that go to a kernel together, by their addresses: once, for Python and for kernels.
 
 One argument costs a fifth of what twenty do.
 """
@@ -21,7 +21,7 @@ BUNDLE: Final = numba.types.Array(numba.types.int64, 2, "C", readonly=True)
 
 
 class Form(NamedTuple):
-    """What a column is to a kernel: an array (n, *inner) of elements of one type."""
+    """The form of a column: an array (n, *inner) of elements of one type."""
 
     dtype: np.dtype
     inner: tuple[int, ...] = ()
@@ -62,7 +62,7 @@ class Declared(Generic[_Columns]):
             raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(forms)}")
         self._forms = forms
         self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
-        """From a bundle to the columns; in kernels only"""
+        """Find the columns by a bundle; in kernels only"""
 
     def bundle(self, owner: object) -> IntArray:
         """Address and number of rows (n, 2) of the owner's arrays of these names; the owner must keep them.

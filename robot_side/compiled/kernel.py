@@ -83,7 +83,7 @@ _FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile `function` into whichever kernel calls it."""
+    """Compile `function` into each kernel that calls it."""
     return cast(_Function, numba.njit(forceinline=True, **_FOR_CALLERS)(function))
 
 
@@ -118,7 +118,7 @@ power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrins
 
 @contextlib.contextmanager
 def _uncollected() -> Iterator[None]:
-    """Without looking for garbage, which takes a tenth of a compilation: it allocates much and keeps most of it."""
+    """Stop the garbage collector, which takes a tenth of a compilation and finds little."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -139,15 +139,15 @@ def imported_kernels() -> tuple["Compiled", ...]:
 class Compiled:
     """A kernel with one signature, compiled (or loaded from the cache on disk) when it is first needed.
 
-    One signature means that no later call can start a compilation: an array of another type, number of
-    dimensions or layout raises TypeError instead of stalling a running tick.
+    With one signature no later call can start a compilation. An array of another type, number of dimensions or
+    layout raises TypeError instead of stalling a running tick.
     """
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
         self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         self.function = function
-        """What it is compiled from."""
+        """Its Python function."""
         self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
@@ -190,14 +190,14 @@ class Compiled:
 
     @property
     def address(self) -> int:
-        """Where its machine code is, for `calls.call_of`; compiles it if need be."""
+        """The address of its machine code, for `calls.call_at_address`; compiles it if need be."""
         if not self.ready:
             self.prepare()
         return entry_point(self._dispatcher, self.signature)
 
     @property
     def cache_hits(self) -> int:
-        """How often machine code came from the cache on disk: 0 or 1."""
+        """Number of times that its machine code came from the disk: 0 or 1."""
         return sum(self._dispatcher.stats.cache_hits.values())
 
 

@@ -1,4 +1,4 @@
-"""Machine code on disk: one file for each kernel, processor and state of its sources, there whole or not at all."""
+"""Keep machine code on disk: a file for each kernel, processor and state of the sources, whole or not at all."""
 
 import contextlib
 import hashlib
@@ -12,11 +12,11 @@ from common.files.user_folders import cache_folder
 _ENDING: Final = ".machine-code"
 _CHECK_BYTES: Final = 32
 _VERSIONS: Final = 8
-"""So many files of one kernel stay: processors and states of the sources may take turns."""
+"""The most files that one kernel keeps: processors and states of the sources may take turns."""
 
 
 def machine_code_folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """Where it is: $NUMBA_CACHE_DIR, else `kernels` in the folder of what can be worked out again."""
+    """Find the folder: $NUMBA_CACHE_DIR, else `kernels` in the user's cache."""
     given = environment.get("NUMBA_CACHE_DIR")
     return Path(given) if given else cache_folder(environment) / "kernels"
 

@@ -27,7 +27,7 @@ from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
 @register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
 class _ForCallers(LoweringPass):
-    """What `NativeLowering` leaves out without machine code: making the function known to its callers."""
+    """Make the function known to its callers, which `NativeLowering` leaves out without machine code."""
 
     _name = "for_callers"
 
@@ -56,8 +56,8 @@ class _ForLinking(JITCodeLibrary):
 class WithoutMachineCode(CompilerBase):
     """Compile to what a kernel needs to link the function in.
 
-    By default Numba also makes machine code of it, and wrappers by which Python and C may call it: more than half
-    of the time in all, as nothing but kernels calls these functions.
+    By default Numba also makes machine code of it, and wrappers for Python and C. That takes more than half of the
+    time, and nothing but kernels calls these functions.
     """
 
     def define_pipelines(self) -> list[Any]:
@@ -89,7 +89,7 @@ def once_for_both(dispatcher: Any) -> Any:
 
 
 def machine() -> str:
-    """What decides, beside the sources, whether machine code is good here: versions, and the processor."""
+    """Name the versions and the processor, which machine code depends on beside its sources."""
     processor = cast(Any, cpu_target).target_context.codegen().magic_tuple()
     return f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag} {processor}"
 
@@ -97,8 +97,8 @@ def machine() -> str:
 class _OnDisk(_Cache):
     """Keep a kernel's machine code in a file of `machine_code`.
 
-    Numba's own cache knows a kernel by its file alone, and would go on running machine code with an old version of a
-    building block from another file; it keeps nothing where it can only read, and ends the start on a full disk.
+    Numba's own cache knows a kernel by its file alone: it would go on running an old version of a building block from
+    another file. It keeps nothing where it can only read, and a full disk ends the start.
     """
 
     cache_path = property(lambda _: str(machine_code_folder()))
@@ -130,7 +130,7 @@ class _OnDisk(_Cache):
 
 
 def keep_on_disk(dispatcher: Any, name: str, key: str) -> None:
-    """Have the dispatcher look for machine code on disk by `name` and `key`, and keep there what it compiles."""
+    """Let the dispatcher load machine code from disk by `name` and `key`, and keep there what it compiles."""
     dispatcher._cache = cast(Any, _OnDisk)(name, key)
 
 
@@ -141,7 +141,7 @@ def entry_point(dispatcher: Any, signature: Any) -> int:
 
 
 def call_at(context: Any, builder: Any, signature: Any, address: Any, given: list[Any]) -> Any:
-    """Build the call of a kernel of this signature at an address; what it returns."""
+    """Build the call of a kernel of this signature at an address, and its result."""
     convention = context.call_conv
     callee = builder.inttoptr(address, convention.get_function_type(signature.return_type, signature.args).as_pointer())
     status, result = convention.call_function(builder, callee, signature.return_type, signature.args, given)
@@ -169,7 +169,7 @@ def element_of(context: Any, builder: Any, table_type: Any, table: Any, row: int
 
 
 def room_on_stack(context: Any, builder: Any, element: Any, count: int) -> Any:
-    """Build the pointer to so many elements in the frame of the function, at the start of a cache line."""
+    """Build the pointer to `count` elements in the frame of the function, at the start of a cache line."""
     room = alloca_once(builder, context.get_data_type(element), count)  # type: ignore[no-untyped-call]
     room.align = 64
     return room
