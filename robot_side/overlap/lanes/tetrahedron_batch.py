@@ -13,28 +13,23 @@ from robot_side.compiled.kernel import (
     output_indices,
     power_of_two_below,
 )
-from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.checks.arguments import LARGEST
-from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
+from robot_side.overlap.lanes.batch import batch
 from robot_side.overlap.lanes.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
-    RESULT_COLUMNS,
     SOME_DOUBTFUL,
     SOME_PARTIAL,
     WHOLE_SOLID,
     WHOLE_SPHERE,
     WIDTH,
     column,
-    copy_lane,
     doubt,
-    lane_groups,
     load_rows,
     load_vectors,
     reach,
-    scatter,
     store_result,
     vector_column,
     weight,
@@ -44,7 +39,6 @@ from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
 _BOUNDS, _SOLID_VOLUME, _RESULT = 16, 17, 18
-_lanes, _indices = on_stack((_RESULT + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
 
 _SURE = 1.0 + 1e-9
 """Bounds settle a pair only with this margin for what they round."""
@@ -53,88 +47,13 @@ _ROUNDING_2 = 1e-21
 """(8 · 2⁻⁵³)² / 1e-9: what products of three lengths may round, squared, where the margin above does not cover it."""
 
 
-@compiled(
-    input_array(2),
-    input_array(1),
-    input_array(3),
-    output_array(1),
-    output_array(2),
-    output_array(1),
-    output_indices(),
-    returns=COUNT,
-)
-def overlap_tetrahedra(
-    centers: FloatArray,
-    radii: FloatArray,
-    vertices: FloatArray,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    areas: FloatArray,
-    rows: IntArray,
-) -> int:
-    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3); the results must hold zeros.
-
-    Writes the pairs that need precise forms to the first entries of `rows` (p + 1,), the number of pairs that lanes
-    worked out to its last entry, and returns how many need precise forms. The last entry n is ~n instead, below 0,
-    where a number may be NaN or out of range.
-    """
-    block, waiting, pairs, own = _lanes(), _lanes(), _indices(), _indices()
-    waiting_count = unsettled = partial = doubtful = 0
-    total = radii.size
-    for first in range(0, total, LANES):
-        count = min(LANES, total - first)
-        _load(centers, radii, vertices, first, count, block)
-        groups = lane_groups(count)
-        left = _bound(block, groups)
-        doubtful += left // SOME_DOUBTFUL
-        left %= SOME_DOUBTFUL
-        if left == 0:
-            continue
-        if left == groups * WIDTH * SOME_PARTIAL:
-            # Nothing to sort out: worked out where they are.
-            _work_out(block, groups)
-            partial += count
-            for lane in range(count):
-                own[lane] = first + lane
-            unsettled = scatter(block, _RESULT, own, count, volumes, gradients, areas, rows, unsettled)
-            continue
-        for lane in range(count):
-            verdict = column(block, _BOUNDS, lane)
-            if verdict == NOTHING:
-                continue
-            pair = first + lane
-            if verdict == PARTIAL:
-                copy_lane(block, lane, waiting, waiting_count, _INPUTS)
-                pairs[waiting_count] = pair
-                waiting_count += 1
-                if waiting_count == LANES:
-                    _work_out(waiting, LANES // WIDTH)
-                    partial += LANES
-                    unsettled = scatter(waiting, _RESULT, pairs, LANES, volumes, gradients, areas, rows, unsettled)
-                    waiting_count = 0
-            elif verdict == WHOLE_SOLID:
-                volumes[pair] = column(block, _SOLID_VOLUME, lane)
-            else:
-                volumes[pair], areas[pair] = sphere_volume(radii[pair]), sphere_area(radii[pair])
-    if waiting_count > 0:
-        for lane in range(waiting_count, lane_groups(waiting_count) * WIDTH):
-            copy_lane(waiting, 0, waiting, lane, _INPUTS)
-        _work_out(waiting, lane_groups(waiting_count))
-        partial += waiting_count
-        unsettled = scatter(waiting, _RESULT, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
-    rows[total] = ~partial if doubtful > 0 else partial
-    return unsettled
-
-
 @inlined
 def _load(
-    centers: FloatArray, radii: FloatArray, vertices: FloatArray, first: int, count: int, block: FloatArray
+    centers: FloatArray, radii: FloatArray, tetrahedra: tuple[FloatArray], first: int, count: int, block: FloatArray
 ) -> None:
     load_vectors(centers.reshape(-1), first, count, block, _CENTER)
     load_rows(radii, first, count, 1, block, _RADIUS)
-    load_rows(vertices.reshape(-1), first, count, 12, block, _CORNERS)
-    for lane in range(count, lane_groups(count) * WIDTH):
-        copy_lane(block, 0, block, lane, _INPUTS)
+    load_rows(tetrahedra[0].reshape(-1), first, count, 12, block, _CORNERS)
 
 
 @inlined
@@ -258,3 +177,29 @@ def _work_out(block: FloatArray, groups: int) -> None:
         center = scale(shrink, vector_column(block, _CENTER, lane))
         overlap, unsettled = tetrahedron_lane(center, shrink * radius, corners)
         store_result(block, _RESULT, lane, overlap, size, unsettled)
+
+
+_run = batch(_load, _bound, _work_out, _INPUTS)
+
+
+@compiled(
+    input_array(2),
+    input_array(1),
+    input_array(3),
+    output_array(1),
+    output_array(2),
+    output_array(1),
+    output_indices(),
+    returns=COUNT,
+)
+def overlap_tetrahedra(
+    centers: FloatArray,
+    radii: FloatArray,
+    vertices: FloatArray,
+    volumes: FloatArray,
+    gradients: FloatArray,
+    areas: FloatArray,
+    rows: IntArray,
+) -> int:
+    """Fill in spheres with tetrahedra `vertices` (p, 4, 3); see `batch`."""
+    return _run(centers, radii, (vertices,), volumes, gradients, areas, rows)

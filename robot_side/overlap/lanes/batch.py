@@ -1,0 +1,113 @@
+"""Run many pairs of one kind: bounds settle most of them, the others are gathered into full blocks of lanes."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import inlined
+from robot_side.compiled.stack import on_stack
+from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
+from robot_side.overlap.lanes.lanes import (
+    LANES,
+    NOTHING,
+    PARTIAL,
+    RESULT_COLUMNS,
+    SOME_DOUBTFUL,
+    SOME_PARTIAL,
+    WHOLE_SOLID,
+    WIDTH,
+    column,
+    copy_lane,
+    lane_groups,
+    scatter,
+)
+
+Run = Callable[[FloatArray, FloatArray, Any, FloatArray, FloatArray, FloatArray, IntArray], int]
+
+
+@inlined
+def _fill_group(block: FloatArray, count: int, inputs: int) -> None:
+    """Copy the first lane to those that the last group has beyond `count`."""
+    for lane in range(count, lane_groups(count) * WIDTH):
+        copy_lane(block, 0, block, lane, inputs)
+
+
+def batch(
+    load: Callable[[FloatArray, FloatArray, Any, int, int, FloatArray], None],
+    bound: Callable[[FloatArray, int], int],
+    work_out: Callable[[FloatArray, int], None],
+    inputs: int,
+) -> Run:
+    """Make the loop over spheres `centers` (p, 3), `radii` (p,) and as many solids, a tuple of arrays; in kernels only.
+
+    A block has `inputs` columns for what a pair consists of, then a verdict, the solid's volume, and the result.
+    load: fills the first columns with `count` pairs from `first` on. bound: fills in verdicts and volumes of the first
+    groups of lanes; returns the sum of weights and doubts. work_out: fills in results.
+
+    The results must hold zeros. Pairs that need precise forms go to the first entries of `rows` (p + 1,), their number
+    is returned. The last entry is the number n of pairs that lanes worked out; ~n, below 0, where a number may be NaN
+    or out of range.
+    """
+    lanes, indices = on_stack((inputs + 2 + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
+    bounds, solid_volume, result = inputs, inputs + 1, inputs + 2
+
+    @inlined
+    def run(
+        centers: FloatArray,
+        radii: FloatArray,
+        solids: Any,
+        volumes: FloatArray,
+        gradients: FloatArray,
+        areas: FloatArray,
+        rows: IntArray,
+    ) -> int:
+        block, waiting, pairs, own = lanes(), lanes(), indices(), indices()
+        waiting_count = unsettled = partial = doubtful = 0
+        total = radii.size
+        for first in range(0, total, LANES):
+            count = min(LANES, total - first)
+            groups = lane_groups(count)
+            load(centers, radii, solids, first, count, block)
+            _fill_group(block, count, inputs)
+            left = bound(block, groups)
+            doubtful += left // SOME_DOUBTFUL
+            left %= SOME_DOUBTFUL
+            if left == 0:
+                continue
+            if left == groups * WIDTH * SOME_PARTIAL:
+                # Nothing to sort out: worked out where they are.
+                work_out(block, groups)
+                partial += count
+                for lane in range(count):
+                    own[lane] = first + lane
+                unsettled = scatter(block, result, own, count, volumes, gradients, areas, rows, unsettled)
+                continue
+            for lane in range(count):
+                verdict = column(block, bounds, lane)
+                if verdict == NOTHING:
+                    continue
+                pair = first + lane
+                if verdict == PARTIAL:
+                    copy_lane(block, lane, waiting, waiting_count, inputs)
+                    pairs[waiting_count] = pair
+                    waiting_count += 1
+                    if waiting_count == LANES:
+                        work_out(waiting, LANES // WIDTH)
+                        partial += LANES
+                        unsettled = scatter(waiting, result, pairs, LANES, volumes, gradients, areas, rows, unsettled)
+                        waiting_count = 0
+                elif verdict == WHOLE_SOLID:
+                    volumes[pair] = column(block, solid_volume, lane)
+                else:
+                    volumes[pair], areas[pair] = sphere_volume(radii[pair]), sphere_area(radii[pair])
+        if waiting_count > 0:
+            _fill_group(waiting, waiting_count, inputs)
+            work_out(waiting, lane_groups(waiting_count))
+            partial += waiting_count
+            unsettled = scatter(waiting, result, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
+        rows[total] = ~partial if doubtful > 0 else partial
+        return unsettled
+
+    return run
