@@ -25,12 +25,12 @@ def joint_velocities(
     twist: FloatArray,
     velocity_limits_rad_s: FloatArray,
 ) -> FloatArray:
-    """Joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
+    """Find joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
 
-    jacobian (6, n) and twist (6,), linear rows first, are in one frame. While the smallest of the Jacobian's
-    min(6, n) singular values stays above a threshold of 0.06 there is no damping and the twist is met exactly, or in
-    the least-squares sense by an arm with fewer than six joints. Below it λ² = λ_max² (1 - (σ_min/σ_0)²), so that
-    no joint runs away at a singularity. A joint over its limit slows all of them alike, which keeps the direction.
+    jacobian (6, n) and twist (6,), linear rows first, are in one frame. There is no damping while the smallest of the
+    Jacobian's min(6, n) singular values is above 0.06. Then the twist is met exactly; by an arm with fewer than six
+    joints, in the least-squares sense. Below 0.06, λ² = λ_max² (1 - (σ_min/σ_0)²): no joint runs away at a singularity.
+    A joint over its limit slows all of them alike, which keeps the direction.
     Metres and radians are mixed in the singular values: the defaults suit an arm of about one metre's reach.
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
@@ -43,7 +43,7 @@ def joint_velocities(
 
 
 def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
-    """ValueError that says what of these `resolve` could not use."""
+    """Raise the ValueError that names what `resolve` could not use."""
     for name, values in (("jacobian", jacobian), ("twist", twist)):
         require_finite(name, values)
     if not (velocity_limits_rad_s > 0.0).all():

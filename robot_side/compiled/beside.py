@@ -21,10 +21,10 @@ _MOST_PROCESSES: Final = 4
 
 
 class Queue:
-    """Kernels for several processes, which each ask for the next: the largest first, so that all end at about one time.
+    """Kernels for several processes, the largest first: each process asks for its next, so that all end together.
 
-    A function that several kernels call is compiled once in each process that needs it. So what counts of a kernel is
-    the bytecode of functions that no other process has.
+    A function that several kernels call is compiled once in each process that needs it. So the size of a kernel is
+    the bytecode of its functions that no other process has.
     """
 
     def __init__(self, kernels: Sequence[Compiled], processes: int) -> None:
@@ -32,7 +32,7 @@ class Queue:
         self._has: list[set[FunctionType]] = [set() for _ in range(processes)]
 
     def take(self, process: int) -> Compiled | None:
-        """The next for a process, by its number; None when there is none left."""
+        """Take the next for a process, by its number; None when there is none left."""
         if not self._sizes:
             return None
         elsewhere = set[FunctionType]().union(*self._has) - self._has[process]
@@ -54,6 +54,9 @@ def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str]
     waiting = Queue(kernels, count)
     with ExitStack() as processes:
         channels = [processes.enter_context(Companion(__name__)).channel for _ in range(count)]
+        for channel in channels:
+            # Before any of them is waited for: a process may take two seconds to end.
+            processes.callback(channel.close)
 
         def hand_on(place: int) -> None:
             kernel = waiting.take(place)
@@ -82,14 +85,17 @@ def _end_with(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str])
 
 
 def main() -> None:
-    """Compile each kernel whose name comes, which says its module, too."""
+    """Compile each kernel whose name comes, which says its module, too; end where nothing can be kept."""
     owner, _ = companion_channel(sys.argv[1:])
     speaking, names = threading.Lock(), SimpleQueue[str]()
     threading.Thread(target=_end_with, args=(owner, speaking, names), daemon=True).start()
     while True:
         name = names.get()
         import_module(name.rpartition(".")[0])
-        next(kernel for kernel in imported_kernels() if kernel.name == name).prepare()
+        kernel = next(kernel for kernel in imported_kernels() if kernel.name == name)
+        kernel.prepare()
+        if not kernel.is_kept:
+            return
         with speaking:
             owner.send(name.encode())
 

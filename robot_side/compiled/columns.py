@@ -67,14 +67,15 @@ class Declared(Generic[_Columns]):
     def bundle(self, owner: object) -> IntArray:
         """Address and number of rows (n, 2) of the owner's arrays of these names; the owner must keep them.
 
-        ValueError for an array with gaps between its rows, or of other elements than declared.
+        ValueError for an array with gaps between its rows, not aligned, or of another form than declared.
         """
         arrays = [getattr(owner, name) for name in self._fields]
         for name, array, form in zip(self._fields, arrays, self._forms, strict=True):
-            if not array.flags.c_contiguous or array.dtype != form.dtype or array.shape[1:] != form.inner:
+            fits = array.flags.c_contiguous and array.flags.aligned
+            if not fits or array.dtype != form.dtype or array.shape[1:] != form.inner:
                 raise ValueError(
                     f"{name}: {array.dtype} {array.shape} with steps {array.strides} cannot be bundled;"
-                    f" valid: C-contiguous {form.dtype} (n, {', '.join(map(str, form.inner))})"
+                    f" valid: C-contiguous, aligned {form.dtype} ({', '.join(('n', *map(str, form.inner)))})"
                 )
         return np.array([(array.__array_interface__["data"][0], len(array)) for array in arrays], dtype=np.int64)
 

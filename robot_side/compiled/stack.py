@@ -15,7 +15,8 @@ from robot_side.compiled.numba_inside import array_at, room_on_stack
 def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
     """Make the function by which a kernel gets an array of this shape, with anything in it; in kernels only.
 
-    It is gone when the function that asked returns. Each place that asks has its own, in a loop the same each time.
+    It is gone when the function that asked returns: never return it, nor a tuple with it. Each place that asks has its
+    own, in a loop the same each time.
     """
     element = np.dtype(dtype)
 

@@ -14,7 +14,7 @@ Spread = tuple[float, Vector, Vector, Vector]
 
 @inlined
 def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> Spread:
-    """ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of any point that moves with the tool, as a quadratic in where it is.
+    """Work out ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of any point that moves with the tool: a quadratic form of its place.
 
     A joint moves the point r from the tool by û·(v + ω × r) = û·v + (û × ω)·r. jacobian (6, n): the tool's.
     """
@@ -32,7 +32,7 @@ def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vect
 
 @inlined
 def variance_at(spread: Spread, arm: Vector) -> float:
-    """The variance (m²) of the point at `arm` from the tool."""
+    """Evaluate the variance (m²) of the point at `arm` from the tool."""
     at_tool, linear, squares, others = spread
     x, y, z = arm
     products = others[0] * y * z + others[1] * z * x + others[2] * x * y
@@ -81,7 +81,7 @@ def inflate(
 
 @inlined
 def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """A sphere around those from `first` to `end` of spheres (m, 4), inflated by the first column of (m, 1 or more)."""
+    """Find a sphere around those from `first` to `end` of spheres (m, 4), each inflated by the first column."""
     x, y, z, count = 0.0, 0.0, 0.0, max(end - first, 1)
     for i in range(first, end):
         x, y, z = x + spheres[i, 0], y + spheres[i, 1], z + spheres[i, 2]

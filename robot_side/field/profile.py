@@ -34,8 +34,8 @@ _FINE: Final = 1.0 / 6.0
 _COARSE: Final = 0.5
 """The distance between samples beyond the margin, in margins: where another primitive is entered, and elsewhere."""
 _EARLY: Final = 0.4
-"""A second sample of a smooth profile lies at this share of the margin, where early strengths begin; of others in its
-middle, as one of those that are kept."""
+"""The share of the margin at which a second sample of a smooth profile lies: early strengths begin there. Other
+profiles keep samples over the margin, of which the second one is the middle."""
 
 
 class Rise(NamedTuple):
@@ -135,8 +135,8 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
 
 
 @building_block
-def _most_over_margin(profile: Profile, rise: Rise, half: Sample, full: Sample, bundles: Bundles) -> float:
-    """W(d + m), with samples over the margin that are kept; half, full: the one in the middle, and the last of them."""
+def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample, bundles: Bundles) -> float:
+    """Work out W(d + m), and keep samples over the margin; middle, full: those at half of it, and at its end."""
     scratch = scratch_at(bundles.scratch)
     samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.floor)
     last = rise.free
@@ -144,7 +144,7 @@ def _most_over_margin(profile: Profile, rise: Rise, half: Sample, full: Sample, 
         if k == 0:
             found = rise.free
         elif k == SAMPLES // 2:
-            found = half
+            found = middle
         elif k == SAMPLES:
             found = full
         else:
@@ -216,36 +216,36 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
     reference, smooth = max(rise.least, full.volume - floor), keep_tangents(profile, full.at, False, entries)
     if not may_count(profile, floor, reference, distances, entries):
         return False
-    half, _, _ = sample(profile, free.at + (_EARLY if smooth else 0.5) * margin, bundles)
-    keep_tangents(profile, half.at, True, entries)
+    second, _, _ = sample(profile, free.at + (_EARLY if smooth else 0.5) * margin, bundles)
+    keep_tangents(profile, second.at, True, entries)
     if not may_count(profile, floor, reference, distances, entries):
         return False
     level, stored, last = 0, 0, free
     if smooth:
         # The overlap with convex primitives rises until there.
-        level = _take(profile, level, free, half, floor, reference, bundles)
-        level = _take(profile, level, half, full, floor, reference, bundles)
+        level = _take(profile, level, free, second, floor, reference, bundles)
+        level = _take(profile, level, second, full, floor, reference, bundles)
         last = full
-    elif _is_late(profile, free, half, full, floor, reference, distances):
+    elif _is_late(profile, free, second, full, floor, reference, distances):
         return False
     else:
-        reference, stored = max(reference, _most_over_margin(profile, rise, half, full, bundles)), SAMPLES
+        reference, stored = max(reference, _most_over_margin(profile, rise, second, full, bundles)), SAMPLES
     _go_on(profile, level, last, stored, may_rise, rise, reference, bundles)
     return False
 
 
 @building_block
 def _is_late(
-    profile: Profile, free: Sample, half: Sample, full: Sample, floor: float, reference: float, distances: FloatArray
+    profile: Profile, free: Sample, second: Sample, full: Sample, floor: float, reference: float, distances: FloatArray
 ) -> bool:
     """Whether an overlap that seems to rise all along the margin lets every strength begin too late to count."""
-    if not (floor <= half.volume <= full.volume and min(free.slope, half.slope, full.slope) >= 0.0):
+    if not (floor <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
         return False
     late = True
     for level in range(STRENGTHS):
         latest = latest_of(profile, level, distances)
-        at = min(latest + _DOUBT * (full.at - half.at), full.at)
-        a, b = (free, half) if at < half.at else (half, full)
+        at = min(latest + _DOUBT * (full.at - second.at), full.at)
+        a, b = (free, second) if at < second.at else (second, full)
         reached = cubic(a, b, max(at - a.at, 0.0) / (b.at - a.at))
         late = late and latest <= full.at and reached - floor < (level + 0.5) / STRENGTHS * reference
     return late

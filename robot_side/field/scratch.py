@@ -14,7 +14,7 @@ TOUCH_STRENGTH: Final = 4
 CLUSTER: Final = 6
 """Gripper spheres that follow each other, and are passed over together."""
 SAMPLES: Final = 4
-"""Steps between samples of an overlap profile over the margin"""
+"""Steps between samples of an overlap profile over the margin; even, so that one lies in its middle"""
 
 PAIR: Final = np.dtype(
     [

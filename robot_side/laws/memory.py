@@ -155,7 +155,7 @@ class Memory:
         self.prospect: np.ndarray = np.zeros(1, dtype=PROSPECT)
         self.direction: FloatArray = np.zeros(3)
         self.able: FloatArray = np.zeros(FOUND + limits.velocity_rad_s.size)
-        """Speed and acceleration there, and by how much the motion is off"""
+        """Speed and acceleration there, by how much the motion is off, and the joints' rates"""
         self.displacement_m: FloatArray = np.zeros(3)
         """δ of the overlap that is looked at"""
         self.push: FloatArray = np.zeros(3)

@@ -70,7 +70,7 @@ def test_another_number_of_views_than_of_columns_is_refused() -> None:
 
 def test_an_array_with_gaps_is_refused() -> None:
     owner = Owner(points=np.zeros((4, 6))[:, ::2])
-    with pytest.raises(ValueError, match=r"points: float64 \(4, 3\) .*valid: C-contiguous float64 \(n, 3\)"):
+    with pytest.raises(ValueError, match=r"points: float64 \(4, 3\) .*valid: C-contiguous, aligned float64 \(n, 3\)"):
         DECLARED.bundle(owner)
 
 
@@ -79,6 +79,7 @@ def test_an_array_with_gaps_is_refused() -> None:
     [
         Owner(indices=np.zeros(3, dtype=np.int32)),
         Owner(points=np.zeros((4, 2))),
+        Owner(points=np.zeros(97, dtype=np.uint8)[1:].view(np.float64).reshape(4, 3)),
         Owner(turns=np.zeros((3, 2, 3), dtype=np.float32)),
     ],
 )
