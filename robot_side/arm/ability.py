@@ -1,4 +1,4 @@
-"""What the arm can do along a direction in one pose: how fast, and how fast its speed changes there."""
+"""Find what the arm can do along a direction in one pose: its speed there, and how fast that changes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +17,7 @@ _MET = 1e-6
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
 FOUND: Final = 3
-"""Of what `find_ability` finds, the numbers before the joints' rates."""
+"""`find_ability` finds this many numbers, then the joints' rates."""
 _twist = on_stack(6)
 
 
@@ -70,7 +70,7 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
 
 ABILITY: Final = (*(input_array(2), input_array(1), NUMBER, input_array(1), input_array(1), output_array(1)),)
-"""What `find_ability` takes, for who calls it by its address."""
+"""Numba types of the arguments of `find_ability`, for a call by its address."""
 
 
 @compiled(*ABILITY, returns=TRUTH)

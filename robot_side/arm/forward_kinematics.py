@@ -223,14 +223,13 @@ def _place(
         of_arm += joints[number].of_arm
     if arm.size != of_arm or fingers.size != joints.size - of_arm or poses.shape[0] != links.size:
         return False
+    # The Jacobian holds the axes and anchors until the tool's place is known.
     _place_links(links, joints, arm, fingers, poses, jacobian)
 
     carrier = tool[0].link
     turn = _quaternion(poses[carrier], 3)
-    position, rotation = (
-        _on_link(poses[carrier], _rotation(turn), _vector(tool[0].position)),
-        _rotation(_product(turn, _quaternion(tool_quaternion, 0))),
-    )
+    position = _on_link(poses[carrier], _rotation(turn), _vector(tool[0].position))
+    rotation = _rotation(_product(turn, _quaternion(tool_quaternion, 0)))
     for i in range(3):
         tool_position[i] = position[i]
         for j in range(3):
@@ -240,14 +239,14 @@ def _place(
         joint = joints[number]
         if not joint.of_arm:
             continue
-        of = joint.reading
-        axis, turned = (jacobian[0, of], jacobian[1, of], jacobian[2, of]), (0.0, 0.0, 0.0)
+        column = joint.reading
+        axis, turned = (jacobian[0, column], jacobian[1, column], jacobian[2, column]), (0.0, 0.0, 0.0)
         linear = axis
         if not joint.slides:
-            lever = subtract(position, (jacobian[3, of], jacobian[4, of], jacobian[5, of]))
+            lever = subtract(position, (jacobian[3, column], jacobian[4, column], jacobian[5, column]))
             linear, turned = cross(axis, lever), axis
         for i in range(3):
-            jacobian[i, of], jacobian[3 + i, of] = linear[i], turned[i]
+            jacobian[i, column], jacobian[3 + i, column] = linear[i], turned[i]
 
     before = -1
     for number in range(points.size):

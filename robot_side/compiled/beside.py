@@ -20,7 +20,7 @@ _MOST_PROCESSES: Final = 4
 """With more, half of the work would be done twice; each takes 0.4 GB."""
 
 
-class Queue:
+class KernelQueue:
     """Kernels for several processes, the largest first: each process asks for its next, so that all end together.
 
     A function that several kernels call is compiled once in each process that needs it. So the size of a kernel is
@@ -51,7 +51,7 @@ def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str]
     A process may be killed, or find no room on the disk. `prepare` compiles what is missing then.
     """
     count = min(count, _MOST_PROCESSES, len(kernels))
-    waiting = Queue(kernels, count)
+    waiting = KernelQueue(kernels, count)
     with ExitStack() as processes:
         channels = [processes.enter_context(Companion(__name__)).channel for _ in range(count)]
         for channel in channels:
@@ -74,8 +74,8 @@ def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str]
                     hand_on(channels.index(channel))
 
 
-def _end_with(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -> None:
-    """Take names of kernels; a compilation cannot be asked to stop."""
+def _listen(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -> None:
+    """Take names of kernels from the owner, and end with it: a compilation cannot be asked to stop."""
     while not owner.ended:
         select.select([owner], [], [])
         with speaking:
@@ -88,7 +88,7 @@ def main() -> None:
     """Compile each kernel whose name comes, which says its module, too; end where nothing can be kept."""
     owner, _ = companion_channel(sys.argv[1:])
     speaking, names = threading.Lock(), SimpleQueue[str]()
-    threading.Thread(target=_end_with, args=(owner, speaking, names), daemon=True).start()
+    threading.Thread(target=_listen, args=(owner, speaking, names), daemon=True).start()
     while True:
         name = names.get()
         import_module(name.rpartition(".")[0])

@@ -19,9 +19,9 @@ from robot_side.compiled.machine_code import kept
 from robot_side.compiled.numba_inside import (
     WithoutMachineCode,
     entry_point,
+    ignore_constant_flags,
     keep_on_disk,
     machine,
-    once_for_both,
 )
 from robot_side.compiled.sources import digest
 
@@ -89,7 +89,7 @@ def inlined(function: _Function) -> _Function:
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
-    return cast(_Function, once_for_both(numba.njit(**_FOR_CALLERS)(function)))
+    return cast(_Function, ignore_constant_flags(numba.njit(**_FOR_CALLERS)(function)))
 
 
 def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:

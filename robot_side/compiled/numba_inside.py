@@ -74,8 +74,8 @@ class WithoutMachineCode(CompilerBase):
         return [passes]
 
 
-def once_for_both(dispatcher: Any) -> Any:
-    """Let callers share one version of a function: by default Numba compiles one for True and one for False."""
+def ignore_constant_flags(dispatcher: Any) -> Any:
+    """Compile one version of a function for all callers: by default Numba compiles one for True and one for False."""
     of_types = dispatcher.get_call_template
 
     def plain(given: Any) -> Any:

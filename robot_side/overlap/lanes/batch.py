@@ -27,6 +27,11 @@ from robot_side.overlap.lanes.lanes import (
 Run = Callable[[FloatArray, FloatArray, Any, FloatArray, FloatArray, FloatArray, IntArray], int]
 
 
+def found_columns(inputs: int) -> tuple[int, int, int]:
+    """Number a block's columns after the pairs' own: the verdict, the solid's volume, the result."""
+    return inputs, inputs + 1, inputs + 2
+
+
 @inlined
 def _fill_group(block: FloatArray, count: int, inputs: int) -> None:
     """Copy the first lane to those that the last group has beyond `count`."""
@@ -50,8 +55,8 @@ def batch(
     is returned. The last entry is the number n of pairs that lanes worked out; ~n, below 0, where a number may be NaN
     or out of range.
     """
-    lanes, indices = on_stack((inputs + 2 + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
-    bounds, solid_volume, result = inputs, inputs + 1, inputs + 2
+    bounds, solid_volume, result = found_columns(inputs)
+    lanes, indices = on_stack((result + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
 
     @inlined
     def run(

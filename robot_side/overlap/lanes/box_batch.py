@@ -15,7 +15,7 @@ from robot_side.compiled.kernel import (
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.checks.arguments import LARGEST, ORTHONORMALITY
-from robot_side.overlap.lanes.batch import batch
+from robot_side.overlap.lanes.batch import batch, found_columns
 from robot_side.overlap.lanes.box_lane import Columns, box_lane
 from robot_side.overlap.lanes.lanes import (
     LANES,
@@ -36,7 +36,7 @@ from robot_side.overlap.lanes.lanes import (
 
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
-_BOUNDS, _SOLID_VOLUME, _RESULT = 19, 20, 21
+_BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SLACK = 1e-5
 """Share of all lengths by which bounds must settle a pair: rotations are orthonormal only to 1e-6."""

@@ -15,7 +15,7 @@ from robot_side.compiled.kernel import (
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.checks.arguments import LARGEST
-from robot_side.overlap.lanes.batch import batch
+from robot_side.overlap.lanes.batch import batch, found_columns
 from robot_side.overlap.lanes.lanes import (
     LANES,
     NOTHING,
@@ -38,7 +38,7 @@ from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 
 # Columns of a block: what a pair consists of, then what its bounds tell, then its result.
 _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
-_BOUNDS, _SOLID_VOLUME, _RESULT = 16, 17, 18
+_BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SURE = 1.0 + 1e-9
 """Bounds settle a pair only with this margin for what they round."""

@@ -13,7 +13,7 @@ import pytest
 from common.companion.process import Companion
 from robot_side.compiled import beside
 from robot_side.compiled import warm_up as warm_up_module
-from robot_side.compiled.beside import Queue, compile_beside
+from robot_side.compiled.beside import KernelQueue, compile_beside
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
@@ -26,7 +26,7 @@ def ours() -> list[Compiled]:
 
 def taken_in_turns(kernels: Sequence[Compiled], processes: int) -> list[list[Compiled]]:
     """What each gets when all take as long as their bytecode is."""
-    queue, busy, found = Queue(kernels, processes), [0] * processes, [list[Compiled]() for _ in range(processes)]
+    queue, busy, found = KernelQueue(kernels, processes), [0] * processes, [list[Compiled]() for _ in range(processes)]
     while (kernel := queue.take(place := busy.index(min(busy)))) is not None:
         before = size(found[place])
         found[place].append(kernel)
@@ -53,7 +53,7 @@ def test_what_another_process_has_compiled_most_of_is_taken_last() -> None:
         next(kernel for kernel in ours() if kernel.function.__name__ == name)
         for name in ("precise_boxes", "precise_tetrahedra", "find_prospect")
     )
-    queue = Queue([boxes, tetrahedra, small], 2)
+    queue = KernelQueue([boxes, tetrahedra, small], 2)
     assert queue.take(0) is boxes
     assert [queue.take(1), queue.take(1), queue.take(1)] == [small, tetrahedra, None]
 
@@ -70,6 +70,14 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
     for kernel in fresh:
         kernel.prepare()
     assert [kernel.cache_hits for kernel in fresh] == [1, 1, 1]
+
+
+@pytest.mark.processes
+def test_a_process_that_can_keep_nothing_ends_and_claims_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/nowhere")
+    told: list[str] = []
+    compile_beside(fresh_kernels(), 2, told.append)
+    assert told == []
 
 
 @pytest.mark.processes
